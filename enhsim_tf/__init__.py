@@ -1,0 +1,30 @@
+"""ML-enhanced simulation: realistic telemetry from a coarse simulator (Feldman 2020, arXiv 2008.12082).
+
+The public names below are imported on first use, so `import enhsim_tf` costs milliseconds and only the rooms
+that hold a network pay for TensorFlow.
+"""
+
+import importlib
+
+__version__ = "0.1.0"
+
+_ROOMS = {
+    "Degraded": "simulator",
+    "EnhancedSimulator": "enhanced_simulator",
+    "InputError": "errors",
+    "NoiseGAN": "noise_gan",
+    "ParquetStore": "store",
+    "SquareWave": "simulator",
+    "SquareWaveSimulator": "simulator",
+    "Telemetry": "telemetry",
+    "build_enhancer": "enhancer",
+    "extract_noise": "noise",
+    "read_telemetry": "telemetry",
+}
+__all__ = list(_ROOMS)
+
+
+def __getattr__(name: str):
+    if name in _ROOMS:
+        return getattr(importlib.import_module(f"enhsim_tf.{_ROOMS[name]}"), name)
+    raise AttributeError(f"module 'enhsim_tf' has no attribute {name!r}")

@@ -1,0 +1,226 @@
+"""The product, steps 5 and "Combined" of the paper's pipeline: coarse simulator -> enhanced -> + noise.
+
+It puts the rooms below together and trains none of their networks by hand.
+"""
+
+import dataclasses
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import keras
+import numpy as np
+
+from enhsim_tf import enhancer as enhancer_room
+from enhsim_tf.errors import InputError
+from enhsim_tf.files import replace_folder, sha256, write_json
+from enhsim_tf.noise import extract_noise, noise_unit
+from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.simulator import Degraded, SquareWaveSimulator, paired_windows, units_of
+from enhsim_tf.telemetry import Telemetry, cut_windows, random_offsets
+
+_FORMAT = "enhsim_tf.EnhancedSimulator/1"
+_NETWORKS = ("enhancer", "generator", "discriminator")
+_START_RANGE = 1_000_000  # samples; windows begin at a random one of these, so at every phase of the waves
+
+
+class EnhancedSimulator:
+    """A coarse simulator whose output is enhanced to realistic telemetry.
+
+    Args:
+        coarse: The coarse simulator.
+        enhancer: Network one, from coarse to enhanced windows of shape `(windows, samples)`.
+        noise: Network two, trained.
+        interval_s: Sampling interval in seconds.
+        offset: What the enhancer's zero stands for, in the telemetry's unit.
+        scale: What the enhancer's one stands for, in the telemetry's unit.
+
+    Example:
+    >>> simulator = EnhancedSimulator.fit(telemetry, coarse=SquareWaveSimulator.fit(telemetry), seed=0)
+    >>> windows = simulator.generate(num_windows=1000, scenario=Degraded("stuck", severity=0.5), seed=1)
+    >>> simulator.save("model_dir")
+    >>> simulator = EnhancedSimulator.load("model_dir")
+    """
+
+    def __init__(
+        self,
+        coarse: SquareWaveSimulator,
+        enhancer: keras.Model,
+        noise: NoiseGAN,
+        interval_s: float = 1.0,
+        offset: float = 0.0,
+        scale: float = 1.0,
+    ):
+        self.coarse, self.enhancer, self.noise = coarse, enhancer, noise
+        self.interval_s, self.offset, self.scale = float(interval_s), float(offset), float(scale)
+
+    @property
+    def window(self) -> int:
+        """Samples of a window."""
+        return self.enhancer.input_shape[1]
+
+    @classmethod
+    def fit(
+        cls,
+        telemetry: Telemetry,
+        coarse: SquareWaveSimulator | None = None,
+        seed: int = 0,
+        num_windows: int = 1_500,
+        epochs: int = 40,
+        num_iterations: int = 1_000,
+        moving_average: int = 25,
+        normalise: bool = True,
+        window: int = 500,
+        verbose: int | str = "auto",
+    ) -> "EnhancedSimulator":
+        """Trains both networks on nominal telemetry.
+
+        Args:
+            telemetry: Nominal telemetry, at least two windows long.
+            coarse: The coarse simulator, configured like the telemetry; None fits square waves to it.
+            seed: Seed of everything drawn.
+            num_windows: Training windows, cut at random offsets.
+            epochs: Passes of the enhancer over the windows.
+            num_iterations: Adversarial iterations of the noise networks.
+            moving_average: Width of the moving average that separates noise, in samples.
+            normalise: Whether the networks see the telemetry in units of the coarse simulator's levels, and its noise at
+                the scale of the paper's; False leaves values as they are, as the paper does.
+            window: Samples of a window.
+            verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
+
+        Returns:
+            The trained simulator.
+
+        Raises:
+            InputError: If the telemetry is shorter than two windows.
+        """
+        if len(telemetry) < 2 * window:
+            raise InputError(
+                f"Expected at least two windows of {window} samples. Received: {len(telemetry)} samples. Give a longer series."
+            )
+        coarse = SquareWaveSimulator.fit(telemetry) if coarse is None else coarse
+        offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
+        rng = np.random.default_rng(seed)
+
+        offsets = random_offsets(len(telemetry), window, num_windows, rng)
+        source, target = ((pair - offset) / scale for pair in paired_windows(telemetry, coarse, offsets, window))
+        network = enhancer_room.build_enhancer(window, seed=seed)
+        enhancer_room.fit_windows(network, source, target, epochs, batch_size=15, seed=seed, verbose=verbose)
+
+        noise, _ = extract_noise(telemetry.values, moving_average)
+        noise_windows = cut_windows(noise, random_offsets(len(noise), window, num_windows, rng), window)
+        noise_scale = noise_unit(noise) if normalise else 1.0
+        gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_scale, seed=seed)
+        gan.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
+        return cls(coarse, network, gan, telemetry.interval_s, offset, scale)
+
+    def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+        """Coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`."""
+        rng = np.random.default_rng(seed)
+        begins = rng.integers(0, _START_RANGE, num_windows)
+        return self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
+
+    def enhance(self, coarse: np.ndarray) -> np.ndarray:
+        """Enhanced, still clean windows (step 5) from coarse ones, float32 of the same shape `(windows, samples)`."""
+        enhanced = enhancer_room.enhance(self.enhancer, (coarse - self.offset) / self.scale)
+        return enhanced * np.float32(self.scale) + np.float32(self.offset)
+
+    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+        """Generates realistic telemetry windows: enhanced signal plus generated noise ("Combined").
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Seed of the windows' first samples, of the scenario and of the noise; the same seed gives the same.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
+        """
+        return self.enhance(self.generate_coarse(num_windows, scenario, seed)) + self.noise.generate(num_windows, seed)
+
+    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
+        """Generates one continuous series of any length, without seams.
+
+        Windows that overlap by half are faded into each other: the enhanced signal with weights that add up to one,
+        the noise, which is independent from window to window, with weights whose squares do, so its variance stays.
+
+        Args:
+            num_samples: Length of the series.
+            scenario: A degraded mode over the whole series, or None.
+            seed: Seed of the scenario and of the noise.
+            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
+
+        Returns:
+            float32 array of shape `(num_samples,)`, in the telemetry's unit.
+        """
+        if num_samples < 1:
+            raise InputError(f"Expected at least one sample. Received: num_samples={num_samples}.")
+        window, hop = self.window, self.window // 2
+        num_windows = 1 + max(0, -(-(num_samples - window) // hop))
+        length = window + (num_windows - 1) * hop
+        rng = np.random.default_rng(seed)
+        if scenario is not None:  # the last window may reach beyond the end; the onset stays where it was asked for
+            scenario = dataclasses.replace(scenario, onset=scenario.onset * num_samples / length)
+        coarse = self.coarse.simulate(start_s + self.interval_s * np.arange(length)[None], scenario, rng)[0]
+        begins = hop * np.arange(num_windows)
+        enhanced = self.enhance(cut_windows(coarse, begins, window))
+        noise = self.noise.generate(num_windows, seed)
+
+        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # fade^2 of two windows half a window apart adds up to 1
+        signal, power, total = np.zeros(length), np.zeros(length), np.zeros(length)
+        for begin, clean, rough in zip(begins, enhanced, noise, strict=True):
+            stretch = slice(begin, begin + window)
+            signal[stretch] += fade**2 * clean
+            total[stretch] += fade**2
+            power[stretch] += fade * rough
+        return (signal / total + power / np.sqrt(total))[:num_samples].astype(np.float32)
+
+    def save(self, folder: str | os.PathLike) -> None:
+        """Saves to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums."""
+        with replace_folder(folder) as temporary:
+            for name, model in zip(_NETWORKS, (self.enhancer, self.noise.generator, self.noise.discriminator), strict=True):
+                model.save(temporary / f"{name}.keras", include_optimizer=False)
+            settings = {
+                "coarse": self.coarse.get_config(),
+                "noise": self.noise.get_config(),
+                "interval_s": self.interval_s,
+                "offset": self.offset,
+                "scale": self.scale,
+            }
+            write_json(temporary / "settings.json", settings)
+            checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
+            write_json(temporary / "manifest.json", {"format": _FORMAT, "keras": keras.__version__, "sha256": checksums})
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
+        """Loads what `save` wrote, in Keras' safe mode.
+
+        Raises:
+            InputError: If the folder is not one that `save` wrote, or if a file in it was changed.
+        """
+        folder = Path(folder)
+        try:
+            manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+            known, checksums = manifest["format"] == _FORMAT, manifest["sha256"]
+            complete = set(checksums) == {"settings.json", *(f"{name}.keras" for name in _NETWORKS)}
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__}).") from None
+        if not (known and complete):
+            raise InputError(f"Expected the format {_FORMAT}. Received: {str(manifest['format'])[:80]!r} in {folder}.")
+        for name, expected in checksums.items():
+            if not (folder / name).is_file() or sha256(folder / name) != expected:
+                raise InputError(
+                    f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again."
+                )
+        try:
+            settings = json.loads((folder / "settings.json").read_text(encoding="utf-8"))
+            enhancer, generator, discriminator = (
+                keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS
+            )
+            coarse = SquareWaveSimulator.from_config(settings["coarse"])
+            noise = NoiseGAN(generator, discriminator, **settings["noise"])
+            return cls(coarse, enhancer, noise, settings["interval_s"], settings["offset"], settings["scale"])
+        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            reason = (str(error).splitlines() or [""])[0]
+            raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

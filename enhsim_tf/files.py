@@ -1,0 +1,75 @@
+"""Files and folders that appear whole or not at all, and their checksums.
+
+Everything the package writes goes to a temporary name beside its destination and is renamed when it is complete:
+a killed process leaves either the old content or the new, never a half.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.errors import InputError
+
+
+def _temporary(path: Path) -> Path:
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.tmp")
+
+
+def make_folder(path: str | os.PathLike) -> Path:
+    """Creates `path` with its parents and returns it; `InputError` where it cannot be a writable folder."""
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = _temporary(path / "probe")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(f"Expected a folder that can be written to. Received: {path} ({error.strerror}). Name another.") from None
+    return path
+
+
+@contextlib.contextmanager
+def replace_file(path: str | os.PathLike) -> Iterator[Path]:
+    """Yields a temporary path; when the block ends well, the file written there takes the name `path`."""
+    path = Path(path)
+    temporary = _temporary(path).with_suffix(path.suffix)  # writers that look at the suffix see the right one
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def replace_folder(path: str | os.PathLike) -> Iterator[Path]:
+    """Yields a temporary folder; when the block ends well, it takes the name `path`, replacing what stood there."""
+    path = Path(path)
+    make_folder(path.parent)
+    temporary, old = _temporary(path), _temporary(path)
+    temporary.mkdir()
+    try:
+        yield temporary
+        if path.exists():
+            os.replace(path, old)
+        os.replace(temporary, path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def write_json(path: str | os.PathLike, content: Any) -> None:
+    """Writes `content` as indented JSON, whole or not at all."""
+    with replace_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def sha256(path: str | os.PathLike) -> str:
+    """The SHA-256 checksum of a file, as hexadecimal text."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

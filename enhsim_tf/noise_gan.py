@@ -1,0 +1,237 @@
+"""Network two, steps 7 to 9 of the paper's pipeline: an adversarial pair that learns noise (section 2.3).
+
+It knows windows of noise and nothing of telemetry. Outside, windows have the shape `(windows, samples)`; between the
+two networks `(windows, samples, 1)`.
+"""
+
+from collections.abc import Callable
+
+import keras
+import numpy as np
+import tensorflow as tf
+
+from enhsim_tf.convolution_maximum import convolution_maximum
+
+REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
+
+
+def build_generator(
+    window: int = 500, latent: int = 16, hidden_units: int = 64, activation: str = "tanh", seed: int = 0
+) -> keras.Sequential:
+    """Builds the paper's generator, Figure 9: Dense 64, BatchNormalization, Dense 500, Reshape.
+
+    Args:
+        window: Samples of a window.
+        latent: Elements of the latent vector.
+        hidden_units: Units of the first layer.
+        activation: Activation of the last Dense layer; tanh keeps the noise within -1 and 1.
+        seed: Seed of the weights.
+
+    Returns:
+        An uncompiled Keras model from shape `(windows, latent)` to `(windows, window, 1)`.
+    """
+    first, last = (keras.initializers.HeUniform(seed=seed * 1000 + number) for number in (100, 101))
+    return keras.Sequential(
+        [
+            keras.Input((latent,)),
+            keras.layers.Dense(hidden_units, activation="relu", kernel_initializer=first),
+            keras.layers.BatchNormalization(),
+            keras.layers.Dense(window, activation=activation, kernel_initializer=last),
+            keras.layers.Reshape((window, 1)),
+        ],
+        name="generator",
+    )
+
+
+def build_discriminator(
+    window: int = 500, filters: int = 500, width: int = 20, stride: int = 4, narrow_units: int = 25, dropout: float = 0.0, seed: int = 0
+) -> keras.Sequential:
+    """Builds the paper's discriminator, Figure 10: one convolution, its maximum, narrowing to one sigmoid neuron.
+
+    Args:
+        window: Samples of a window.
+        filters: Filters of the convolution.
+        width: Samples under a filter.
+        stride: Samples from one position of a filter to the next.
+        narrow_units: Units of the layer before the last.
+        dropout: Share dropped after the convolution and after the narrow layer; 0 leaves the layers out.
+        seed: Seed of the weights.
+
+    Returns:
+        An uncompiled Keras model from shape `(windows, window, 1)` to `(windows, 1)`, the probability of being real.
+    """
+    kernels = [keras.initializers.HeUniform(seed=seed * 1000 + number) for number in (200, 201, 202)]
+
+    def dropped(number: int) -> list[keras.layers.Layer]:
+        return [keras.layers.Dropout(dropout, seed=seed * 1000 + number)] if dropout else []
+
+    return keras.Sequential(
+        [
+            keras.Input((window, 1)),
+            keras.layers.Conv1D(filters, width, strides=stride, activation="relu", kernel_initializer=kernels[0]),
+            *dropped(300),
+            keras.layers.GlobalMaxPooling1D(),
+            keras.layers.Dense(narrow_units, activation="relu", kernel_initializer=kernels[1]),
+            *dropped(301),
+            keras.layers.Dense(1, activation="sigmoid", kernel_initializer=kernels[2]),
+        ],
+        name="discriminator",
+    )
+
+
+class NoiseGAN:
+    """The generator and the discriminator, trained against each other (paper, Figure 11).
+
+    Keras 3 reads `trainable` when a training step is built, not when a model is compiled; "compile, freeze, compile the
+    stack" therefore freezes the discriminator for ever. Here each step names the weights it moves, so "frozen" means
+    what the paper means.
+
+    Args:
+        generator: From `(rows, latent)` to `(rows, window, 1)`, as `build_generator` makes it; None builds the paper's.
+        discriminator: From `(rows, window, 1)` to `(rows, 1)`, as `build_discriminator` makes it; None builds the paper's.
+        batch_size: Rows of real and rows of generated noise a step.
+        learning_rate: Adam's learning rate, for both networks.
+        latent_span: The latent vector is standard normal times this.
+        mixed_batch: One discriminator update on real and generated rows together, instead of two in turn.
+        generated_in_training_mode: Whether the rows shown to the discriminator come from batch normalisation in training
+            mode instead of inference mode.
+        scale: The noise is divided by this for the networks and multiplied by it afterwards.
+        seed: Seed of every draw in training, and of the networks built here.
+    """
+
+    def __init__(
+        self,
+        generator: keras.Model | None = None,
+        discriminator: keras.Model | None = None,
+        batch_size: int = 200,
+        learning_rate: float = 0.001,
+        latent_span: float = 1.0,
+        mixed_batch: bool = False,
+        generated_in_training_mode: bool = False,
+        scale: float = 1.0,
+        seed: int = 0,
+    ):
+        self.generator = build_generator(seed=seed) if generator is None else generator
+        self.discriminator = build_discriminator(self.generator.output_shape[1], seed=seed) if discriminator is None else discriminator
+        self.combined = keras.Sequential([self.generator, self.discriminator], name="combined")
+        self.batch_size, self.latent_span, self.scale = batch_size, latent_span, scale
+        self.mixed_batch, self.generated_in_training_mode = mixed_batch, generated_in_training_mode
+        self.loss = keras.losses.BinaryCrossentropy()
+        self.discriminator_optimizer = keras.optimizers.Adam(learning_rate)
+        self.generator_optimizer = keras.optimizers.Adam(learning_rate)
+        self.discriminator_optimizer.build(self.discriminator.trainable_variables)
+        self.generator_optimizer.build(self.generator.trainable_variables)
+        self.seeds = keras.random.SeedGenerator(seed)
+        self._step = tf.function(self.train_step)
+
+    def train_step(self, noise: tf.Tensor) -> None:
+        """One iteration of Figure 11: the discriminator learns, then the generator through the frozen discriminator.
+
+        Args:
+            noise: All real rows, float32 of shape `(windows, window, 1)`; a batch is drawn from them.
+        """
+        # equal amounts of real and generated rows
+        real = tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=self.seeds))
+        generated = self.generator(self._draw_latent(), training=self.generated_in_training_mode)
+
+        # the discriminator learns to tell them apart: real rows are tagged 1, generated rows 0
+        if self.mixed_batch:
+            self._update_discriminator(tf.concat([real, generated], 0), tf.concat([self._tags(REAL), self._tags(GENERATED)], 0))
+        else:
+            self._update_discriminator(real, self._tags(REAL))
+            self._update_discriminator(generated, self._tags(GENERATED))
+
+        # the generator learns through the combined model: the tags are reversed, only its own weights move
+        with tf.GradientTape() as tape:
+            judged = self._judge(self.generator(self._draw_latent(), training=True))
+            loss = self.loss(self._tags(REAL), judged)
+        weights = self.generator.trainable_variables
+        self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
+
+    def _update_discriminator(self, rows: tf.Tensor, tags: tf.Tensor) -> None:
+        weights = self.discriminator.trainable_variables
+        with tf.GradientTape(watch_accessed_variables=False) as tape:
+            tape.watch([weight.value for weight in weights])
+            loss = self.loss(tags, self._judge(rows))
+        self.discriminator_optimizer.apply(tape.gradient(loss, weights), weights)
+
+    def _judge(self, rows: tf.Tensor) -> tf.Tensor:
+        """The discriminator in training mode, its first two layers by the fast path where they are what that computes."""
+        first, second, *rest = self.discriminator.layers
+        if not (isinstance(first, keras.layers.Conv1D) and isinstance(second, keras.layers.GlobalMaxPooling1D)):
+            return self.discriminator(rows, training=True)
+        kernel = tf.squeeze(tf.convert_to_tensor(first.kernel), 1)
+        judged = convolution_maximum(tf.squeeze(rows, 2), kernel, tf.convert_to_tensor(first.bias), first.strides[0])
+        for layer in rest:
+            judged = layer(judged, training=True) if isinstance(layer, keras.layers.Dropout) else layer(judged)
+        return judged
+
+    def _draw_latent(self) -> tf.Tensor:
+        return self.latent_span * keras.random.normal((self.batch_size, self.generator.input_shape[1]), seed=self.seeds)
+
+    def _tags(self, tag: float) -> tf.Tensor:
+        return tf.fill((self.batch_size, 1), tag)
+
+    def fit(
+        self,
+        windows: np.ndarray,
+        num_iterations: int = 1_000,
+        record_every: int = 100,
+        on_record: Callable[[int, "NoiseGAN"], None] | None = None,
+        verbose: bool | None = None,
+    ) -> dict[str, np.ndarray]:
+        """Trains both networks.
+
+        Args:
+            windows: Real noise, float32 of shape `(windows, samples)`.
+            num_iterations: Iterations of `train_step`.
+            record_every: Iterations between two records.
+            on_record: Called with the iteration and this object at each record.
+            verbose: Whether to show a progress bar; None shows one on a terminal only.
+
+        Returns:
+            The history, one entry a record, the first before training: `iteration`, and for `real` and `generated` rows
+            `accuracy_*` (share judged rightly) and `loss_*` (binary cross-entropy).
+        """
+        from tqdm import tqdm
+
+        noise = tf.constant(np.asarray(windows, np.float32)[:, :, None] / self.scale)
+        history = []
+        disable = None if verbose is None else not verbose  # None: tqdm looks whether there is a terminal
+        with tqdm(total=num_iterations, desc="noise GAN", unit="iteration", disable=disable) as bar:
+            for iteration in range(num_iterations + 1):
+                if iteration % record_every == 0 or iteration == num_iterations:
+                    history.append({"iteration": iteration, **self._evaluate(noise)})
+                    if on_record is not None:
+                        on_record(iteration, self)
+                if iteration < num_iterations:
+                    self._step(noise)
+                    bar.update()
+        return {key: np.array([record[key] for record in history]) for key in history[0]}
+
+    def _evaluate(self, noise: tf.Tensor) -> dict[str, float]:
+        """Accuracy and loss of the discriminator on a fresh batch of each kind, in inference mode."""
+        real = tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=self.seeds))
+        generated = self.generator(self._draw_latent(), training=False)
+        record = {}
+        for kind, rows, tag in (("real", real, REAL), ("generated", generated, GENERATED)):
+            judged = self.discriminator(rows, training=False)
+            record[f"accuracy_{kind}"] = float(np.mean((np.asarray(judged) > 0.5) == (tag == REAL)))
+            record[f"loss_{kind}"] = float(self.loss(self._tags(tag), judged))
+        return record
+
+    def generate(self, num_windows: int, seed: int, batch_size: int = 1_024) -> np.ndarray:
+        """Generates noise (step 9), float32 of shape `(num_windows, samples)`; the same seed gives the same.
+
+        Args:
+            num_windows: Number of windows.
+            seed: Seed of the latent vectors.
+            batch_size: Windows a call of the network.
+        """
+        latent = np.random.default_rng(seed).standard_normal((num_windows, self.generator.input_shape[1]), np.float32)
+        noise = self.generator.predict(self.latent_span * latent, batch_size=batch_size, verbose=0)
+        return noise[:, :, 0] * np.float32(self.scale)
+
+    def get_config(self) -> dict:
+        """The settings that `generate` needs, as plain JSON types."""
+        return {"latent_span": self.latent_span, "scale": self.scale}

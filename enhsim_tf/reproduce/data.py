@@ -1,0 +1,170 @@
+"""The data of a run: telemetry placed in the store and read back, its parts, and the windows cut from them.
+
+Everything that the stages of `experiments` share and that trains nothing.
+"""
+
+import dataclasses
+import functools
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.noise import extract_noise, noise_unit
+from enhsim_tf.reproduce.settings import Settings
+from enhsim_tf.signals import sines, white_noise
+from enhsim_tf.simulator import Degraded, SquareWave, SquareWaveSimulator, degrade, paired_windows, units_of
+from enhsim_tf.store import ParquetStore
+from enhsim_tf.telemetry import Telemetry, cut_windows, disjoint_offsets, random_offsets, read_telemetry, split_by_time
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """Where real telemetry comes from: a file, and which of its columns."""
+
+    path: Path
+    column: str | None = None
+    time: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """One series with its parts, its coarse simulator and, where known in closed form, its true signal."""
+
+    telemetry: Telemetry
+    train: Telemetry
+    calibration: Telemetry | None
+    test: Telemetry
+    coarse: SquareWaveSimulator
+    periods_s: tuple[float, ...] | None = None
+    amplitudes: tuple[float, ...] | None = None
+
+    @property
+    def truth(self):
+        """The noiseless signal as a function of time, or None where nobody knows it."""
+        return None if self.periods_s is None else functools.partial(sines, periods_s=self.periods_s, amplitudes=self.amplitudes)
+
+
+def waves_of(settings: Settings) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Periods and amplitudes of each series of the paper's example, by the series' name."""
+    chosen = settings.telemetry
+    if chosen.layout == "separate":
+        return {
+            "orbit": ((chosen.orbit_period_s,), (chosen.orbit_amplitude,)),
+            "rotation": ((chosen.rotation_period_s,), (chosen.rotation_amplitude,)),
+        }
+    return {"orbit and rotation": ((chosen.orbit_period_s, chosen.rotation_period_s), (chosen.orbit_amplitude, chosen.rotation_amplitude))}
+
+
+def draw(settings: Settings, purpose: str) -> np.random.Generator:
+    """The generator of one purpose: draws for one do not move those for another."""
+    return np.random.default_rng([settings.seed, zlib.crc32(purpose.encode())])
+
+
+def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -> None:
+    """Places the telemetry in the store: the paper's example, or a real channel."""
+    chosen = settings.telemetry
+    if source is not None:
+        store.write(read_telemetry(source.path, source.column, source.time, 2 * chosen.window))
+        return
+    rng = draw(settings, "telemetry")
+    for name, (periods, amplitudes) in waves_of(settings).items():
+        clean = sines(chosen.interval_s * np.arange(chosen.num_samples), periods, amplitudes)
+        values = (clean + white_noise(chosen.num_samples, chosen.noise_sd, rng)).astype(np.float32)
+        store.write(Telemetry(values, chosen.interval_s, start="2020-01-01T00:00:00+00:00", name=name))
+
+
+class Data:
+    """The telemetry of a run, read back from the store, and its windows.
+
+    Args:
+        store: The store.
+        settings: Every number.
+        is_paper: Whether the store holds the paper's example, where the truth is known.
+    """
+
+    def __init__(self, store: ParquetStore, settings: Settings, is_paper: bool):
+        self.settings, self.window = settings, settings.telemetry.window
+        make = self._paper_channel if is_paper else self._real_channel
+        self.channels = [make(store.read(name)) for name in store.names()]
+
+    def _paper_channel(self, series: Telemetry) -> Channel:
+        split = self.settings.split
+        parts = split_by_time(series, (split.train, split.calibration, split.test), self.window)
+        periods, amplitudes = waves_of(self.settings)[series.name]
+        pairs, levels = zip(periods, amplitudes, strict=True), self.settings.enhancer.num_levels
+        coarse = SquareWaveSimulator([SquareWave(period, low=-size, high=size, num_levels=levels) for period, size in pairs])
+        return Channel(series, *parts, coarse, periods, amplitudes)
+
+    def _real_channel(self, series: Telemetry) -> Channel:
+        # a real channel is short: the gap between the parts gives way before either part falls below a window
+        test_length = max(int((1 - self.settings.split.real_train) * len(series)), self.window)
+        gap = min(self.window, max(0, len(series) - test_length - self.window))
+        train, test = series.part(0, len(series) - test_length - gap), series.part(len(series) - test_length, len(series))
+        return Channel(series, train, None, test, SquareWaveSimulator.fit(train, num_levels=self.settings.enhancer.num_levels))
+
+    def draw(self, purpose: str) -> np.random.Generator:
+        """The generator of one purpose."""
+        return draw(self.settings, purpose)
+
+    @property
+    def num_test_windows(self) -> int:
+        """Test windows that share no sample: the sample size of every rate measured on the test part."""
+        return sum(len(channel.test) // self.window for channel in self.channels)
+
+    @functools.cached_property
+    def units(self) -> tuple[float, float, float]:
+        """Offset and scale of the signal and scale of the noise; a real channel is normalised, the paper's is not."""
+        channel = self.channels[0]
+        if channel.truth is not None:
+            return 0.0, 1.0, 1.0
+        return *units_of(channel.coarse), noise_unit(extract_noise(channel.train.values, self.settings.noise.moving_average)[0])
+
+    def windows(self, part: str, num_windows: int | None, purpose: str = "") -> dict[str, np.ndarray]:
+        """Paired windows of one part of every channel, as many of each.
+
+        Args:
+            part: `train`, `calibration` or `test`.
+            num_windows: How many, at random offsets; None for all that share no sample.
+            purpose: Names the draw of the offsets.
+
+        Returns:
+            `coarse`, `target` (the telemetry) and `truth` (the noiseless signal where known, else the telemetry),
+            each of shape `(windows, samples)`.
+        """
+        rng, found = self.draw(purpose), []
+        for channel in self.channels:
+            series = getattr(channel, part)
+            if num_windows is None:
+                offsets = disjoint_offsets(len(series), self.window)
+            else:
+                offsets = random_offsets(len(series), self.window, num_windows // len(self.channels), rng)
+            coarse, target = paired_windows(series, channel.coarse, offsets, self.window)
+            times = series.time_s[offsets[:, None] + np.arange(self.window)]
+            truth = target if channel.truth is None else channel.truth(times).astype(np.float32)
+            found.append({"coarse": coarse, "target": target, "truth": truth})
+        return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}
+
+    def noise_windows(self, part: str, num_windows: int, purpose: str) -> np.ndarray:
+        """Windows of the noise that the moving average leaves of a part, at random offsets."""
+        rng = self.draw(purpose)
+        noises = [extract_noise(getattr(channel, part).values, self.settings.noise.moving_average)[0] for channel in self.channels]
+        each = num_windows // len(noises)
+        return np.concatenate([cut_windows(noise, random_offsets(len(noise), self.window, each, rng), self.window) for noise in noises])
+
+    def degraded_times(self) -> np.ndarray:
+        """Times of the windows that degraded modes are measured on, shape `(windows, samples)`."""
+        begins = self.draw("degraded windows").integers(0, 10**6, self.settings.detectors.num_windows)
+        return self.settings.telemetry.interval_s * (begins[:, None] + np.arange(self.window, dtype=np.float64))
+
+    def degraded_coarse(self, scenario: Degraded | None) -> np.ndarray:
+        """The coarse simulator in a degraded mode, at `degraded_times`."""
+        return self.channels[0].coarse.simulate(self.degraded_times(), scenario, self.draw(f"degraded {scenario}"))
+
+    def degraded_truth(self, scenario: Degraded | None, noisy: bool) -> np.ndarray:
+        """What the true vehicle of the paper's example sends in that mode, at the same times, with the same draws."""
+        channel, rng = self.channels[0], self.draw(f"degraded {scenario}")
+        size = sum(channel.amplitudes)
+        clean = degrade(channel.truth, self.degraded_times(), scenario, (-size, size), min(channel.periods_s), rng)
+        noise = white_noise(clean.size, self.settings.telemetry.noise_sd, self.draw(f"degraded noise {scenario}"))
+        return (clean + noise.reshape(clean.shape) if noisy else clean).astype(np.float32)

@@ -1,0 +1,109 @@
+"""Stages that are done once: each is kept under the hash of what it depends on and found again by the next run.
+
+A stage is a function that fills a folder. The folder appears whole, under a name that holds the hash of the stage's
+settings, of its code with all rooms below it, of the stages before it, and of the versions it ran on. A killed run
+therefore leaves only whole stages, and the next one goes on behind the last of them.
+"""
+
+import ast
+import hashlib
+import importlib.metadata
+import inspect
+import json
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.files import make_folder, replace_folder, write_json
+
+_PACKAGE = Path(__file__).parents[1]
+VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
+
+
+def default_cache() -> Path:
+    """Where stages are kept: `ENHSIM_TF_CACHE`, or `.cache` beside the package's sources, or the user's cache folder."""
+    if "ENHSIM_TF_CACHE" in os.environ:
+        return Path(os.environ["ENHSIM_TF_CACHE"])
+    checkout = _PACKAGE.parent
+    return checkout / ".cache" if (checkout / "pyproject.toml").exists() else Path.home() / ".cache" / "enhsim_tf"
+
+
+class Stages:
+    """The stages of one run.
+
+    Args:
+        cache: Folder the stages are kept in.
+        fresh: Whether to do every stage anew.
+        tell: Called with a line about each stage.
+    """
+
+    def __init__(self, cache: Path, fresh: bool = False, tell: Callable[[str], None] = print):
+        self.cache, self.fresh, self.tell = make_folder(cache), fresh, tell
+        self.seconds: dict[str, float] = {}
+        self.cached: dict[str, bool] = {}
+        self._keys: dict[str, str] = {}
+
+    def run(self, name: str, make: Callable[[Path], None], rooms: Iterable[str], settings: Any, after: Iterable[str] = ()) -> Path:
+        """Does a stage, or finds it done.
+
+        Args:
+            name: Name of the stage.
+            make: Fills the folder it is given.
+            rooms: Modules of the package that `make` works with.
+            settings: What else the result depends on, anything with a faithful `repr`.
+            after: Names of the stages whose results `make` reads.
+
+        Returns:
+            The folder with the stage's results.
+        """
+        depends = [name, repr(settings), _code(rooms), inspect.getsource(make), VERSIONS, [self._keys[before] for before in after]]
+        key = self._keys[name] = hashlib.sha256(json.dumps(depends).encode()).hexdigest()[:16]
+        folder = self.cache / f"{name}-{key}"
+        done = folder / "stage.json"
+        self.cached[name] = done.exists() and not self.fresh
+        if not self.cached[name]:
+            self.tell(f"{name:12} ...")
+            began = time.perf_counter()
+            with replace_folder(folder) as temporary:
+                make(temporary)
+                write_json(temporary / "stage.json", {"stage": name, "seconds": time.perf_counter() - began})
+        self.seconds[name] = json.loads(done.read_text(encoding="utf-8"))["seconds"]
+        self.tell(f"{name:12} {self.seconds[name]:7.1f} s{'  (from the cache)' if self.cached[name] else ''}")
+        return folder
+
+
+def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -> None:
+    """Keeps arrays and numbers of a stage."""
+    np.savez_compressed(folder / f"{name}.npz", **{key: np.asarray(value) for key, value in arrays.items()})
+
+
+def load_arrays(folder: Path, name: str = "arrays") -> dict[str, np.ndarray]:
+    """The arrays and numbers that `save_arrays` kept; numbers come back as arrays of shape `()`."""
+    with np.load(folder / f"{name}.npz", allow_pickle=False) as archive:
+        return dict(archive)
+
+
+def _code(rooms: Iterable[str]) -> str:
+    """Hash of the sources of `rooms` and of every room they import, directly or not."""
+    waiting, seen = list(rooms), {}
+    while waiting:
+        room = waiting.pop()
+        if room not in seen:
+            seen[room] = source = (_PACKAGE / f"{room.replace('.', '/')}.py").read_text(encoding="utf-8")
+            waiting += imports_of(source)
+    return hashlib.sha256("".join(f"{room}\n{seen[room]}" for room in sorted(seen)).encode()).hexdigest()
+
+
+def imports_of(source: str) -> list[str]:
+    """Names of the package's modules that a source imports, without the package's own name."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("enhsim_tf."):
+            found.append(node.module.removeprefix("enhsim_tf."))
+        elif isinstance(node, ast.ImportFrom) and node.module == "enhsim_tf":
+            found += [alias.name for alias in node.names]
+    return found

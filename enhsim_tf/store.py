@@ -1,0 +1,104 @@
+"""Telemetry at rest: the "storage and retrieval system" of the paper's section 2.
+
+One interface, `TelemetryStore`; a folder of Parquet files is the default behind it. A store keeps values, times,
+unit and name as they are and interprets none of them.
+"""
+
+import os
+import urllib.parse
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from enhsim_tf.errors import InputError
+from enhsim_tf.files import make_folder, replace_folder
+from enhsim_tf.telemetry import Telemetry
+
+_DAY_NS = 86_400 * 10**9
+
+
+class TelemetryStore(Protocol):
+    """What every store does."""
+
+    def write(self, telemetry: Telemetry) -> None:
+        """Keeps the series under its name, in place of what stood there."""
+
+    def read(self, name: str) -> Telemetry:
+        """The series kept under `name`; `InputError` if there is none."""
+
+    def names(self) -> list[str]:
+        """The names of the series kept here, sorted."""
+
+
+class ParquetStore:
+    """A folder with one folder a channel and in it one Parquet file a day (columns `time` and `value`).
+
+    Any tool that reads Parquet reads it: `pandas.read_parquet("store/attitude")`.
+
+    Args:
+        folder: Where the store lives; made when it does not exist.
+    """
+
+    def __init__(self, folder: str | os.PathLike):
+        self.folder = Path(folder)
+
+    def write(self, telemetry: Telemetry) -> None:
+        """Keeps the series under its name, in place of what stood there, whole or not at all."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        make_folder(self.folder)
+        start = np.datetime64((telemetry.start or "1970-01-01").removesuffix("+00:00"), "ns")
+        since_start = np.round(telemetry.time_s * 1e9).astype(np.int64)
+        times = start + since_start.astype("timedelta64[ns]")
+        described = {
+            "name": telemetry.name,
+            "unit": telemetry.unit,
+            "start": telemetry.start or "",
+            "interval_s": repr(telemetry.interval_s),
+            "offset_s": repr(telemetry.offset_s),
+        }
+        table = pa.table({"time": pa.array(times, pa.timestamp("ns", "UTC")), "value": pa.array(telemetry.values, pa.float32())})
+        table = table.replace_schema_metadata(described)
+        days = times.astype(np.int64) // _DAY_NS
+        edges = np.flatnonzero(np.diff(days, prepend=days[0] - 1))
+        with replace_folder(self._channel(telemetry.name)) as folder:
+            for first, stop in zip(edges, [*edges[1:], len(days)], strict=True):
+                file = folder / f"{np.datetime64(int(days[first]), 'D')}.parquet"
+                pq.write_table(table.slice(first, stop - first), file, compression="zstd")
+
+    def read(self, name: str) -> Telemetry:
+        """The series kept under `name`.
+
+        Raises:
+            InputError: If there is none, or if samples are missing from it.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        files = sorted(self._channel(name).glob("*.parquet"))
+        if not files:
+            raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
+        try:
+            table = pa.concat_tables([pq.read_table(file) for file in files])
+            about = {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
+            interval_s, offset_s = float(about["interval_s"]), float(about["offset_s"])
+            values = table["value"].to_numpy().astype(np.float32)
+            times = table["time"].cast(pa.int64()).to_numpy()
+        except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
+            raise InputError(
+                f"Expected Parquet files of this store in {files[0].parent}. Received: {error}. Write the series again."
+            ) from None
+        if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 2:
+            raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
+        return Telemetry(values, interval_s, offset_s, about["start"] or None, about["name"], about["unit"])
+
+    def names(self) -> list[str]:
+        """The names of the series kept here, sorted."""
+        folders = self.folder.glob("[!.]*") if self.folder.is_dir() else ()
+        return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
+
+    def _channel(self, name: str) -> Path:
+        # percent-encoding with the dot: no channel name can leave the folder or hide in it
+        return self.folder / urllib.parse.quote(name, safe=" ").replace(".", "%2E")

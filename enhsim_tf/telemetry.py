@@ -1,0 +1,219 @@
+"""A telemetry series: values with their time and unit, read from a file, checked, split by time, cut into windows.
+
+Step 4 of the paper's pipeline (the data source) and what every other room works on. It draws no random number
+that its caller does not own, and it never interprets values: a series is what its file says or it is refused.
+"""
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.errors import InputError
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Telemetry:
+    """A regularly sampled series.
+
+    Args:
+        values: float32 array of shape `(samples,)`.
+        interval_s: Sampling interval in seconds (in samples, that is 1, where `has_time` is False).
+        offset_s: Time of the first sample on the clock that all parts of one series share, in seconds.
+        start: ISO 8601 time (UTC) of that clock's zero, or None where the source has no time.
+        name: Channel name.
+        unit: Unit of the values.
+    """
+
+    values: np.ndarray
+    interval_s: float = 1.0
+    offset_s: float = 0.0
+    start: str | None = None
+    name: str = "telemetry"
+    unit: str = "1"
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def has_time(self) -> bool:
+        """Whether the source said when its samples were taken."""
+        return self.start is not None
+
+    @property
+    def time_unit(self) -> str:
+        """What the time axis counts: seconds, or samples where the source has no time."""
+        return "s" if self.has_time else "samples"
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Time of each sample on the series' clock, float64 of shape `(samples,)`."""
+        return self.offset_s + self.interval_s * np.arange(len(self))
+
+    def part(self, start: int, stop: int) -> "Telemetry":
+        """The samples from `start` to before `stop`, on the same clock."""
+        return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
+
+
+def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndarray:
+    """Returns `values` as a float32 series, or says in one line why it cannot be one.
+
+    Args:
+        values: Array of shape `(samples,)`.
+        what: Where the values come from, for the message.
+        min_samples: Fewest samples that can be used.
+
+    Raises:
+        InputError: If the values are not numeric, not one-dimensional, empty, NaN, infinite, too short or constant.
+    """
+    values = np.asarray(values)
+    if values.ndim != 1:
+        raise InputError(f"Expected one series of shape (samples,). Received: shape {values.shape} from {what}. Name a --column.")
+    if len(values) == 0:
+        raise InputError(f"Expected samples. Received: none from {what}. Give a file that holds a series.")
+    if values.dtype.kind not in "fiub":
+        raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column.")
+    values = values.astype(np.float32)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        kind = "NaN" if np.isnan(values[bad[0]]) else "infinite"
+        raise InputError(
+            f"Expected finite values. Received: {len(bad)} NaN or infinite in {what}, the first ({kind}) at sample {bad[0]}. Fill or cut them."
+        )
+    if len(values) < min_samples:
+        raise InputError(
+            f"Expected at least {min_samples} samples (two windows). Received: {len(values)} from {what}. Give a longer series."
+        )
+    if np.ptp(values) == 0:
+        raise InputError(f"Expected values that vary. Received: the constant {values[0]:g} in {what}. Choose another channel.")
+    return values
+
+
+def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str | None = None, min_samples: int = 2) -> Telemetry:
+    """Reads one channel from a file.
+
+    Args:
+        path: A `.npy` array of shape `(samples,)` or `(samples, columns)`, a `.csv` or a `.parquet` table.
+        column: Which column holds the values: a number for `.npy`, a name for tables. Needed when there are several.
+        time: Name of a table's time column (date-times or seconds), regularly sampled. None: samples are counted.
+        min_samples: Fewest samples that can be used.
+
+    Returns:
+        The checked `Telemetry`.
+
+    Raises:
+        InputError: If the file cannot be read, the column is not there, or the values or times cannot be used.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is no file. Check the path.")
+    readers = {".npy": _read_array, ".csv": _read_table, ".parquet": _read_table}
+    if path.suffix.lower() not in readers:
+        raise InputError(f"Expected a .npy, .csv or .parquet file. Received: {path.name}. Convert it to one of these.")
+    values, times, label = readers[path.suffix.lower()](path, column, time)
+    values = check_values(values, f"{path.name}{label}", min_samples)
+    interval_s, start = (1.0, None) if times is None else _regular_interval(times, path.name)
+    return Telemetry(values, interval_s=interval_s, start=start, name=path.stem)
+
+
+def _read_array(path: Path, column: str | None, time: str | None):
+    if time is not None:
+        raise InputError(
+            f"Expected --time with a table only. Received: --time {time} with {path.name}, an array has no named columns. Leave it out."
+        )
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({str(error).splitlines()[0]}). Save it again."
+        ) from None
+    if not isinstance(array, np.ndarray) or array.ndim not in (1, 2):
+        shape = getattr(array, "shape", "an archive")
+        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    if array.ndim == 1 and column is None:
+        return array, None, ""
+    columns = 1 if array.ndim == 1 else array.shape[1]
+    if column is None and columns > 1:
+        raise InputError(
+            f"Expected --column, a number from 0 to {columns - 1}. Received: none with {path.name} of shape {array.shape}. Name one."
+        )
+    index = column or "0"
+    if not (index.isdecimal() and int(index) < columns):
+        raise InputError(f"Expected --column, a number from 0 to {columns - 1}. Received: {column!r} with {path.name}. Name one of these.")
+    return array.reshape(len(array), columns)[:, int(index)], None, f" column {index}"
+
+
+def _read_table(path: Path, column: str | None, time: str | None):
+    import pandas as pd  # only tables need it
+
+    try:
+        table = pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path)
+    except (ValueError, OSError) as error:  # pandas' and Arrow's parser errors are ValueErrors
+        reason = (str(error).splitlines() or ["no reason given"])[0]
+        raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
+    for name in (column, time):
+        if name is not None and name not in table.columns:
+            known = ", ".join(map(str, table.columns[:8]))
+            raise InputError(f"Expected a column of {path.name}: {known}. Received: {name!r}. Name one of these.")
+    if column is None:
+        others = [name for name in table.columns if name != time]
+        if len(others) != 1:
+            raise InputError(f"Expected --column, one of: {', '.join(map(str, others[:8]))}. Received: none with {path.name}. Name one.")
+        column = others[0]
+    return table[column].to_numpy(), None if time is None else table[time], f" column {column}"
+
+
+def _regular_interval(times, what: str) -> tuple[float, str]:
+    import pandas as pd
+
+    numeric = pd.api.types.is_numeric_dtype(times)
+    try:
+        stamps = pd.to_datetime(times, unit="s", utc=True) if numeric else pd.to_datetime(times, utc=True)
+    except (ValueError, TypeError):
+        raise InputError(f"Expected times as date-times or seconds. Received: {times.iloc[0]!r} in {what}. Name another --time.") from None
+    steps = np.diff(stamps.to_numpy().astype("datetime64[ns]").astype(np.int64)) / 1e9
+    interval = float(np.median(steps)) if len(steps) else 0.0
+    if stamps.isna().any() or interval <= 0 or np.abs(steps - interval).max() > 0.01 * interval:
+        raise InputError(
+            f"Expected regular, rising times. Received: steps from {steps.min(initial=interval):g} s to {steps.max(initial=interval):g} s in {what}. Resample it first."
+        )
+    return interval, stamps.iloc[0].isoformat()
+
+
+def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) -> list[Telemetry]:
+    """Splits a series into consecutive parts with a gap between them, so that no window of one part touches another.
+
+    Args:
+        telemetry: The series.
+        fractions: Share of each part; they add up to 1.
+        gap: Samples left out between two parts, at least a window.
+    """
+    if abs(sum(fractions) - 1) > 1e-9 or min(fractions) <= 0:
+        raise InputError(f"Expected positive fractions that add up to 1. Received: fractions={tuple(fractions)}. Correct them.")
+    usable = len(telemetry) - gap * (len(fractions) - 1)
+    lengths = [int(usable * fraction) for fraction in fractions]
+    if min(lengths) < 1:
+        raise InputError(
+            f"Expected a series longer than its gaps. Received: {len(telemetry)} samples with gaps of {gap}. Give a longer one."
+        )
+    starts = np.cumsum([0] + [length + gap for length in lengths[:-1]])
+    return [telemetry.part(start, start + length) for start, length in zip(starts.tolist(), lengths, strict=True)]
+
+
+def random_offsets(num_samples: int, window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
+    """First samples of windows "whose beginning and end are offset by a random amount" (paper, section 2.2)."""
+    if num_samples < window:
+        raise InputError(f"Expected at least one window of {window} samples. Received: {num_samples} samples. Give a longer series.")
+    return rng.integers(0, num_samples - window + 1, num_windows)
+
+
+def disjoint_offsets(num_samples: int, window: int) -> np.ndarray:
+    """First samples of windows that share no sample: the independent units of a test."""
+    return np.arange(num_samples // window) * window
+
+
+def cut_windows(values: np.ndarray, offsets: np.ndarray, window: int) -> np.ndarray:
+    """The windows of `values` that begin at `offsets`, shape `(windows, samples)`."""
+    return np.lib.stride_tricks.sliding_window_view(values, window)[offsets]
