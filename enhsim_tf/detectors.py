@@ -88,7 +88,7 @@ class DenseAutoencoder:
         units, samples = (self.num_hidden, self.num_code, self.num_hidden), windows.shape[1]
         self._network = dense_stack(samples, (*units, samples), seed=self.seed, name="autoencoder")
         scaled = self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0, jit_compile=False)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:

@@ -214,6 +214,11 @@ def disjoint_offsets(num_samples: int, window: int) -> np.ndarray:
     return np.arange(num_samples // window) * window
 
 
+def even_offsets(num_samples: int, window: int, num_windows: int) -> np.ndarray:
+    """First samples of windows spread evenly over a series, in the order of time."""
+    return np.linspace(0, num_samples - window, num_windows).astype(np.int64)
+
+
 def cut_windows(values: np.ndarray, offsets: np.ndarray, window: int) -> np.ndarray:
     """The windows of `values` that begin at `offsets`, shape `(windows, samples)`."""
     return np.lib.stride_tricks.sliding_window_view(values, window)[offsets]

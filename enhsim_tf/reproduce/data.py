@@ -15,7 +15,9 @@ from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.signals import sines, white_noise
 from enhsim_tf.simulator import Degraded, SquareWave, SquareWaveSimulator, degrade, paired_windows, units_of
 from enhsim_tf.store import ParquetStore
-from enhsim_tf.telemetry import Telemetry, cut_windows, disjoint_offsets, random_offsets, read_telemetry, split_by_time
+from enhsim_tf.telemetry import Telemetry, cut_windows, even_offsets, random_offsets, read_telemetry, split_by_time
+
+_MIN_DISJOINT = 20  # disjoint windows below which a part is read through overlapping ones
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,7 +127,7 @@ class Data:
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: How many, at random offsets; None for all that share no sample.
+            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
             purpose: Names the draw of the offsets.
 
         Returns:
@@ -135,22 +137,25 @@ class Data:
         rng, found = self.draw(purpose), []
         for channel in self.channels:
             series = getattr(channel, part)
-            if num_windows is None:
-                offsets = disjoint_offsets(len(series), self.window)
-            else:
-                offsets = random_offsets(len(series), self.window, num_windows // len(self.channels), rng)
+            offsets = self._offsets(len(series), num_windows, rng)
             coarse, target = paired_windows(series, channel.coarse, offsets, self.window)
             times = series.time_s[offsets[:, None] + np.arange(self.window)]
             truth = target if channel.truth is None else channel.truth(times).astype(np.float32)
             found.append({"coarse": coarse, "target": target, "truth": truth})
         return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}
 
-    def noise_windows(self, part: str, num_windows: int, purpose: str) -> np.ndarray:
-        """Windows of the noise that the moving average leaves of a part, at random offsets."""
+    def noise_windows(self, part: str, num_windows: int | None, purpose: str = "") -> np.ndarray:
+        """Windows of the noise that the moving average leaves of a part; arguments as of `windows`."""
         rng = self.draw(purpose)
         noises = [extract_noise(getattr(channel, part).values, self.settings.noise.moving_average)[0] for channel in self.channels]
-        each = num_windows // len(noises)
-        return np.concatenate([cut_windows(noise, random_offsets(len(noise), self.window, each, rng), self.window) for noise in noises])
+        return np.concatenate([cut_windows(noise, self._offsets(len(noise), num_windows, rng), self.window) for noise in noises])
+
+    def _offsets(self, num_samples: int, num_windows: int | None, rng: np.random.Generator) -> np.ndarray:
+        if num_windows is not None:
+            return random_offsets(num_samples, self.window, num_windows // len(self.channels), rng)
+        disjoint = num_samples // self.window
+        few = disjoint < _MIN_DISJOINT  # a short real channel: windows must overlap, and nothing may be counted by them
+        return even_offsets(num_samples, self.window, min(200, num_samples - self.window + 1) if few else disjoint)
 
     def degraded_times(self) -> np.ndarray:
         """Times of the windows that degraded modes are measured on, shape `(windows, samples)`."""

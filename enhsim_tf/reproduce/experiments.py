@@ -172,7 +172,7 @@ class Experiment:
 
     def _make_enhancement(self, folder: Path) -> None:
         train = self.data.windows("train", self.settings.telemetry.num_windows, "training windows")
-        test = self.data.windows("test", self.settings.detectors.num_windows, "test windows")
+        test = self.data.windows("test", None)
         save_arrays(folder, measurements.enhancement(self.simulator.enhance, train, test))
 
     @functools.cached_property
@@ -181,10 +181,11 @@ class Experiment:
         return self._measure("resemblance", self._make_resemblance)
 
     def _make_resemblance(self, folder: Path) -> None:
-        number, seed, noise_of = self.settings.detectors.num_windows, self.settings.seed, self.simulator.noise.generate
-        real, again = (self.data.noise_windows(part, number, f"noise of {part}") for part in ("test", "train"))
+        seed, noise_of = self.settings.seed, self.simulator.noise.generate
+        # windows that share no sample, in the order of time: an overlap across the classifier's folds would give itself away
+        real, again = (self.data.noise_windows(part, None) for part in ("test", "train"))
         noise = measurements.resemblance(noise_of(len(real), seed + 1), real, again, seed)
-        real, again = (self.data.windows(part, number, f"sum of {part}") for part in ("test", "train"))
+        real, again = (self.data.windows(part, None) for part in ("test", "train"))
         combined = self.simulator.enhance(real["coarse"]) + noise_of(len(real["coarse"]), seed + 2)
         combined = measurements.resemblance(combined, real["target"], again["target"], seed)
         save_arrays(

@@ -44,11 +44,11 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
     Args:
         generated: Generated windows.
         real: As many held-out real windows.
-        real_again: As many other real windows: what the floor compares with `real`.
+        real_again: At least as many other real windows: what the floor compares with `real`.
         seed: Seed of the two-sample classifier's folds.
     """
     measures = {}
-    for name, other in (("", generated), ("floor_", real_again)):
+    for name, other in (("", generated), ("floor_", real_again[: len(real)])):
         lag_one = fidelity.autocorrelation(other, 1)[1] - fidelity.autocorrelation(real, 1)[1]
         measures |= {
             f"{name}scale_difference": fidelity.scale_difference(other, real),

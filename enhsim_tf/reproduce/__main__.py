@@ -1,0 +1,155 @@
+"""`python -m enhsim_tf.reproduce`: runs the paper, draws its figures and says claim by claim what holds."""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+EXAMPLES = """\
+examples:
+  python -m enhsim_tf.reproduce                      everything at full budget, about four minutes on two cores
+  python -m enhsim_tf.reproduce --budget smoke       the same path with small counts, below a minute, into smoke/
+  python -m enhsim_tf.reproduce --only fig04         one figure and what it needs
+  python -m enhsim_tf.reproduce --telemetry my.csv --column volts --time utc --out my_figures
+
+exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
+"""
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Reads the command line; imports nothing that is slow."""
+    parser = argparse.ArgumentParser(
+        prog="python -m enhsim_tf.reproduce",
+        description="Reproduces Feldman 2020, 'Training robust anomaly detection using ML-Enhanced simulations', end to end.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--budget", choices=("smoke", "full"), default="full", help="how many windows, epochs and iterations (default: full)"
+    )
+    parser.add_argument("--telemetry", type=Path, metavar="PATH", help="run the pipeline on a real channel: .npy, .csv or .parquet")
+    parser.add_argument("--column", help="which column of the file holds the values: a number for .npy, else a name")
+    parser.add_argument("--time", help="which column of a table holds the times (default: samples are counted)")
+    parser.add_argument("--only", metavar="FIGURE", help="draw one figure, for example fig04, and judge no claim")
+    parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where figures and results.json go (default: figures; smoke: smoke)")
+    parser.add_argument("--spread", type=int, default=0, metavar="N", help="judge the claims for N further seeds, ranges in spread.json")
+    parser.add_argument("--arrays", action="store_true", help="save the arrays behind each figure beside it, as .npz")
+    parser.add_argument("--fresh", action="store_true", help="do every stage anew, whatever the cache holds")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="where finished stages are kept (default: .cache in a checkout)")
+    return parser.parse_args(arguments)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs what the options ask for and returns the exit code."""
+    check(options)
+    from enhsim_tf.files import make_folder, write_json
+    from enhsim_tf.reproduce.claims import CLAIMS, changed, judge, ranges
+    from enhsim_tf.reproduce.data import Source
+    from enhsim_tf.reproduce.experiments import Experiment
+    from enhsim_tf.reproduce.figure_data import FIGURE_DATA
+    from enhsim_tf.reproduce.figures import save
+    from enhsim_tf.reproduce.report import fill_readme, results, table
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
+
+    def tell(line: str) -> None:
+        print(line, flush=True)
+
+    def experiment_of(seed: int) -> Experiment:
+        stages = Stages(options.cache or default_cache(), options.fresh, tell)
+        return Experiment(make_settings(options.budget, seed), stages, source, verbose=int(sys.stderr.isatty()))
+
+    began, is_smoke, folder = time.perf_counter(), options.budget == "smoke", make_folder(out_folder(options))
+    source = None if options.telemetry is None else Source(options.telemetry, options.column, options.time)
+    experiment = experiment_of(options.seed)
+    records = [] if options.only else judge(CLAIMS, experiment)
+
+    drawing, chosen = time.perf_counter(), chosen_figures(options.only)
+    for name in chosen:
+        data = FIGURE_DATA[name](experiment)
+        subject = "" if source is None else f" --telemetry {source.path.name}"
+        caption = f"seed {options.seed} · {options.budget} budget · python -m enhsim_tf.reproduce{subject} --only {name.split('_')[0]}"
+        save(name, data, folder, caption, is_smoke)
+        if options.arrays:
+            save_arrays(folder, data, name)
+    drawn_s = time.perf_counter() - drawing
+    tell(f"{'figures':12} {drawn_s:7.1f} s")
+    if options.only:
+        tell(f"{folder / chosen[0]}.png and .svg")
+        return 0
+
+    found = results(experiment, records, drawn_s, time.perf_counter() - began)
+    write_json(folder / "results.json", found)
+    tell(f"\n{table(records)}\n")
+    tell(f"{found['verdict']}  {len(chosen)} figures and results.json in {folder}/; {found['this_run_s']:.0f} s in all")
+    if options.spread:
+        others = range(options.seed + 1, options.seed + 1 + options.spread)
+        more = {seed: judge(CLAIMS, experiment_of(seed)) for seed in others}
+        write_json(folder / "spread.json", ranges({options.seed: records} | more, options.budget))
+        tell(f"ranges over seeds {options.seed} to {others[-1]} in {folder}/spread.json")
+    if is_smoke or source is not None:
+        tell("A smoke run and a channel of one's own have no expected verdicts; those above are of this run alone.")
+        return 0
+    if folder == Path("figures"):
+        fill_readme(Path("README.md"), folder)
+    different = changed(records)
+    if different:
+        tell(f"Verdicts that changed: {', '.join(different)}")
+    return 1 if different else 0
+
+
+def check(options: argparse.Namespace) -> None:
+    """Refuses what cannot be used before anything is made; needs no TensorFlow."""
+    from enhsim_tf.errors import InputError
+    from enhsim_tf.reproduce.settings import TelemetrySettings
+
+    if options.seed < 0:
+        raise InputError(f"Expected a seed of 0 or more. Received: --seed {options.seed}.")
+    if options.spread < 0:
+        raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
+    chosen_figures(options.only)
+    for name in ("column", "time"):
+        if getattr(options, name) is not None and options.telemetry is None:
+            raise InputError(f"Expected --{name} together with --telemetry. Received: --{name} alone.")
+    if options.budget == "smoke" and out_folder(options).resolve() == Path("figures").resolve():
+        raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
+    if options.telemetry is not None:
+        from enhsim_tf.telemetry import read_telemetry
+
+        read_telemetry(options.telemetry, options.column, options.time, 2 * TelemetrySettings().window)
+
+
+def chosen_figures(only: str | None) -> list[str]:
+    """Names of the figures to draw: all, or the one that is named by its number or in full."""
+    from enhsim_tf.errors import InputError
+    from enhsim_tf.reproduce.settings import FIGURES
+
+    chosen = [name for name in FIGURES if only is None or only in (name, name.split("_")[0])]
+    if not chosen:
+        raise InputError(f"Expected --only with one of {', '.join(name.split('_')[0] for name in FIGURES)}. Received: {only!r}.")
+    return chosen
+
+
+def out_folder(options: argparse.Namespace) -> Path:
+    """Where figures go; a smoke run and a real channel have folders of their own."""
+    default = "smoke" if options.budget == "smoke" else "figures"
+    return options.out or Path(default if options.telemetry is None else f"{default}_{options.telemetry.stem}")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command; a user's mistake is one line and exit code 2."""
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "2")  # TensorFlow's start-up notes are not the user's concern
+    options = parse(arguments)
+    from enhsim_tf.errors import InputError
+
+    try:
+        return run(options)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

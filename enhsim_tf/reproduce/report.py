@@ -1,0 +1,103 @@
+"""What a run leaves behind: the table on the terminal, `results.json`, and the generated parts of the README."""
+
+import json
+import platform
+import re
+import shutil
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.errors import InputError
+from enhsim_tf.files import replace_file
+from enhsim_tf.reproduce.claims import title_verdict
+from enhsim_tf.reproduce.experiments import Experiment
+from enhsim_tf.reproduce.settings import deviations
+from enhsim_tf.reproduce.stages import VERSIONS
+
+
+def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s: float) -> dict[str, Any]:
+    """Everything a run found, as `results.json` holds it; each stage with the seconds it took when it was done."""
+    stages = experiment.stages
+    timings = stages.seconds | {"figures": drawn_s}
+    return {
+        "budget": experiment.settings.budget,
+        "seed": experiment.settings.seed,
+        "source": "the paper's example" if experiment.is_paper else experiment.source.path.name,
+        "verdict": title_verdict(claims),
+        "versions": {"python": platform.python_version(), **VERSIONS},
+        "claims": claims,
+        "timings": {name: round(seconds, 2) for name, seconds in timings.items()},
+        "from_cache": [name for name, cached in stages.cached.items() if cached],
+        "this_run_s": round(total_s, 2),
+    }
+
+
+def table(claims: list[dict]) -> str:
+    """The claims as a table for the terminal, as wide as it is."""
+    width = max(60, min(shutil.get_terminal_size((120, 24)).columns, 140))
+    lines = []
+    for claim in claims:
+        lines.append(f"{claim['id']}  {claim['verdict']:24}  {claim['statistic']}: {_short(claim['value'])} ({claim['tolerance']})")
+        lines += textwrap.wrap(claim["finding"], width, initial_indent="    ", subsequent_indent="    ")
+    return "\n".join(lines)
+
+
+def _files(folder: Path) -> tuple[Path, Path]:
+    return folder / "results.json", folder / "spread.json"
+
+
+def fill_readme(path: Path, folder: Path) -> None:
+    """Writes the generated parts of the README between their markers, and the verdict into its title.
+
+    Args:
+        path: The README; nothing is done where it does not exist.
+        folder: Holds `results.json` of a full run, and `spread.json` where further seeds were run.
+    """
+    if not path.is_file():
+        return
+    found, spread = (json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None for file in _files(folder))
+    text = path.read_text(encoding="utf-8")
+    parts = {"claims": claims_table(found, spread), "deviations": deviations_table(), "timings": timings_table(found)}
+    for name, content in parts.items():
+        pattern = re.compile(rf"(<!-- {name}: generated -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
+        text, count = pattern.subn(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
+        if count != 1:
+            raise InputError(f"Expected the markers of '{name}' once in {path.name}. Received: {count}. Put them back.")
+    text = re.sub(r"\A# (\[.*?\] )?", f"# {found['verdict']} ", text)
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = None) -> str:
+    """The claims as a Markdown table, with the range over seeds where it is known."""
+    lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
+    for claim in found["claims"]:
+        value = _short(claim["value"])
+        if spread is not None:
+            value += " ({} to {})".format(*map(_short, spread["claims"][claim["id"]]["range"]))
+        lines.append(
+            f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "
+            f"| **{claim['verdict']}** | {claim['finding']} |"
+        )
+    seeds = "" if spread is None else f"; in brackets the range over seeds {', '.join(map(str, spread['seeds']))}"
+    return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget{seeds}. From `figures/results.json`."
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}" if abs(value) < 1000 else f"{value:,.0f}"
+
+
+def deviations_table() -> str:
+    """The deviations table in Markdown: each setting, the paper's and the author's value, and why ours is what it is."""
+    lines = ["| setting | ours | paper | author's code | source |", "|---|---|---|---|---|"]
+    lines += [f"| `{row['setting']}` | {row['ours']} | {row['paper']} | {row['author']} | {row['source']} |" for row in deviations()]
+    return "\n".join(lines)
+
+
+def timings_table(found: Mapping[str, Any]) -> str:
+    """Seconds of each stage in Markdown."""
+    rows = [f"| {name} | {seconds:.1f} |" for name, seconds in found["timings"].items()]
+    total = sum(found["timings"].values())
+    return "\n".join(["| stage | seconds |", "|---|---|", *rows, f"| **sum** | **{total:.0f}** |"])
