@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from enhsim_tf.errors import InputError
+from enhsim_tf.periodicity import Box, fit_box
 from enhsim_tf.telemetry import Telemetry, cut_windows
 
 
@@ -65,6 +66,7 @@ MODES = {
     "period_change": "every period grows to 1 + `severity` times itself",
 }
 _DROPOUT_RUN = 10  # samples
+_NUM_SHIFTS = 100  # tried to each side when a clock is set: steps of half a per cent of a period
 
 
 @dataclasses.dataclass(frozen=True)
@@ -200,9 +202,6 @@ class SquareWaveSimulator:
     def fit(cls, telemetry: Telemetry, max_waves: int = 1, min_explained: float = 0.05, num_levels: int = 2) -> "SquareWaveSimulator":
         """Fits square waves to telemetry by least squares, one after another, each to what the ones before left.
 
-        The search is box least squares (Kovacs, Zucker and Mazeh 2002): for each trial period the series is folded and
-        the box that explains most variance is read off cumulative sums.
-
         Args:
             telemetry: The series, at least two periods long.
             max_waves: Most square waves. One suits most channels; more follow harmonics, not mechanisms.
@@ -218,12 +217,37 @@ class SquareWaveSimulator:
         residual = telemetry.values.astype(np.float64)
         variance, waves = residual.var(), []
         while len(waves) < max_waves:
-            wave, explained = _fit_square_wave(residual, telemetry)
+            box = fit_box(residual, telemetry.name)
+            wave, explained = cls._wave_of(box, telemetry), box.explained
             if explained < min_explained * variance and waves:
                 break
             residual = residual - wave(telemetry.time_s)
             waves.append(dataclasses.replace(wave, num_levels=num_levels))
         return cls(waves)
+
+    @staticmethod
+    def _wave_of(box: Box, telemetry: Telemetry) -> SquareWave:
+        period_s = telemetry.interval_s / box.frequency
+        phase = np.mod(-box.begin - telemetry.offset_s / period_s, 1.0)  # on the series' own clock
+        return SquareWave(period_s, float(phase), box.duty, box.low, box.high)
+
+    def synchronise(self, time_s: np.ndarray, windows: np.ndarray) -> np.ndarray:
+        """Sets the simulator's clock for each window, so that its phase is the window's; nothing else is adapted.
+
+        A simulator that runs beside a vehicle is set to the vehicle's clock; one that runs free drifts away from it.
+
+        Args:
+            time_s: Times of the windows, shape `(windows, samples)`.
+            windows: The telemetry of those times, same shape.
+
+        Returns:
+            The shifted times at which `simulate` correlates best with each window.
+        """
+        time_s, centred = np.asarray(time_s, np.float64), windows - windows.mean(axis=1, keepdims=True)
+        longest_s = max(wave.period_s for wave in self.waves)
+        shifts = np.linspace(-0.5, 0.5, 2 * _NUM_SHIFTS + 1) * longest_s
+        agreement = [np.sum(self(time_s + shift) * centred, axis=1) for shift in shifts]
+        return time_s + shifts[np.argmax(agreement, axis=0)][:, None]
 
     def get_config(self) -> dict:
         """The settings as plain JSON types; `from_config` takes them back."""
@@ -245,56 +269,3 @@ def paired_windows(telemetry: Telemetry, coarse: SquareWaveSimulator, offsets: n
     """Coarse and true windows of the same times (steps 3 and 4): two float32 arrays of shape `(windows, samples)`."""
     times = telemetry.offset_s + telemetry.interval_s * (np.asarray(offsets)[:, None] + np.arange(window))
     return coarse.simulate(times), cut_windows(telemetry.values, offsets, window)
-
-
-_NUM_BINS = 200  # of a folded period
-_NUM_PEAKS = 12  # of the periodogram, followed up
-
-
-def _fit_square_wave(values: np.ndarray, telemetry: Telemetry) -> tuple[SquareWave, float]:
-    """The square wave that explains most of `values` in the least-squares sense, and the variance it explains."""
-    centred, num_samples = values - values.mean(), len(values)
-    index = np.arange(num_samples, dtype=np.float64)
-    # trial frequencies (cycles a sample): peaks of the periodogram and their halves and thirds, for a wave whose
-    # harmonics are stronger than its fundamental
-    power = np.abs(np.fft.rfft(centred, 4 * num_samples)) ** 2
-    power[: 4 * 2] = 0  # below two cycles nothing is periodic
-    frequencies = np.arange(len(power)) / (4 * num_samples)
-    peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
-    peaks = peaks[np.argsort(power[peaks])[::-1][:_NUM_PEAKS]]
-    trials = {frequency / divisor for frequency in frequencies[peaks] for divisor in (1, 2, 3)}
-    trials = sorted(trial for trial in trials if 2 / num_samples <= trial <= 0.25)
-    if not trials:
-        raise InputError(
-            f"Expected something periodic, at least two periods and four samples a period. Received: {telemetry.name}, where none was found."
-        )
-    # refine: the step of each grid is fine enough that the last cycle moves by less than a bin of the next
-    best = max(trials, key=lambda trial: _box(index * trial, centred)[0])
-    step = 0.25 / num_samples
-    while step * num_samples > 1e-3:
-        best = max(best + step * np.arange(-4, 5), key=lambda trial: _box(index * trial, centred)[0])
-        step /= 3
-    explained, first, duty = _box(index * best, centred)
-    # levels: means inside and outside the box; phase on the series' own clock
-    cycle = np.mod(index * best - first, 1.0)
-    inside = cycle < duty
-    period_s = telemetry.interval_s / best
-    phase = np.mod(-first - telemetry.offset_s / period_s, 1.0)
-    low, high = values[~inside].mean(), values[inside].mean()
-    return SquareWave(float(period_s), float(phase), float(duty), float(low), float(high)), explained
-
-
-def _box(cycles: np.ndarray, centred: np.ndarray) -> tuple[float, float, float]:
-    """The best high box of a series folded on `cycles`: (variance explained, where it begins, its duty)."""
-    bins = (np.mod(cycles, 1.0) * _NUM_BINS).astype(np.int64)
-    counts = np.bincount(bins, minlength=_NUM_BINS)
-    sums = np.bincount(bins, centred, minlength=_NUM_BINS)
-    totals = np.concatenate([[0], np.cumsum(np.tile(sums, 2))])
-    numbers = np.concatenate([[0], np.cumsum(np.tile(counts, 2))])
-    begin, width = np.arange(_NUM_BINS)[:, None], np.arange(1, _NUM_BINS)[None]
-    total, number = totals[begin + width] - totals[begin], numbers[begin + width] - numbers[begin]
-    rest = len(centred) - number
-    with np.errstate(divide="ignore", invalid="ignore"):
-        explained = np.where((number > 0) & (rest > 0) & (total > 0), total**2 / number + total**2 / rest, 0) / len(centred)
-    row, column = np.unravel_index(np.argmax(explained), explained.shape)
-    return float(explained[row, column]), row / _NUM_BINS, (column + 1) / _NUM_BINS

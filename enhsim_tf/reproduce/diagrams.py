@@ -1,0 +1,263 @@
+"""What the figures draw that is no curve: the pipeline, the adversarial training, the tables of layers.
+
+Also the sheet that every figure is drawn on and its colours, which survive a grey printer and colour-blind eyes: they
+differ in lightness, and where two of them meet in one panel also in line style or label.
+"""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+
+import matplotlib.figure
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
+
+REAL, COARSE, ENHANCED, GENERATED = "#1a1a1a", "#949494", "#0072b2", "#d55e00"
+QUIET, LINE = "#595959", "#8c8c8c"  # small print; outlines
+BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
+SINGLE, DOUBLE = 3.5, 7.2  # widths of a journal's columns, inches
+FOOT = 0.26  # inches left free at the bottom of each sheet, for the caption line
+EDGE = 0.10  # inches from the sheet's edges to its text
+_DASHES = (0, (2.6, 1.6))
+
+
+def sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[matplotlib.figure.Figure, float]:
+    """An empty figure with its message on top.
+
+    Args:
+        width: Inches.
+        height: Inches.
+        title: The message, wrapped to the width.
+        subtitle: What qualifies it, wrapped to the width.
+
+    Returns:
+        The figure, and how many inches the heading takes from its top.
+    """
+    figure = matplotlib.figure.Figure(figsize=(width, height))
+    down = 0.10
+    for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 11.6), (subtitle, 7.5, "normal", QUIET, 15.2)):
+        for line in textwrap.wrap(text, int(width * letters_an_inch)):
+            figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color)
+            down += 1.35 * size / 72
+        down += 0.04
+    return figure, down
+
+
+def drawing_board(figure: matplotlib.figure.Figure) -> Axes:
+    """Axes without frame over the whole sheet, in inches from its lower left corner."""
+    width, height = figure.get_size_inches()
+    return figure.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(0, height), frame_on=False, xticks=(), yticks=())
+
+
+def box(axes: Axes, x: float, y: float, width: float, height: float, fill: str = "white", edge: str = LINE, **options) -> None:
+    """A box with rounded corners; `options` go to the patch."""
+    style = "round,pad=0,rounding_size=0.06"
+    axes.add_patch(FancyBboxPatch((x, y), width, height, boxstyle=style, facecolor=fill, edgecolor=edge, **{"linewidth": 0.8} | options))
+
+
+def arrow(axes: Axes, points: Sequence[tuple[float, float]], dashed: bool = False, color: str = REAL, linewidth: float = 1.1) -> None:
+    """An arrow along straight pieces, in inches."""
+    points = np.array(points, float)
+    along = (points[-1] - points[-2]) / np.hypot(*(points[-1] - points[-2]))
+    neck, across = points[-1] - 0.08 * along, 0.038 * along[::-1] * (1, -1)
+    style = {"linestyle": _DASHES if dashed else "-", "color": color, "linewidth": linewidth, "solid_joinstyle": "miter"}
+    axes.plot(*np.vstack([points[:-1], neck]).T, **style, zorder=2.5, solid_capstyle="butt")
+    axes.add_patch(Polygon([points[-1], neck + across, neck - across], facecolor=color, edgecolor="none", zorder=2.6))
+
+
+def badge(axes: Axes, x: float, y: float, number: int) -> None:
+    """The number of a step of the paper."""
+    axes.add_patch(Circle((x, y), 0.105, facecolor=REAL, edgecolor="white", linewidth=1, zorder=3))
+    axes.text(x, y - 0.005, str(number), color="white", weight="bold", size=8, ha="center", va="center_baseline", zorder=4)
+
+
+def words(axes: Axes, x: float, top: float, text: str, size: float = 7, color: str = QUIET, **options) -> None:
+    """Lines of text at equal distances below `top`."""
+    for number, line in enumerate(text.split("\n")):
+        axes.text(x, top - size / 72 * (0.95 + 1.3 * number), line, size=size, color=color, **options)
+
+
+def card(axes: Axes, x: float, top: float, size: tuple[float, float], heading: str, text: str, number: int | None = None, **options) -> None:
+    """A box with a heading, small print and the number of its step."""
+    box(axes, x, top - size[1], *size, **options)
+    words(axes, x + 0.13, top - 0.1, heading, 7.5, REAL, weight="bold")
+    words(axes, x + 0.13, top - 0.25, text)
+    if number is not None:
+        badge(axes, x, top, number)
+
+
+def inset(figure: matplotlib.figure.Figure, left: float, bottom: float, width: float, height: float, **options) -> Axes:
+    """Axes without frame in a rectangle given in inches."""
+    across, up = figure.get_size_inches()
+    place = (left / across, bottom / up, width / across, height / up)
+    return figure.add_axes(place, frame_on=False, xticks=(), yticks=(), **options)
+
+
+def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
+    """Figure 1: the nine numbered steps of the paper and their sum, with the waveforms of one window."""
+    figure, _ = sheet(DOUBLE, 4.5, "Two networks turn a coarse simulation into realistic telemetry")
+    axes, height, gap = drawing_board(figure), 1.02, 0.3
+    top = [FOOT + 0.14 + height * (3 - row) + gap * (2 - row) for row in range(3)]
+    centre = [y - height / 2 for y in top]
+    wide = np.array([0.98, 1.27, 1.27, 1.27, 1.24])
+    left = EDGE + 0.08 + np.cumsum([0, *(wide[:-1] + 0.235)])
+    right, middle = left + wide, left + wide / 2
+
+    # every signal on one scale, noise too, so that amplitudes can be compared by eye
+    signals = np.concatenate([data[key] for key in ("telemetry", "coarse", "enhanced", "combined")])
+    level, reach = signals.mean(), 1.05 * np.abs(signals - signals.mean()).max()
+
+    def curve(column: int, bottom: float, key: str, color: str, about: float = level) -> None:
+        small = inset(figure, left[column] + 0.1, bottom, wide[column] - 0.2, height - 0.5, ylim=(about - reach, about + reach))
+        small.plot(data["time"], data[key], color=color, linewidth=0.6, clip_on=False)
+
+    def step(column: int, row: int, heading: str, text: str, number: int | None = None, **options) -> float:
+        card(axes, left[column], top[row], (wide[column], height), heading, text, number, **options)
+        return top[row] - height + 0.07
+
+    # steps 1, 2, 3 and 5: the waveform
+    step(0, 0, "Simulator", "light and fast:\nsquare waves\nof about the\nright periods", 1, fill=GREY_TINT)
+    curve(1, step(1, 0, "Approximate data", "highly quantised", 2), "coarse", QUIET)
+    bottom = step(2, 0, "Enhancer", "low to high fidelity", 3, fill=BLUE_TINT, edge=ENHANCED)
+    for x, units in zip(middle[2] + 0.29 * np.linspace(-1.5, 1.5, len(data["enhancer_units"])), data["enhancer_units"], strict=True):
+        size = 0.4 * units / max(data["enhancer_units"])
+        axes.add_patch(Rectangle((x - 0.045, bottom + 0.13), 0.09, size, facecolor=ENHANCED, edgecolor="none"))
+        axes.text(x, bottom + 0.09, f"{units:,}", size=7, ha="center", va="top")
+    curve(3, step(3, 0, "Clean data", "accurate, too clean", 5), "enhanced", ENHANCED)
+    # steps 4 and 6: what is recorded
+    step(0, 1, "Source", "real vehicle or\nhigh-fidelity\nsimulation", 4, fill=GREY_TINT)
+    curve(1, step(1, 1, "Goal", "telemetry in the store"), "telemetry", REAL)
+    curve(2, step(2, 1, "Environment", "moving average off", 6), "noise", REAL, about=0)
+    # steps 7, 8 and 9: the noise
+    bottom = step(1, 2, "Latent space", f"{len(data['latent'])} random numbers", 7)
+    small = inset(figure, left[1] + 0.2, bottom + 0.03, wide[1] - 0.4, height - 0.56)
+    small.vlines(np.arange(len(data["latent"])), 0, data["latent"], color=GENERATED, linewidth=1.6, clip_on=False)
+    small.axhline(0, color=LINE, linewidth=0.5)
+    generator, discriminator = top[2] - 0.83, top[2] - 0.4
+    step(2, 2, "GAN", "", 8, fill=ORANGE_TINT, edge=GENERATED)
+    for y, name in ((generator, "generator"), (discriminator, "discriminator")):
+        box(axes, left[2] + 0.14, y - 0.12, wide[2] - 0.28, 0.24, edge=GENERATED)
+        axes.text(middle[2], y, name, size=7.5, ha="center", va="center")
+    curve(3, step(3, 2, "Generated noise", "of the environment", 9), "generated_noise", GENERATED, about=0)
+    # Combined, beside what it should resemble
+    axes.add_patch(Circle((middle[3], centre[1]), 0.15, facecolor="white", edgecolor=REAL, linewidth=1.1))
+    axes.text(middle[3], centre[1] - 0.005, "+", size=13, ha="center", va="center_baseline")
+    tall = 2.1
+    begin = centre[1] + tall / 2
+    card(axes, left[4], begin, (wide[4], tall), "Combined", "high-fidelity output", edge=REAL, linewidth=1.6)
+    curve(4, begin - 0.98, "combined", GENERATED)
+    axes.plot((left[4] + 0.13, right[4] - 0.13), (begin - 1.11, begin - 1.11), color=LINE, linewidth=0.5)
+    words(axes, left[4] + 0.13, begin - 1.18, "real telemetry of\nthe same times")
+    curve(4, begin - 2.03, "telemetry", REAL)
+
+    turn = top[0] - height - gap / 2
+    for path in (  # taken whenever telemetry is generated
+        [(right[0], centre[0]), (left[1], centre[0])],
+        [(right[1], centre[0]), (left[2], centre[0])],
+        [(right[2], centre[0]), (left[3], centre[0])],
+        [(right[1], generator), (left[2] + 0.14, generator)],
+        [(right[2] - 0.14, generator), (left[3], generator)],
+        [(middle[3], top[0] - height), (middle[3], centre[1] + 0.15)],
+        [(middle[3], top[2]), (middle[3], centre[1] - 0.15)],
+        [(middle[3] + 0.15, centre[1]), (left[4], centre[1])],
+    ):
+        arrow(axes, path, linewidth=1.5)
+    for path in (  # taken in training only
+        [(right[0], centre[1]), (left[1], centre[1])],
+        [(right[1], centre[1]), (left[2], centre[1])],
+        [(middle[1], top[1]), (middle[1], turn), (middle[2], turn), (middle[2], top[0] - height)],
+        [(middle[2], top[1] - height), (middle[2], discriminator + 0.12)],
+        [(middle[2], generator + 0.12), (middle[2], discriminator - 0.12)],
+    ):
+        arrow(axes, path, dashed=True)
+    for y, dashed, meaning in ((generator + 0.34, False, "generates"), (generator, True, "trains")):
+        arrow(axes, [(left[0], y), (left[0] + 0.35, y)], dashed, linewidth=1.1 if dashed else 1.5)
+        axes.text(left[0] + 0.42, y, meaning, size=7, color=QUIET, va="center")
+    return figure
+
+
+def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
+    """Figure 11: the two phases of an iteration, one below the other on the same plan."""
+    batch, latent = f"{int(data['batch_size']):,}", int(data["latent"])
+    figure, down = sheet(
+        DOUBLE, 4.16, f"Each of {int(data['num_iterations']):,} iterations trains the discriminator first, then the generator through it"
+    )
+    axes, tall, gap = drawing_board(figure), 1.6, 0.12
+    left, wide = np.array([0.25, 1.5, 2.86, 4.28, 5.78]), np.array([0.98, 1.09, 1.1, 1.2, 1.2])
+    right, middle, height = left + wide, left + wide / 2, 0.46
+    first = 4.16 - down - 0.04
+    phases = (
+        (first, "1  The discriminator learns", "as a model of its own, from equal amounts of both kinds", ENHANCED, BLUE_TINT),
+        (first - tall - gap, "2  The generator learns", "through the combined model, the tags reversed", GENERATED, ORANGE_TINT),
+    )
+    for phase, (top, heading, text, color, tint) in enumerate(phases, 1):
+        box(axes, EDGE, top - tall, DOUBLE - 2 * EDGE, tall, fill=GREY_TINT, edge="none")
+        axes.text(left[0], top - 0.22, heading, size=8, weight="bold", color=REAL)
+        axes.text(left[0] + 1.95, top - 0.22, text, size=7.5, color=QUIET)
+        y = top - (1.08 if phase == 1 else 0.78)  # of the generated rows
+        judged = top - 0.8 if phase == 1 else y
+
+        def part(column: int, y: float, name: str, text: str, learns: bool | None = None, color=color, tint=tint) -> None:
+            """A box; a network that learns is coloured, one that is frozen has a dashed outline."""
+            style = {None: {}, True: {"edge": color, "fill": tint, "linewidth": 1.8}, False: {"linestyle": _DASHES, "edge": QUIET}}[learns]
+            box(axes, left[column], y - height / 2, wide[column], height, **style)
+            axes.text(middle[column], y + 0.075, name, size=7.5, weight="bold", ha="center", va="center")
+            axes.text(middle[column], y - 0.095, text, size=7, color=QUIET, ha="center", va="center")
+
+        part(0, y, "Latent vectors", f"{batch} × {latent} numbers")
+        part(1, y, "Generator", "learns" if phase == 2 else "frozen", phase == 2)
+        part(2, y, "Generated noise", f"{batch} rows")
+        part(3, judged, "Discriminator", "learns" if phase == 1 else "frozen", phase == 1)
+        part(4, judged, "Loss", "binary cross-entropy")
+        for column in (0, 1):
+            arrow(axes, [(right[column], y), (left[column + 1], y)])
+        arrow(axes, [(right[3], judged), (left[4], judged)])
+        if phase == 1:
+            part(2, top - 0.52, "Real noise", f"{batch} rows")
+            for rows, into in ((top - 0.52, judged + 0.1), (y, judged - 0.1)):
+                turn = right[2] + 0.16
+                arrow(axes, [(right[2], rows), (turn, rows), (turn, into), (left[3], into)])
+        else:
+            arrow(axes, [(right[2], y), (left[3], y)])
+        # the tags go into the loss from above, the error flows back below to the network that learns
+        tags = "tags: real 1.0, generated 0.0" if phase == 1 else "tag: generated 1.0, “real”"
+        axes.text(right[4], judged + height / 2 + 0.07, tags, size=7, ha="right")
+        low, back = judged - height / 2 - 0.2, 3 if phase == 1 else 1
+        arrow(axes, [(middle[4], judged - height / 2), (middle[4], low), (middle[back], low), (middle[back], judged - height / 2)], True, color, 1.5)
+        moved = "the error moves the discriminator's weights only" if phase == 1 else "the error passes the frozen discriminator and moves the generator's weights only"
+        axes.text(middle[4], low - 0.14, moved, size=7, color=color, ha="right")
+    return figure
+
+
+def layer_table(data: Mapping[str, np.ndarray], title: str) -> matplotlib.figure.Figure:
+    """Figures 3, 9 and 10: layers, their output shapes and parameters, as a typeset table."""
+    names, details, leading = data["layer"], data["detail"], 0.3
+    height = 0.98 + leading * (len(names) + 1) + FOOT
+    figure, down = sheet(SINGLE, height, title)
+    axes = drawing_board(figure)
+    shape, number, y = 1.72, SINGLE - EDGE, height - down - 0.2
+
+    def rule(y: float, linewidth: float) -> None:
+        axes.plot((EDGE, SINGLE - EDGE), (y, y), color=REAL, linewidth=linewidth, solid_capstyle="butt")
+
+    def row(y: float, *cells: str, **style) -> None:
+        for x, cell, side in zip((EDGE, shape, number), cells, ("left", "left", "right"), strict=True):
+            axes.text(x, y, cell, ha=side, **style)
+
+    rule(y + 0.17, 1.0)
+    row(y, "Layer", "Output shape", "Parameters", size=7.5, color=QUIET)
+    rule(y - 0.08, 0.5)
+    y -= 0.24
+    for name, kind, detail, output, parameters in zip(names, data["type"], details, data["output_shape"], data["parameters"], strict=True):
+        automatic = name.replace("_", "").rstrip("0123456789") == kind.lower().rstrip("0123456789d")
+        row(y, kind if automatic else f"{name} ({kind})", output, f"{parameters:,}", size=8)
+        axes.text(EDGE, y - 0.125, detail, size=7, color=QUIET)
+        y -= leading
+    rule(y + 0.14, 0.5)
+    total, trainable = int(data["total"]), int(data["trainable"])
+    row(y - 0.02, "Total", "", f"{total:,}", size=8, weight="bold")
+    rest = f"{total - trainable:,} not trainable" if total > trainable else "all trainable"
+    axes.text(number, y - 0.145, rest, size=7, color=QUIET, ha="right")
+    axes.text(EDGE, y - 0.145, f"input {data['input_shape']}", size=7, color=QUIET)
+    rule(y - 0.22, 1.0)
+    return figure

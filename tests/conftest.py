@@ -1,0 +1,27 @@
+"""What all tests share: a quiet TensorFlow, and the one form a user's mistake is answered in."""
+
+import contextlib
+import os
+
+import pytest
+
+os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
+
+from enhsim_tf.errors import InputError  # noqa: E402
+
+
+@pytest.fixture
+def refused():
+    """`with refused("word"):` the block raises an `InputError` of one line that names what was expected and received."""
+
+    @contextlib.contextmanager
+    def refused(*words: str):
+        with pytest.raises(InputError) as caught:
+            yield
+        message = str(caught.value)
+        assert len(message.splitlines()) == 1
+        assert message.startswith("Expected ") and "Received: " in message
+        for word in words:
+            assert word in message
+
+    return refused

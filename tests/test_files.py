@@ -1,0 +1,141 @@
+"""Files and folders appear whole or not at all."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from enhsim_tf import files
+
+ROOT = Path(__file__).parents[1]
+
+
+class Interruption(Exception):
+    """Stands for whatever stops a writer."""
+
+
+def content_of(folder):
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_make_folder_makes_the_parents_and_leaves_nothing_in_it(tmp_path):
+    folder = files.make_folder(tmp_path / "a" / "b")
+    assert folder == tmp_path / "a" / "b" and folder.is_dir() and not list(folder.iterdir())
+    assert files.make_folder(folder) == folder  # again is no error
+
+
+def test_make_folder_refuses_where_a_file_stands(tmp_path, refused):
+    (tmp_path / "taken").write_text("x")
+    with refused("taken"):
+        files.make_folder(tmp_path / "taken")
+    with refused("taken"):
+        files.make_folder(tmp_path / "taken" / "below")
+    assert content_of(tmp_path) == {"taken": "x"}
+
+
+def test_replace_file_takes_the_name_at_the_end_only(tmp_path):
+    path = tmp_path / "values.json"
+    path.write_text("old")
+    with files.replace_file(path) as temporary:
+        temporary.write_text("new")
+        assert path.read_text() == "old"
+        assert temporary.parent == path.parent and temporary.suffix == ".json"
+    assert content_of(tmp_path) == {"values.json": "new"}
+
+
+@pytest.mark.parametrize("before", [{}, {"values.json": "old"}])
+def test_interrupted_replace_file_leaves_what_was(tmp_path, before):
+    for name, text in before.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(Interruption), files.replace_file(tmp_path / "values.json") as temporary:
+        temporary.write_text("half")
+        raise Interruption
+    assert content_of(tmp_path) == before
+
+
+def test_replace_folder_takes_the_place_of_all_that_stood_there(tmp_path):
+    path = tmp_path / "above" / "model"
+    for number in (1, 2):
+        with files.replace_folder(path) as temporary:
+            (temporary / f"only_{number}").write_text(str(number))
+    assert content_of(tmp_path) == {"above/model/only_2": "2"}
+
+
+def test_replace_folder_takes_the_place_of_a_file_and_leaves_no_temporary(tmp_path):
+    path = tmp_path / "model"
+    path.write_text("a file")
+    with files.replace_folder(path) as temporary:
+        (temporary / "inside").write_text("new")
+    assert content_of(tmp_path) == {"model/inside": "new"}
+
+
+@pytest.mark.parametrize("before", [{}, {"model/inside": "old"}])
+def test_interrupted_replace_folder_leaves_what_was(tmp_path, before):
+    for name, text in before.items():
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(text)
+    with pytest.raises(Interruption), files.replace_folder(tmp_path / "model") as temporary:
+        (temporary / "inside").write_text("half")
+        raise Interruption
+    assert content_of(tmp_path) == before
+    assert len(list(tmp_path.iterdir())) == len(before)
+
+
+def test_replace_folder_keeps_the_old_when_the_new_cannot_take_the_name(tmp_path, monkeypatch):
+    path = tmp_path / "model"
+    path.mkdir()
+    (path / "inside").write_text("old")
+    rename, calls = os.replace, []
+
+    def fails_for_the_new(source, destination):
+        calls.append(source)
+        if Path(destination) == path and len(calls) == 2:
+            raise OSError("no space left")
+        rename(source, destination)
+
+    monkeypatch.setattr(os, "replace", fails_for_the_new)
+    with pytest.raises(OSError, match="no space left"), files.replace_folder(path) as temporary:
+        (temporary / "inside").write_text("new")
+    assert content_of(tmp_path) == {"model/inside": "old"}
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_killed_process_leaves_the_old_content(tmp_path, kind):
+    path = tmp_path / "kept"
+    if kind == "folder":
+        path.mkdir()
+    inside = path / "inside" if kind == "folder" else path
+    inside.write_text("old")
+    script = f"""
+import os, signal, sys
+from enhsim_tf.files import replace_{kind}
+with replace_{kind}(sys.argv[1]) as temporary:
+    (temporary / "inside" if "{kind}" == "folder" else temporary).write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    ended = subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT)
+    assert ended.returncode == -9
+    assert inside.read_text() == "old"
+
+
+def test_write_json_round_trip_and_refusal_of_what_json_has_no_word_for(tmp_path):
+    path = tmp_path / "results.json"
+    files.write_json(path, {"a": [1, 2.5, None, "é"]})
+    assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]}
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        files.write_json(path, {"a": float("nan")})
+    assert json.loads(path.read_text(encoding="utf-8"))["a"][1] == 2.5
+    assert [entry.name for entry in tmp_path.iterdir()] == ["results.json"]
+
+
+def test_sha256_of_the_standard_s_examples(tmp_path):
+    path = tmp_path / "message"
+    path.write_bytes(b"abc")  # FIPS 180-2, appendix B.1
+    assert files.sha256(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    path.write_bytes(b"a" * 1_000_000)  # appendix B.3
+    assert files.sha256(path) == "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"
+    assert files.sha256(path) == hashlib.sha256(path.read_bytes()).hexdigest()
