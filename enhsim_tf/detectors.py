@@ -94,7 +94,7 @@ class DenseAutoencoder:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Mean squared reconstruction error, in units of the training variance."""
         scaled = self._scaled(windows)
-        return np.mean((self._network.predict(scaled, batch_size=256, verbose=0) - scaled) ** 2, axis=1)
+        return np.mean((np.asarray(self._network(scaled)) - scaled) ** 2, axis=1)
 
     def _scaled(self, windows: np.ndarray) -> np.ndarray:
         return ((windows - self._mean) / self._scale).astype(np.float32)

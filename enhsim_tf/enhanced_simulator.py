@@ -7,7 +7,9 @@ import dataclasses
 import json
 import os
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import keras
 import numpy as np
@@ -18,7 +20,7 @@ from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, paired_windows, units_of
-from enhsim_tf.telemetry import Telemetry, cut_windows, random_offsets
+from enhsim_tf.telemetry import Telemetry, check_values, cut_windows, random_offsets
 
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
@@ -35,6 +37,7 @@ class EnhancedSimulator:
         interval_s: Sampling interval in seconds.
         offset: What the enhancer's zero stands for, in the telemetry's unit.
         scale: What the enhancer's one stands for, in the telemetry's unit.
+        trained: How the networks were trained, in plain JSON types: kept with them for the record.
 
     Example:
     >>> simulator = EnhancedSimulator.fit(telemetry, coarse=SquareWaveSimulator.fit(telemetry), seed=0)
@@ -51,7 +54,9 @@ class EnhancedSimulator:
         interval_s: float = 1.0,
         offset: float = 0.0,
         scale: float = 1.0,
+        trained: Mapping[str, Any] | None = None,
     ):
+        self.trained = dict(trained or {})
         self.coarse, self.enhancer, self.noise = coarse, enhancer, noise
         self.interval_s, self.offset, self.scale = float(interval_s), float(offset), float(scale)
 
@@ -93,12 +98,9 @@ class EnhancedSimulator:
             The trained simulator.
 
         Raises:
-            InputError: If the telemetry is shorter than two windows.
+            InputError: If the telemetry is not finite, constant or shorter than two windows.
         """
-        if len(telemetry) < 2 * window:
-            raise InputError(
-                f"Expected at least two windows of {window} samples. Received: {len(telemetry)} samples. Give a longer series."
-            )
+        check_values(telemetry.values, telemetry.name, 2 * window)
         coarse = SquareWaveSimulator.fit(telemetry) if coarse is None else coarse
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
@@ -113,7 +115,16 @@ class EnhancedSimulator:
         noise_scale = noise_unit(noise) if normalise else 1.0
         gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_scale, seed=seed)
         gan.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
-        return cls(coarse, network, gan, telemetry.interval_s, offset, scale)
+        trained = {
+            "telemetry": telemetry.name,
+            "num_samples": len(telemetry),
+            "seed": seed,
+            "num_windows": num_windows,
+            "epochs": epochs,
+            "num_iterations": num_iterations,
+            "moving_average": moving_average,
+        }
+        return cls(coarse, network, gan, telemetry.interval_s, offset, scale, trained)
 
     def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`."""
@@ -187,6 +198,7 @@ class EnhancedSimulator:
                 "interval_s": self.interval_s,
                 "offset": self.offset,
                 "scale": self.scale,
+                "trained": self.trained,
             }
             write_json(temporary / "settings.json", settings)
             checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
@@ -220,7 +232,7 @@ class EnhancedSimulator:
             )
             coarse = SquareWaveSimulator.from_config(settings["coarse"])
             noise = NoiseGAN(generator, discriminator, **settings["noise"])
-            return cls(coarse, enhancer, noise, settings["interval_s"], settings["offset"], settings["scale"])
+            return cls(coarse, enhancer, noise, settings["interval_s"], settings["offset"], settings["scale"], settings["trained"])
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             reason = (str(error).splitlines() or [""])[0]
             raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

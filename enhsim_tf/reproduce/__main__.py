@@ -1,7 +1,6 @@
 """`python -m enhsim_tf.reproduce`: runs the paper, draws its figures and says claim by claim what holds."""
 
 import argparse
-import os
 import sys
 import time
 from pathlib import Path
@@ -140,7 +139,6 @@ def out_folder(options: argparse.Namespace) -> Path:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; a user's mistake is one line and exit code 2."""
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "2")  # TensorFlow's start-up notes are not the user's concern
     options = parse(arguments)
     from enhsim_tf.errors import InputError
 

@@ -122,13 +122,14 @@ class Data:
             return 0.0, 1.0, 1.0
         return *units_of(channel.coarse), noise_unit(extract_noise(channel.train.values, self.settings.noise.moving_average)[0])
 
-    def windows(self, part: str, num_windows: int | None, purpose: str = "") -> dict[str, np.ndarray]:
+    def windows(self, part: str, num_windows: int | None, purpose: str = "", synchronised: bool = False) -> dict[str, np.ndarray]:
         """Paired windows of one part of every channel, as many of each.
 
         Args:
             part: `train`, `calibration` or `test`.
             num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
             purpose: Names the draw of the offsets.
+            synchronised: Whether the coarse simulator's clock is set to each window, instead of running on from training.
 
         Returns:
             `coarse`, `target` (the telemetry) and `truth` (the noiseless signal where known, else the telemetry),
@@ -140,6 +141,8 @@ class Data:
             offsets = self._offsets(len(series), num_windows, rng)
             coarse, target = paired_windows(series, channel.coarse, offsets, self.window)
             times = series.time_s[offsets[:, None] + np.arange(self.window)]
+            if synchronised:
+                coarse = channel.coarse.simulate(channel.coarse.synchronise(times, target))
             truth = target if channel.truth is None else channel.truth(times).astype(np.float32)
             found.append({"coarse": coarse, "target": target, "truth": truth})
         return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}

@@ -4,6 +4,7 @@ Also the sheet that every figure is drawn on and its colours, which survive a gr
 differ in lightness, and where two of them meet in one panel also in line style or label.
 """
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 
@@ -12,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
-REAL, COARSE, ENHANCED, GENERATED = "#1a1a1a", "#949494", "#0072b2", "#d55e00"
+REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
 QUIET, LINE = "#595959", "#8c8c8c"  # small print; outlines
 BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
 SINGLE, DOUBLE = 3.5, 7.2  # widths of a journal's columns, inches
@@ -35,8 +36,8 @@ def sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[
     """
     figure = matplotlib.figure.Figure(figsize=(width, height))
     down = 0.10
-    for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 11.6), (subtitle, 7.5, "normal", QUIET, 15.2)):
-        for line in textwrap.wrap(text, int(width * letters_an_inch)):
+    for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 13.5), (subtitle, 7.5, "normal", QUIET, 18.5)):
+        for line in textwrap.wrap(text, int((width - 2 * EDGE) * letters_an_inch)):
             figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color)
             down += 1.35 * size / 72
         down += 0.04
@@ -77,11 +78,14 @@ def words(axes: Axes, x: float, top: float, text: str, size: float = 7, color: s
         axes.text(x, top - size / 72 * (0.95 + 1.3 * number), line, size=size, color=color, **options)
 
 
-def card(axes: Axes, x: float, top: float, size: tuple[float, float], heading: str, text: str, number: int | None = None, **options) -> None:
-    """A box with a heading, small print and the number of its step."""
+def card(
+    axes: Axes, x: float, top: float, size: tuple[float, float], heading: str, text: str, number: int | None = None, **options
+) -> None:
+    """A box with a heading, small print and the number of its step; the text of a grey one, which has no curve, is centred."""
     box(axes, x, top - size[1], *size, **options)
-    words(axes, x + 0.13, top - 0.1, heading, 7.5, REAL, weight="bold")
-    words(axes, x + 0.13, top - 0.25, text)
+    down = (size[1] - 0.12 * (2 + text.count("\n"))) / 2 - 0.04 if options.get("fill") == GREY_TINT else 0.1
+    words(axes, x + 0.13, top - down, heading, 7.5, REAL, weight="bold")
+    words(axes, x + 0.13, top - down - 0.15, text)
     if number is not None:
         badge(axes, x, top, number)
 
@@ -116,10 +120,10 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         return top[row] - height + 0.07
 
     # steps 1, 2, 3 and 5: the waveform
-    step(0, 0, "Simulator", "light and fast:\nsquare waves\nof about the\nright periods", 1, fill=GREY_TINT)
-    curve(1, step(1, 0, "Approximate data", "highly quantised", 2), "coarse", QUIET)
+    step(0, 0, "Simulator", "light and fast:\nsquare waves", 1, fill=GREY_TINT)
+    curve(1, step(1, 0, "Approximate data", "highly quantised", 2), "coarse", COARSE)
     bottom = step(2, 0, "Enhancer", "low to high fidelity", 3, fill=BLUE_TINT, edge=ENHANCED)
-    for x, units in zip(middle[2] + 0.29 * np.linspace(-1.5, 1.5, len(data["enhancer_units"])), data["enhancer_units"], strict=True):
+    for x, units in zip(middle[2] + 0.305 * np.linspace(-1.5, 1.5, len(data["enhancer_units"])), data["enhancer_units"], strict=True):
         size = 0.4 * units / max(data["enhancer_units"])
         axes.add_patch(Rectangle((x - 0.045, bottom + 0.13), 0.09, size, facecolor=ENHANCED, edgecolor="none"))
         axes.text(x, bottom + 0.09, f"{units:,}", size=7, ha="center", va="top")
@@ -127,7 +131,7 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     # steps 4 and 6: what is recorded
     step(0, 1, "Source", "real vehicle or\nhigh-fidelity\nsimulation", 4, fill=GREY_TINT)
     curve(1, step(1, 1, "Goal", "telemetry in the store"), "telemetry", REAL)
-    curve(2, step(2, 1, "Environment", "moving average off", 6), "noise", REAL, about=0)
+    curve(2, step(2, 1, "Environment", "telemetry − average", 6), "noise", REAL, about=0)
     # steps 7, 8 and 9: the noise
     bottom = step(1, 2, "Latent space", f"{len(data['latent'])} random numbers", 7)
     small = inset(figure, left[1] + 0.2, bottom + 0.03, wide[1] - 0.4, height - 0.56)
@@ -178,24 +182,29 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
 
 def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     """Figure 11: the two phases of an iteration, one below the other on the same plan."""
-    batch, latent = f"{int(data['batch_size']):,}", int(data["latent"])
-    figure, down = sheet(
-        DOUBLE, 4.16, f"Each of {int(data['num_iterations']):,} iterations trains the discriminator first, then the generator through it"
-    )
-    axes, tall, gap = drawing_board(figure), 1.6, 0.12
+    batch, latent, updates = f"{int(data['batch_size']):,}", int(data["latent"]), "one update" if data["mixed_batch"] else "two updates"
+    title = "Each iteration trains the discriminator alone, then the generator through it"
+    figure, down = sheet(DOUBLE, 3.94, title, f"{int(data['num_iterations']):,} iterations; {batch} rows of each kind in each")
+    axes, tall, gap = drawing_board(figure), 1.46, 0.12
     left, wide = np.array([0.25, 1.5, 2.86, 4.28, 5.78]), np.array([0.98, 1.09, 1.1, 1.2, 1.2])
     right, middle, height = left + wide, left + wide / 2, 0.46
-    first = 4.16 - down - 0.04
+    first = 3.94 - down - 0.06
     phases = (
-        (first, "1  The discriminator learns", "as a model of its own, from equal amounts of both kinds", ENHANCED, BLUE_TINT),
-        (first - tall - gap, "2  The generator learns", "through the combined model, the tags reversed", GENERATED, ORANGE_TINT),
+        (first, "1  The discriminator learns", f"alone, from equal amounts of real and generated noise, in {updates}", ENHANCED, BLUE_TINT),
+        (
+            first - tall - gap,
+            "2  The generator learns",
+            "through the combined model; the discriminator is told that the generated rows are real",
+            GENERATED,
+            ORANGE_TINT,
+        ),
     )
     for phase, (top, heading, text, color, tint) in enumerate(phases, 1):
         box(axes, EDGE, top - tall, DOUBLE - 2 * EDGE, tall, fill=GREY_TINT, edge="none")
         axes.text(left[0], top - 0.22, heading, size=8, weight="bold", color=REAL)
         axes.text(left[0] + 1.95, top - 0.22, text, size=7.5, color=QUIET)
-        y = top - (1.08 if phase == 1 else 0.78)  # of the generated rows
-        judged = top - 0.8 if phase == 1 else y
+        y = top - (1.1 if phase == 1 else 0.8)  # of the generated rows
+        judged = top - 0.82 if phase == 1 else y
 
         def part(column: int, y: float, name: str, text: str, learns: bool | None = None, color=color, tint=tint) -> None:
             """A box; a network that learns is coloured, one that is frozen has a dashed outline."""
@@ -213,18 +222,25 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
             arrow(axes, [(right[column], y), (left[column + 1], y)])
         arrow(axes, [(right[3], judged), (left[4], judged)])
         if phase == 1:
-            part(2, top - 0.52, "Real noise", f"{batch} rows")
-            for rows, into in ((top - 0.52, judged + 0.1), (y, judged - 0.1)):
+            part(2, top - 0.54, "Real noise", f"{batch} rows")
+            for rows, into in ((top - 0.54, judged + 0.1), (y, judged - 0.1)):
                 turn = right[2] + 0.16
                 arrow(axes, [(right[2], rows), (turn, rows), (turn, into), (left[3], into)])
         else:
             arrow(axes, [(right[2], y), (left[3], y)])
         # the tags go into the loss from above, the error flows back below to the network that learns
-        tags = "tags: real 1.0, generated 0.0" if phase == 1 else "tag: generated 1.0, “real”"
+        tags = "tags: real 1.0, generated 0.0" if phase == 1 else "tags reversed: generated 1.0"
         axes.text(right[4], judged + height / 2 + 0.07, tags, size=7, ha="right")
         low, back = judged - height / 2 - 0.2, 3 if phase == 1 else 1
-        arrow(axes, [(middle[4], judged - height / 2), (middle[4], low), (middle[back], low), (middle[back], judged - height / 2)], True, color, 1.5)
-        moved = "the error moves the discriminator's weights only" if phase == 1 else "the error passes the frozen discriminator and moves the generator's weights only"
+        arrow(
+            axes,
+            [(middle[4], judged - height / 2), (middle[4], low), (middle[back], low), (middle[back], judged - height / 2)],
+            True,
+            color,
+            1.5,
+        )
+        moved = ("the error moves", "the error passes the frozen discriminator and moves")[phase - 1]
+        moved += f" the {('discriminator', 'generator')[phase - 1]}’s weights only"
         axes.text(middle[4], low - 0.14, moved, size=7, color=color, ha="right")
     return figure
 
@@ -232,7 +248,7 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
 def layer_table(data: Mapping[str, np.ndarray], title: str) -> matplotlib.figure.Figure:
     """Figures 3, 9 and 10: layers, their output shapes and parameters, as a typeset table."""
     names, details, leading = data["layer"], data["detail"], 0.3
-    height = 0.98 + leading * (len(names) + 1) + FOOT
+    height = 0.82 + leading * (len(names) + 1) + FOOT
     figure, down = sheet(SINGLE, height, title)
     axes = drawing_board(figure)
     shape, number, y = 1.72, SINGLE - EDGE, height - down - 0.2
@@ -249,7 +265,7 @@ def layer_table(data: Mapping[str, np.ndarray], title: str) -> matplotlib.figure
     rule(y - 0.08, 0.5)
     y -= 0.24
     for name, kind, detail, output, parameters in zip(names, data["type"], details, data["output_shape"], data["parameters"], strict=True):
-        automatic = name.replace("_", "").rstrip("0123456789") == kind.lower().rstrip("0123456789d")
+        automatic = re.fullmatch(rf"{kind.lower()}\d*", name.replace("_", ""))  # a name that Keras made up says nothing
         row(y, kind if automatic else f"{name} ({kind})", output, f"{parameters:,}", size=8)
         axes.text(EDGE, y - 0.125, detail, size=7, color=QUIET)
         y -= leading

@@ -207,11 +207,10 @@ def _seed(rng: np.random.Generator) -> int:
 
 def _layers(model) -> Arrays:
     """A Keras model as a table: one row a layer."""
-    configs = [layer.get_config() for layer in model.layers]
     rows = {
         "layer": [layer.name for layer in model.layers],
         "type": [type(layer).__name__ for layer in model.layers],
-        "detail": [_detail(config) for config in configs],
+        "detail": [_detail(layer) for layer in model.layers],
         "output_shape": [str(tuple(layer.output.shape)) for layer in model.layers],
         "parameters": [layer.count_params() for layer in model.layers],
         "input_shape": str(tuple(model.input_shape)),
@@ -221,9 +220,18 @@ def _layers(model) -> Arrays:
     return {key: np.array(values) for key, values in rows.items()}
 
 
-def _detail(config: dict) -> str:
-    """What a layer does, in words, from its configuration."""
-    words = []
+_MEANING = {
+    "BatchNormalization": "to mean 0, variance 1",
+    "GlobalMaxPooling1D": "largest value of each filter",
+    "Reshape": "to the discriminator's input",
+}
+
+
+def _detail(layer) -> str:
+    """What a layer does, in words, from its class and its configuration."""
+    config, words = layer.get_config(), []
+    if type(layer).__name__ in _MEANING:
+        words.append(_MEANING[type(layer).__name__])
     if "kernel_size" in config:
         words += [f"{config['filters']:,} filters", f"window {config['kernel_size'][0]}", f"stride {config['strides'][0]}"]
     if config.get("activation"):
