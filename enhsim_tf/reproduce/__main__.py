@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
 
     def experiment_of(seed: int) -> Experiment:
         stages = Stages(options.cache or default_cache(), options.fresh, tell)
-        return Experiment(make_settings(options.budget, seed), stages, source, verbose=int(sys.stderr.isatty()))
+        return Experiment(make_settings(options.budget, seed), stages, source, verbose=int(sys.stdout.isatty()))
 
     began, is_smoke, folder = time.perf_counter(), options.budget == "smoke", make_folder(out_folder(options))
     source = None if options.telemetry is None else Source(options.telemetry, options.column, options.time)
@@ -147,6 +147,9 @@ def main(arguments: list[str] | None = None) -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("interrupted; finished stages are kept, the next run goes on behind them", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

@@ -319,6 +319,7 @@ def ranges(records_of: Mapping[int, list[dict]], budget: str) -> dict:
         details = {key: [min(found), max(found)] for key in claims[0]["details"] if (found := [claim["details"][key] for claim in claims])}
         spread[claims[0]["id"]] = {
             "range": [min(values), max(values)] if values else None,
+            "values": [claim["value"] for claim in claims],
             "verdicts": [claim["verdict"] for claim in claims],
             "details": details,
         }

@@ -5,7 +5,7 @@ import platform
 import re
 import shutil
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +44,8 @@ def table(claims: list[dict]) -> str:
     return "\n".join(lines)
 
 
-def _files(folder: Path) -> tuple[Path, Path]:
-    return folder / "results.json", folder / "spread.json"
+def _read(file: Path) -> dict | None:
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
 
 
 def fill_readme(path: Path, folder: Path) -> None:
@@ -57,9 +57,16 @@ def fill_readme(path: Path, folder: Path) -> None:
     """
     if not path.is_file():
         return
-    found, spread = (json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None for file in _files(folder))
+    found, spread = (_read(folder / name) for name in ("results.json", "spread.json"))
+    if spread is not None and _short(found["claims"][0]["value"]) not in map(_short, spread["claims"]["C1"]["values"]):
+        spread = None  # ranges of an older run say nothing of this one
     text = path.read_text(encoding="utf-8")
-    parts = {"claims": claims_table(found, spread), "deviations": deviations_table(), "timings": timings_table(found)}
+    parts = {
+        "claims": claims_table(found, spread),
+        "channels": channels_table(sorted(folder.glob("*/results.json"))),
+        "deviations": deviations_table(),
+        "timings": timings_table(found),
+    }
     for name, content in parts.items():
         pattern = re.compile(rf"(<!-- {name}: generated -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
         text, count = pattern.subn(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
@@ -87,6 +94,21 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
 
 def _short(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}" if abs(value) < 1000 else f"{value:,.0f}"
+
+
+def channels_table(files: Sequence[Path]) -> str:
+    """What the pipeline reached on real channels, one row a `results.json`, in Markdown."""
+    names = ("nrmse", "ridge_nrmse", "identity_nrmse")
+    lines = [
+        "| channel | enhanced | ridge regression | coarse | enhanced, in step | ridge, in step | coarse, in step | C1 |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for file in files:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        claim = next(claim for claim in found["claims"] if claim["id"] == "C1")
+        errors = [f"{claim['details'][prefix + name]:.3f}" for prefix in ("", "synchronised_") for name in names]
+        lines.append(f"| `{found['source']}` | {' | '.join(errors)} | {claim['verdict']} |")
+    return "\n".join(lines)
 
 
 def deviations_table() -> str:
