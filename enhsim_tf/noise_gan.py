@@ -10,7 +10,7 @@ import keras
 import numpy as np
 import tensorflow as tf
 
-from enhsim_tf.convolution_maximum import convolution_maximum
+from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
 
 REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
 
@@ -156,12 +156,14 @@ class NoiseGAN:
         self.discriminator_optimizer.apply(tape.gradient(loss, weights), weights)
 
     def _judge(self, rows: tf.Tensor) -> tf.Tensor:
-        """The discriminator in training mode, its first two layers by the fast path where they are what that computes."""
-        first, second, *rest = self.discriminator.layers
-        if not (isinstance(first, keras.layers.Conv1D) and isinstance(second, keras.layers.GlobalMaxPooling1D)):
+        """The discriminator in training mode, its first layers by the fast path where they are what that computes."""
+        number = num_layers_computed(self.discriminator.layers)
+        if not number:
             return self.discriminator(rows, training=True)
-        kernel = tf.squeeze(tf.convert_to_tensor(first.kernel), 1)
-        judged = convolution_maximum(tf.squeeze(rows, 2), kernel, tf.convert_to_tensor(first.bias), first.strides[0])
+        (first, *between), rest = self.discriminator.layers[: number - 1], self.discriminator.layers[number:]
+        kernel, bias = (tf.convert_to_tensor(weight) for weight in (first.kernel, first.bias))
+        dropped = {"rate": between[0].rate, "seed": between[0].seed_generator.next()} if between and between[0].rate else {}
+        judged = convolution_maximum(tf.squeeze(rows, 2), tf.squeeze(kernel, 1), bias, first.strides[0], **dropped)
         for layer in rest:
             judged = layer(judged, training=True) if isinstance(layer, keras.layers.Dropout) else layer(judged)
         return judged

@@ -1,0 +1,156 @@
+import keras
+import numpy as np
+import pytest
+import tensorflow as tf
+
+from enhsim_tf import convolution_maximum as room
+from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
+from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+
+WINDOW, FILTERS, WIDTH, STRIDE = 63, 14, 20, 4  # the last sample lies under no filter
+
+
+def arrays(num_rows, seed=0):
+    rng = np.random.default_rng(seed)
+    shapes = {"rows": (num_rows, WINDOW), "kernel": (WIDTH, FILTERS), "bias": (FILTERS,), "upstream": (num_rows, FILTERS)}
+    return {name: rng.normal(0, 0.3, shape).astype(np.float32) for name, shape in shapes.items()}
+
+
+def by_autodiff(rows, kernel, bias, kept=None, rate=0.0):
+    products = tf.nn.relu(tf.nn.conv1d(rows[:, :, None], kernel[:, None], STRIDE, "VALID") + bias)
+    if kept is not None:
+        products = tf.where(kept, products / (1 - rate), 0.0)
+    return tf.reduce_max(products, axis=1)
+
+
+def compare(given, fast, plain, tolerance=2e-6):
+    found = {}
+    for name, function in (("fast", fast), ("plain", plain)):
+
+        @tf.function
+        def run(rows, kernel, bias, upstream, function=function):
+            with tf.GradientTape() as tape:
+                tape.watch([rows, kernel, bias])
+                outputs = function(rows, kernel, bias)
+            return outputs, *tape.gradient(outputs, [rows, kernel, bias], upstream)
+
+        found[name] = [array.numpy() for array in run(*(tf.constant(given[key]) for key in ("rows", "kernel", "bias", "upstream")))]
+    for of_fast, of_plain in zip(found["fast"], found["plain"], strict=True):
+        np.testing.assert_allclose(of_fast, of_plain, rtol=0, atol=tolerance * max(1, np.abs(of_plain).max()))
+    return found["plain"]
+
+
+# 7 rows are less than a block, 10 one block, 23 two and a part of a third
+@pytest.mark.parametrize("num_rows", [7, 10, 23])
+def test_gradients_are_those_of_autodiff(num_rows):
+    compare(arrays(num_rows), lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
+
+
+def test_gradients_where_frames_tie():
+    given = arrays(12)
+    given["rows"] = np.tile(given["rows"][:, :STRIDE], (1, 16))[:, :WINDOW]  # period of one stride: every frame is the same
+    given["rows"][6:, -WIDTH:] *= 3  # in half of the rows the last frames differ
+    _, to_rows, _, _ = compare(given, lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
+    assert np.count_nonzero(to_rows[0]) == 60  # the gradient is shared by all frames, not given to the first
+
+
+def test_gradients_where_nothing_fires():
+    given = arrays(12)
+    given["rows"][3] = 0.0
+    given["bias"][:] = -0.01
+    given["bias"][5] = -100.0
+    outputs, to_rows, to_kernel, _ = compare(given, lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
+    assert not outputs[3].any() and not to_rows[3].any() and not to_kernel[:, 5].any() and to_kernel.any()
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.95])  # at 0.95 some filters lose every frame
+def test_gradients_with_dropped_products(rate):
+    given, seed = arrays(23), tf.constant([3, 4])
+    seeds = tf.unstack(tf.random.split(seed, 3))
+    shapes = [tf.TensorShape((number, 11, FILTERS)) for number in (10, 10, 3)]
+    kept = tf.concat([room._kept(shape, rate, each) for shape, each in zip(shapes, seeds, strict=True)], axis=0)
+    if rate == 0.95:
+        assert not kept.numpy().any(axis=1).all()
+    compare(
+        given,
+        lambda *given: convolution_maximum(*given, STRIDE, rate, seed),
+        lambda *given: by_autodiff(*given, kept, rate),
+        tolerance=2e-6 / (1 - rate),
+    )
+
+
+def test_dropped_products_are_drawn_independently_at_the_rate():
+    kept = room._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 2])).numpy()
+    error = np.sqrt(0.3 * 0.7 / len(kept))
+    assert abs(kept.mean() - 0.7) < 5 * error
+    for lag in (1, 2, 8):  # neighbours come out of one word
+        assert abs(np.mean(kept[lag:] & kept[:-lag]) - 0.49) < 5 * np.sqrt(0.49 * 0.51 / len(kept)) * 2
+    assert not np.array_equal(kept, room._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 3])).numpy())
+
+
+def test_mean_under_dropout_is_that_of_the_keras_layers():
+    row = arrays(1)["rows"]
+    model = small_discriminator(dropout=0.3)
+    by_keras = keras.Sequential(model.layers[:3])
+    first, draws = model.layers[0], 4_000
+    many = tf.constant(np.repeat(row, draws, axis=0))
+    ours = convolution_maximum(many, tf.squeeze(tf.convert_to_tensor(first.kernel), 1), first.bias.value, STRIDE, 0.3, tf.constant([5, 6]))
+    theirs = by_keras(many[:, :, None], training=True).numpy()
+    error = np.sqrt((ours.numpy().var(0) + theirs.var(0)) / draws)
+    assert (np.abs(ours.numpy().mean(0) - theirs.mean(0)) <= 5 * error + 1e-6).all()
+    assert (ours.numpy().std(0) > 0).any()
+
+
+def small_discriminator(**settings):
+    return build_discriminator(WINDOW, FILTERS, WIDTH, STRIDE, narrow_units=5, **settings)
+
+
+class PlainGAN(NoiseGAN):
+    def _judge(self, rows):
+        return self.discriminator(rows, training=True)
+
+
+@pytest.mark.parametrize("mixed_batch", [False, True])
+def test_training_curves_are_those_of_the_keras_layers(mixed_batch):
+    noise = np.random.default_rng(0).normal(0, 0.1, (64, WINDOW)).astype(np.float32)
+    fast, plain = (
+        kind(build_generator(WINDOW, 4, 8), small_discriminator(), batch_size=16, mixed_batch=mixed_batch) for kind in (NoiseGAN, PlainGAN)
+    )
+    before = [weight.numpy() for weight in fast.combined.trainable_variables]
+    curves = [gan.fit(noise, num_iterations=20, record_every=1, verbose=False) for gan in (fast, plain)]
+    for kind in ("real", "generated"):
+        np.testing.assert_allclose(curves[0][f"loss_{kind}"], curves[1][f"loss_{kind}"], rtol=2e-5)
+    for weight, of_plain, at_first in zip(fast.combined.trainable_variables, plain.combined.trainable_variables, before, strict=True):
+        np.testing.assert_allclose(weight.numpy(), of_plain.numpy(), atol=2e-5)
+        assert not np.array_equal(weight.numpy(), at_first)
+
+
+def test_training_with_dropout_takes_the_fast_path_and_repeats(monkeypatch):
+    noise = np.random.default_rng(0).normal(0, 0.1, (64, WINDOW)).astype(np.float32)
+    curves = []
+    for _ in range(2):
+        gan = NoiseGAN(build_generator(WINDOW, 4, 8), small_discriminator(dropout=0.3), batch_size=16)
+        seeds = [layer.seed_generator.state.numpy().copy() for layer in gan.discriminator.layers if isinstance(layer, keras.layers.Dropout)]
+        curves.append(gan.fit(noise, num_iterations=4, record_every=1, verbose=False))
+        after = [layer.seed_generator.state.numpy() for layer in gan.discriminator.layers if isinstance(layer, keras.layers.Dropout)]
+        assert all((one != other).any() for one, other in zip(seeds, after, strict=True))  # new draws each time
+    np.testing.assert_array_equal(curves[0]["loss_real"], curves[1]["loss_real"])
+
+
+@pytest.mark.parametrize(
+    "layers",
+    [
+        [keras.layers.Conv1D(3, 20, 4, activation="tanh"), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 4, activation="relu", padding="same"), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 3, activation="relu"), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 4, activation="relu", use_bias=False), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 4, activation="relu"), keras.layers.GlobalAveragePooling1D()],
+        [keras.layers.Flatten(), keras.layers.Dense(3)],
+        [keras.layers.GlobalMaxPooling1D()],
+    ],
+)
+def test_other_layers_are_left_to_keras(layers):
+    model = keras.Sequential([keras.Input((WINDOW, 1)), *layers, keras.layers.Dense(1, activation="sigmoid")])
+    assert num_layers_computed(model.layers) == 0
+    assert num_layers_computed(small_discriminator().layers) == 2
+    assert num_layers_computed(small_discriminator(dropout=0.3).layers) == 3
