@@ -148,7 +148,7 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
-        return self.enhance(self.generate_coarse(num_windows, scenario, seed)) + self.noise.generate(num_windows, seed)
+        return self.enhance(self.generate_coarse(num_windows, scenario, seed)) + self.noise.generate(num_windows, _noise_seed(seed))
 
     def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
         """Generates one continuous series of any length, without seams.
@@ -176,7 +176,7 @@ class EnhancedSimulator:
         coarse = self.coarse.simulate(start_s + self.interval_s * np.arange(length)[None], scenario, rng)[0]
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
-        noise = self.noise.generate(num_windows, seed)
+        noise = self.noise.generate(num_windows, _noise_seed(seed))
 
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # fade^2 of two windows half a window apart adds up to 1
         signal, power, total = np.zeros(length), np.zeros(length), np.zeros(length)
@@ -236,3 +236,8 @@ class EnhancedSimulator:
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             reason = (str(error).splitlines() or [""])[0]
             raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None
+
+
+def _noise_seed(seed: int) -> int:
+    """A seed for the noise whose draws have nothing to do with those of the coarse windows from `seed` itself."""
+    return int(np.random.SeedSequence([seed, 1]).generate_state(1)[0])

@@ -122,6 +122,7 @@ class NoiseGAN:
         self.discriminator_optimizer.build(self.discriminator.trainable_variables)
         self.generator_optimizer.build(self.generator.trainable_variables)
         self.seeds = keras.random.SeedGenerator(seed)
+        self.record_seeds = keras.random.SeedGenerator(seed + 1)  # of their own: recording more often changes no training
         self._step = tf.function(self.train_step)
 
     def train_step(self, noise: tf.Tensor) -> None:
@@ -131,8 +132,8 @@ class NoiseGAN:
             noise: All real rows, float32 of shape `(windows, window, 1)`; a batch is drawn from them.
         """
         # equal amounts of real and generated rows
-        real = tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=self.seeds))
-        generated = self.generator(self._draw_latent(), training=self.generated_in_training_mode)
+        real = self._draw_rows(noise, self.seeds)
+        generated = self.generator(self._draw_latent(self.seeds), training=self.generated_in_training_mode)
 
         # the discriminator learns to tell them apart: real rows are tagged 1, generated rows 0
         if self.mixed_batch:
@@ -143,7 +144,7 @@ class NoiseGAN:
 
         # the generator learns through the combined model: the tags are reversed, only its own weights move
         with tf.GradientTape() as tape:
-            judged = self._judge(self.generator(self._draw_latent(), training=True))
+            judged = self._judge(self.generator(self._draw_latent(self.seeds), training=True))
             loss = self.loss(self._tags(REAL), judged)
         weights = self.generator.trainable_variables
         self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
@@ -168,8 +169,11 @@ class NoiseGAN:
             judged = layer(judged, training=True) if isinstance(layer, keras.layers.Dropout) else layer(judged)
         return judged
 
-    def _draw_latent(self) -> tf.Tensor:
-        return self.latent_span * keras.random.normal((self.batch_size, self.generator.input_shape[1]), seed=self.seeds)
+    def _draw_rows(self, noise: tf.Tensor, seeds: keras.random.SeedGenerator) -> tf.Tensor:
+        return tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=seeds))
+
+    def _draw_latent(self, seeds: keras.random.SeedGenerator) -> tf.Tensor:
+        return self.latent_span * keras.random.normal((self.batch_size, self.generator.input_shape[1]), seed=seeds)
 
     def _tags(self, tag: float) -> tf.Tensor:
         return tf.fill((self.batch_size, 1), tag)
@@ -213,8 +217,8 @@ class NoiseGAN:
 
     def _evaluate(self, noise: tf.Tensor) -> dict[str, float]:
         """Accuracy and loss of the discriminator on a fresh batch of each kind, in inference mode."""
-        real = tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=self.seeds))
-        generated = self.generator(self._draw_latent(), training=False)
+        real = self._draw_rows(noise, self.record_seeds)
+        generated = self.generator(self._draw_latent(self.record_seeds), training=False)
         record = {}
         for kind, rows, tag in (("real", real, REAL), ("generated", generated, GENERATED)):
             judged = self.discriminator(rows, training=False)

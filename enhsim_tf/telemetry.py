@@ -173,7 +173,7 @@ def _regular_interval(times, what: str) -> tuple[float, str]:
         stamps = pd.to_datetime(times, unit="s", utc=True) if numeric else pd.to_datetime(times, utc=True)
     except (ValueError, TypeError):
         raise InputError(f"Expected times as date-times or seconds. Received: {times.iloc[0]!r} in {what}. Name another --time.") from None
-    steps = np.diff(stamps.to_numpy().astype("datetime64[ns]").astype(np.int64)) / 1e9
+    steps = np.diff(stamps.dt.tz_convert(None).to_numpy().astype("datetime64[ns]").astype(np.int64)) / 1e9
     interval = float(np.median(steps)) if len(steps) else 0.0
     if stamps.isna().any() or interval <= 0 or np.abs(steps - interval).max() > 0.01 * interval:
         raise InputError(

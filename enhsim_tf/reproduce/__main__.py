@@ -102,7 +102,6 @@ def run(options: argparse.Namespace) -> int:
 def check(options: argparse.Namespace) -> None:
     """Refuses what cannot be used before anything is made; needs no TensorFlow."""
     from enhsim_tf.errors import InputError
-    from enhsim_tf.reproduce.settings import TelemetrySettings
 
     if options.seed < 0:
         raise InputError(f"Expected a seed of 0 or more. Received: --seed {options.seed}.")
@@ -115,9 +114,11 @@ def check(options: argparse.Namespace) -> None:
     if options.budget == "smoke" and out_folder(options).resolve() == Path("figures").resolve():
         raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
     if options.telemetry is not None:
+        from enhsim_tf.reproduce.data import least_part
+        from enhsim_tf.reproduce.settings import Settings
         from enhsim_tf.telemetry import read_telemetry
 
-        read_telemetry(options.telemetry, options.column, options.time, 2 * TelemetrySettings().window)
+        read_telemetry(options.telemetry, options.column, options.time, 2 * least_part(Settings()))
 
 
 def chosen_figures(only: str | None) -> list[str]:

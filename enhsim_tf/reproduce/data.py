@@ -58,6 +58,11 @@ def waves_of(settings: Settings) -> dict[str, tuple[tuple[float, ...], tuple[flo
     return {"orbit and rotation": ((chosen.orbit_period_s, chosen.rotation_period_s), (chosen.orbit_amplitude, chosen.rotation_amplitude))}
 
 
+def least_part(settings: Settings) -> int:
+    """Fewest samples of a part: a window, and what the moving average cuts off around it."""
+    return settings.telemetry.window + settings.noise.moving_average - 1
+
+
 def draw(settings: Settings, purpose: str) -> np.random.Generator:
     """The generator of one purpose: draws for one do not move those for another."""
     return np.random.default_rng([settings.seed, zlib.crc32(purpose.encode())])
@@ -67,7 +72,7 @@ def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -
     """Places the telemetry in the store: the paper's example, or a real channel."""
     chosen = settings.telemetry
     if source is not None:
-        store.write(read_telemetry(source.path, source.column, source.time, 2 * chosen.window))
+        store.write(read_telemetry(source.path, source.column, source.time, 2 * least_part(settings)))
         return
     rng = draw(settings, "telemetry")
     for name, (periods, amplitudes) in waves_of(settings).items():
@@ -99,9 +104,10 @@ class Data:
         return Channel(series, *parts, coarse, periods, amplitudes)
 
     def _real_channel(self, series: Telemetry) -> Channel:
-        # a real channel is short: the gap between the parts gives way before either part falls below a window
-        test_length = max(int((1 - self.settings.split.real_train) * len(series)), self.window)
-        gap = min(self.window, max(0, len(series) - test_length - self.window))
+        # a real channel is short: the gap between the parts gives way before either part falls below a window of noise
+        least = least_part(self.settings)
+        test_length = max(int((1 - self.settings.split.real_train) * len(series)), least)
+        gap = min(self.window, max(0, len(series) - test_length - least))
         train, test = series.part(0, len(series) - test_length - gap), series.part(len(series) - test_length, len(series))
         return Channel(series, train, None, test, SquareWaveSimulator.fit(train, num_levels=self.settings.enhancer.num_levels))
 

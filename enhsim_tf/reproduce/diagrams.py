@@ -1,11 +1,9 @@
 """What the figures draw that is no curve: the pipeline, the adversarial training, the tables of layers.
 
-Also the sheet that every figure is drawn on and its colours, which survive a grey printer and colour-blind eyes: they
-differ in lightness, and where two of them meet in one panel also in line style or label.
+Positions and sizes are inches on the sheet, so that boxes and their text keep the size they were laid out for.
 """
 
 import re
-import textwrap
 from collections.abc import Mapping, Sequence
 
 import matplotlib.figure
@@ -13,50 +11,40 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
-REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
-QUIET, LINE = "#595959", "#8c8c8c"  # small print; outlines
-BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
-SINGLE, DOUBLE = 3.5, 7.2  # widths of a journal's columns, inches
-FOOT = 0.26  # inches left free at the bottom of each sheet, for the caption line
-EDGE = 0.10  # inches from the sheet's edges to its text
+from enhsim_tf.reproduce.sheet import (
+    BLUE_TINT,
+    COARSE,
+    DOUBLE,
+    EDGE,
+    ENHANCED,
+    FOOT,
+    GENERATED,
+    GREY_TINT,
+    IN_PRINT,
+    LINE,
+    ORANGE_TINT,
+    QUIET,
+    REAL,
+    SINGLE,
+    new_sheet,
+)
+
 _DASHES = (0, (2.6, 1.6))
 
 
-def sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[matplotlib.figure.Figure, float]:
-    """An empty figure with its message on top.
-
-    Args:
-        width: Inches.
-        height: Inches.
-        title: The message, wrapped to the width.
-        subtitle: What qualifies it, wrapped to the width.
-
-    Returns:
-        The figure, and how many inches the heading takes from its top.
-    """
-    figure = matplotlib.figure.Figure(figsize=(width, height))
-    down = 0.10
-    for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 13.5), (subtitle, 7.5, "normal", QUIET, 18.5)):
-        for line in textwrap.wrap(text, int((width - 2 * EDGE) * letters_an_inch)):
-            figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color)
-            down += 1.35 * size / 72
-        down += 0.04
-    return figure, down
-
-
-def drawing_board(figure: matplotlib.figure.Figure) -> Axes:
+def _drawing_board(figure: matplotlib.figure.Figure) -> Axes:
     """Axes without frame over the whole sheet, in inches from its lower left corner."""
     width, height = figure.get_size_inches()
     return figure.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(0, height), frame_on=False, xticks=(), yticks=())
 
 
-def box(axes: Axes, x: float, y: float, width: float, height: float, fill: str = "white", edge: str = LINE, **options) -> None:
+def _box(axes: Axes, x: float, y: float, width: float, height: float, fill: str = "white", edge: str = LINE, **options) -> None:
     """A box with rounded corners; `options` go to the patch."""
     style = "round,pad=0,rounding_size=0.06"
     axes.add_patch(FancyBboxPatch((x, y), width, height, boxstyle=style, facecolor=fill, edgecolor=edge, **{"linewidth": 0.8} | options))
 
 
-def arrow(axes: Axes, points: Sequence[tuple[float, float]], dashed: bool = False, color: str = REAL, linewidth: float = 1.1) -> None:
+def _arrow(axes: Axes, points: Sequence[tuple[float, float]], dashed: bool = False, color: str = REAL, linewidth: float = 1.1) -> None:
     """An arrow along straight pieces, in inches."""
     points = np.array(points, float)
     along = (points[-1] - points[-2]) / np.hypot(*(points[-1] - points[-2]))
@@ -66,31 +54,31 @@ def arrow(axes: Axes, points: Sequence[tuple[float, float]], dashed: bool = Fals
     axes.add_patch(Polygon([points[-1], neck + across, neck - across], facecolor=color, edgecolor="none", zorder=2.6))
 
 
-def badge(axes: Axes, x: float, y: float, number: int) -> None:
+def _badge(axes: Axes, x: float, y: float, number: int) -> None:
     """The number of a step of the paper."""
     axes.add_patch(Circle((x, y), 0.105, facecolor=REAL, edgecolor="white", linewidth=1, zorder=3))
     axes.text(x, y - 0.005, str(number), color="white", weight="bold", size=8, ha="center", va="center_baseline", zorder=4)
 
 
-def words(axes: Axes, x: float, top: float, text: str, size: float = 7, color: str = QUIET, **options) -> None:
+def _words(axes: Axes, x: float, top: float, text: str, size: float = 7, color: str = QUIET, **options) -> None:
     """Lines of text at equal distances below `top`."""
     for number, line in enumerate(text.split("\n")):
         axes.text(x, top - size / 72 * (0.95 + 1.3 * number), line, size=size, color=color, **options)
 
 
-def card(
+def _card(
     axes: Axes, x: float, top: float, size: tuple[float, float], heading: str, text: str, number: int | None = None, **options
 ) -> None:
     """A box with a heading, small print and the number of its step; the text of a grey one, which has no curve, is centred."""
-    box(axes, x, top - size[1], *size, **options)
+    _box(axes, x, top - size[1], *size, **options)
     down = (size[1] - 0.12 * (2 + text.count("\n"))) / 2 - 0.04 if options.get("fill") == GREY_TINT else 0.1
-    words(axes, x + 0.13, top - down, heading, 7.5, REAL, weight="bold")
-    words(axes, x + 0.13, top - down - 0.15, text)
+    _words(axes, x + 0.13, top - down, heading, 7.5, REAL, weight="bold")
+    _words(axes, x + 0.13, top - down - 0.15, text)
     if number is not None:
-        badge(axes, x, top, number)
+        _badge(axes, x, top, number)
 
 
-def inset(figure: matplotlib.figure.Figure, left: float, bottom: float, width: float, height: float, **options) -> Axes:
+def _inset(figure: matplotlib.figure.Figure, left: float, bottom: float, width: float, height: float, **options) -> Axes:
     """Axes without frame in a rectangle given in inches."""
     across, up = figure.get_size_inches()
     place = (left / across, bottom / up, width / across, height / up)
@@ -99,8 +87,8 @@ def inset(figure: matplotlib.figure.Figure, left: float, bottom: float, width: f
 
 def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     """Figure 1: the nine numbered steps of the paper and their sum, with the waveforms of one window."""
-    figure, _ = sheet(DOUBLE, 4.5, "Two networks turn a coarse simulation into realistic telemetry")
-    axes, height, gap = drawing_board(figure), 1.02, 0.3
+    figure, _ = new_sheet(DOUBLE, 4.5, "Two networks turn a coarse simulation into realistic telemetry")
+    axes, height, gap = _drawing_board(figure), 1.02, 0.3
     top = [FOOT + 0.14 + height * (3 - row) + gap * (2 - row) for row in range(3)]
     centre = [y - height / 2 for y in top]
     wide = np.array([0.98, 1.27, 1.27, 1.27, 1.24])
@@ -112,11 +100,11 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     level, reach = signals.mean(), 1.05 * np.abs(signals - signals.mean()).max()
 
     def curve(column: int, bottom: float, key: str, color: str, about: float = level) -> None:
-        small = inset(figure, left[column] + 0.1, bottom, wide[column] - 0.2, height - 0.5, ylim=(about - reach, about + reach))
+        small = _inset(figure, left[column] + 0.1, bottom, wide[column] - 0.2, height - 0.5, ylim=(about - reach, about + reach))
         small.plot(data["time"], data[key], color=color, linewidth=0.6, clip_on=False)
 
     def step(column: int, row: int, heading: str, text: str, number: int | None = None, **options) -> float:
-        card(axes, left[column], top[row], (wide[column], height), heading, text, number, **options)
+        _card(axes, left[column], top[row], (wide[column], height), heading, text, number, **options)
         return top[row] - height + 0.07
 
     # steps 1, 2, 3 and 5: the waveform
@@ -134,13 +122,13 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     curve(2, step(2, 1, "Environment", "telemetry − average", 6), "noise", REAL, about=0)
     # steps 7, 8 and 9: the noise
     bottom = step(1, 2, "Latent space", f"{len(data['latent'])} random numbers", 7)
-    small = inset(figure, left[1] + 0.2, bottom + 0.03, wide[1] - 0.4, height - 0.56)
+    small = _inset(figure, left[1] + 0.2, bottom + 0.03, wide[1] - 0.4, height - 0.56)
     small.vlines(np.arange(len(data["latent"])), 0, data["latent"], color=GENERATED, linewidth=1.6, clip_on=False)
     small.axhline(0, color=LINE, linewidth=0.5)
     generator, discriminator = top[2] - 0.83, top[2] - 0.4
     step(2, 2, "GAN", "", 8, fill=ORANGE_TINT, edge=GENERATED)
     for y, name in ((generator, "generator"), (discriminator, "discriminator")):
-        box(axes, left[2] + 0.14, y - 0.12, wide[2] - 0.28, 0.24, edge=GENERATED)
+        _box(axes, left[2] + 0.14, y - 0.12, wide[2] - 0.28, 0.24, edge=GENERATED)
         axes.text(middle[2], y, name, size=7.5, ha="center", va="center")
     curve(3, step(3, 2, "Generated noise", "of the environment", 9), "generated_noise", GENERATED, about=0)
     # Combined, beside what it should resemble
@@ -148,10 +136,10 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     axes.text(middle[3], centre[1] - 0.005, "+", size=13, ha="center", va="center_baseline")
     tall = 2.1
     begin = centre[1] + tall / 2
-    card(axes, left[4], begin, (wide[4], tall), "Combined", "high-fidelity output", edge=REAL, linewidth=1.6)
+    _card(axes, left[4], begin, (wide[4], tall), "Combined", "high-fidelity output", edge=REAL, linewidth=1.6)
     curve(4, begin - 0.98, "combined", GENERATED)
     axes.plot((left[4] + 0.13, right[4] - 0.13), (begin - 1.11, begin - 1.11), color=LINE, linewidth=0.5)
-    words(axes, left[4] + 0.13, begin - 1.18, "real telemetry of\nthe same times")
+    _words(axes, left[4] + 0.13, begin - 1.18, "real telemetry of\nthe same times")
     curve(4, begin - 2.03, "telemetry", REAL)
 
     turn = top[0] - height - gap / 2
@@ -165,7 +153,7 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         [(middle[3], top[2]), (middle[3], centre[1] - 0.15)],
         [(middle[3] + 0.15, centre[1]), (left[4], centre[1])],
     ):
-        arrow(axes, path, linewidth=1.5)
+        _arrow(axes, path, linewidth=1.5)
     for path in (  # taken in training only
         [(right[0], centre[1]), (left[1], centre[1])],
         [(right[1], centre[1]), (left[2], centre[1])],
@@ -173,9 +161,9 @@ def pipeline(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         [(middle[2], top[1] - height), (middle[2], discriminator + 0.12)],
         [(middle[2], generator + 0.12), (middle[2], discriminator - 0.12)],
     ):
-        arrow(axes, path, dashed=True)
+        _arrow(axes, path, dashed=True)
     for y, dashed, meaning in ((generator + 0.34, False, "generates"), (generator, True, "trains")):
-        arrow(axes, [(left[0], y), (left[0] + 0.35, y)], dashed, linewidth=1.1 if dashed else 1.5)
+        _arrow(axes, [(left[0], y), (left[0] + 0.35, y)], dashed, linewidth=1.1 if dashed else 1.5)
         axes.text(left[0] + 0.42, y, meaning, size=7, color=QUIET, va="center")
     return figure
 
@@ -184,8 +172,8 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
     """Figure 11: the two phases of an iteration, one below the other on the same plan."""
     batch, latent, updates = f"{int(data['batch_size']):,}", int(data["latent"]), "one update" if data["mixed_batch"] else "two updates"
     title = "Each iteration trains the discriminator alone, then the generator through it"
-    figure, down = sheet(DOUBLE, 3.94, title, f"{int(data['num_iterations']):,} iterations; {batch} rows of each kind in each")
-    axes, tall, gap = drawing_board(figure), 1.46, 0.12
+    figure, down = new_sheet(DOUBLE, 3.94, title, f"{int(data['num_iterations']):,} iterations; {batch} rows of each kind in each")
+    axes, tall, gap = _drawing_board(figure), 1.46, 0.12
     left, wide = np.array([0.25, 1.5, 2.86, 4.28, 5.78]), np.array([0.98, 1.09, 1.1, 1.2, 1.2])
     right, middle, height = left + wide, left + wide / 2, 0.46
     first = 3.94 - down - 0.06
@@ -200,7 +188,7 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         ),
     )
     for phase, (top, heading, text, color, tint) in enumerate(phases, 1):
-        box(axes, EDGE, top - tall, DOUBLE - 2 * EDGE, tall, fill=GREY_TINT, edge="none")
+        _box(axes, EDGE, top - tall, DOUBLE - 2 * EDGE, tall, fill=GREY_TINT, edge="none")
         axes.text(left[0], top - 0.22, heading, size=8, weight="bold", color=REAL)
         axes.text(left[0] + 1.95, top - 0.22, text, size=7.5, color=QUIET)
         y = top - (1.1 if phase == 1 else 0.8)  # of the generated rows
@@ -209,7 +197,7 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         def part(column: int, y: float, name: str, text: str, learns: bool | None = None, color=color, tint=tint) -> None:
             """A box; a network that learns is coloured, one that is frozen has a dashed outline."""
             style = {None: {}, True: {"edge": color, "fill": tint, "linewidth": 1.8}, False: {"linestyle": _DASHES, "edge": QUIET}}[learns]
-            box(axes, left[column], y - height / 2, wide[column], height, **style)
+            _box(axes, left[column], y - height / 2, wide[column], height, **style)
             axes.text(middle[column], y + 0.075, name, size=7.5, weight="bold", ha="center", va="center")
             axes.text(middle[column], y - 0.095, text, size=7, color=QUIET, ha="center", va="center")
 
@@ -219,20 +207,20 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         part(3, judged, "Discriminator", "learns" if phase == 1 else "frozen", phase == 1)
         part(4, judged, "Loss", "binary cross-entropy")
         for column in (0, 1):
-            arrow(axes, [(right[column], y), (left[column + 1], y)])
-        arrow(axes, [(right[3], judged), (left[4], judged)])
+            _arrow(axes, [(right[column], y), (left[column + 1], y)])
+        _arrow(axes, [(right[3], judged), (left[4], judged)])
         if phase == 1:
             part(2, top - 0.54, "Real noise", f"{batch} rows")
             for rows, into in ((top - 0.54, judged + 0.1), (y, judged - 0.1)):
                 turn = right[2] + 0.16
-                arrow(axes, [(right[2], rows), (turn, rows), (turn, into), (left[3], into)])
+                _arrow(axes, [(right[2], rows), (turn, rows), (turn, into), (left[3], into)])
         else:
-            arrow(axes, [(right[2], y), (left[3], y)])
+            _arrow(axes, [(right[2], y), (left[3], y)])
         # the tags go into the loss from above, the error flows back below to the network that learns
         tags = "tags: real 1.0, generated 0.0" if phase == 1 else "tags reversed: generated 1.0"
         axes.text(right[4], judged + height / 2 + 0.07, tags, size=7, ha="right")
         low, back = judged - height / 2 - 0.2, 3 if phase == 1 else 1
-        arrow(
+        _arrow(
             axes,
             [(middle[4], judged - height / 2), (middle[4], low), (middle[back], low), (middle[back], judged - height / 2)],
             True,
@@ -241,16 +229,16 @@ def gan_training(data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
         )
         moved = ("the error moves", "the error passes the frozen discriminator and moves")[phase - 1]
         moved += f" the {('discriminator', 'generator')[phase - 1]}’s weights only"
-        axes.text(middle[4], low - 0.14, moved, size=7, color=color, ha="right")
+        axes.text(middle[4], low - 0.14, moved, size=7, color=IN_PRINT.get(color, color), ha="right")
     return figure
 
 
 def layer_table(data: Mapping[str, np.ndarray], title: str) -> matplotlib.figure.Figure:
     """Figures 3, 9 and 10: layers, their output shapes and parameters, as a typeset table."""
     names, details, leading = data["layer"], data["detail"], 0.3
-    height = 0.82 + leading * (len(names) + 1) + FOOT
-    figure, down = sheet(SINGLE, height, title)
-    axes = drawing_board(figure)
+    height = 0.84 + leading * (len(names) + 1) + FOOT
+    figure, down = new_sheet(SINGLE, height, title)
+    axes = _drawing_board(figure)
     shape, number, y = 1.72, SINGLE - EDGE, height - down - 0.2
 
     def rule(y: float, linewidth: float) -> None:
@@ -269,11 +257,11 @@ def layer_table(data: Mapping[str, np.ndarray], title: str) -> matplotlib.figure
         row(y, kind if automatic else f"{name} ({kind})", output, f"{parameters:,}", size=8)
         axes.text(EDGE, y - 0.125, detail, size=7, color=QUIET)
         y -= leading
-    rule(y + 0.14, 0.5)
+    rule(y + 0.12, 0.5)
     total, trainable = int(data["total"]), int(data["trainable"])
-    row(y - 0.02, "Total", "", f"{total:,}", size=8, weight="bold")
+    row(y - 0.04, "Total", "", f"{total:,}", size=8, weight="bold")
     rest = f"{total - trainable:,} not trainable" if total > trainable else "all trainable"
-    axes.text(number, y - 0.145, rest, size=7, color=QUIET, ha="right")
-    axes.text(EDGE, y - 0.145, f"input {data['input_shape']}", size=7, color=QUIET)
-    rule(y - 0.22, 1.0)
+    axes.text(number, y - 0.165, rest, size=7, color=QUIET, ha="right")
+    axes.text(EDGE, y - 0.165, f"input {data['input_shape']}", size=7, color=QUIET)
+    rule(y - 0.24, 1.0)
     return figure

@@ -21,8 +21,9 @@ from enhsim_tf.store import ParquetStore
 from enhsim_tf.terminal import start_tensorflow
 
 _DATA = ("reproduce.data",)
-_NETWORKS = (*_DATA, "enhanced_simulator", "fidelity")
-_MEASURED = (*_NETWORKS, "reproduce.measurements")
+_ENHANCER = (*_DATA, "enhancer")
+_NOISE = (*_DATA, "noise_gan", "fidelity")
+_MEASURED = (*_DATA, "enhanced_simulator", "reproduce.measurements")
 
 
 class Experiment:
@@ -77,7 +78,7 @@ class Experiment:
             self.settings.noise.moving_average,
             self.settings.seed,
         )
-        return self.stages.run("enhancer", self._make_enhancer, _NETWORKS, depends, after=("telemetry",))
+        return self.stages.run("enhancer", self._make_enhancer, _ENHANCER, depends, after=("telemetry",))
 
     def _make_enhancer(self, folder: Path) -> None:
         start_tensorflow()
@@ -102,7 +103,7 @@ class Experiment:
         """Network two, its history and how its noise changed while it learned."""
         _ = self.data
         depends = (self.settings.telemetry, self.settings.split, self.settings.noise, self.settings.adversarial, self.settings.seed)
-        return self.stages.run("noise GAN", self._make_noise, _NETWORKS, depends, after=("telemetry",))
+        return self.stages.run("noise GAN", self._make_noise, _NOISE, depends, after=("telemetry",))
 
     def _make_noise(self, folder: Path) -> None:
         start_tensorflow()

@@ -139,7 +139,7 @@ def telemetry_store(experiment: Experiment) -> Arrays:
     if series.has_time:
         start = np.datetime64(series.start.removesuffix("+00:00"), "ms")
         time = start + np.round(1e3 * stretch.time_s).astype("timedelta64[ms]")
-    about = {"name": series.name, "num_samples": len(series), "interval_s": series.interval_s, "unit": series.unit}
+    about = {"name": series.name, "num_samples": len(series), "interval_s": series.interval_s, "unit": _unit(experiment, series)}
     return {"time": time, "values": stretch.values} | {key: np.array(value) for key, value in about.items()}
 
 
@@ -191,7 +191,13 @@ def _axis(experiment: Experiment, num_samples: int | None = None) -> Arrays:
     if telemetry.has_time:
         units = {"s": 1, "min": 60, "h": 3_600, "d": 86_400}
         unit, size = next((item for item in units.items() if time[-1] < 300 * item[1]), ("d", 86_400))
-    return {"time": time / size, "time_unit": np.array(unit), "unit": np.array(telemetry.unit)}
+    return {"time": time / size, "time_unit": np.array(unit), "unit": _unit(experiment, telemetry)}
+
+
+def _unit(experiment: Experiment, series: Telemetry) -> np.ndarray:
+    """The unit of the values in words; a file seldom says it."""
+    unit = series.unit
+    return np.array(unit if unit != "1" else "dimensionless" if experiment.is_paper else "as recorded")
 
 
 def _shuffled(real: np.ndarray, generated: np.ndarray, rng: np.random.Generator) -> Arrays:

@@ -16,6 +16,7 @@ import numpy as np
 
 from enhsim_tf.files import replace_file
 from enhsim_tf.reproduce import curves, diagrams
+from enhsim_tf.reproduce.sheet import EDGE, GENERATED, QUIET
 
 WATERMARK = "SMOKE BUDGET"
 _STYLE = ("default", Path(__file__).with_name("style.mplstyle"))
@@ -108,7 +109,7 @@ FIGURES: dict[str, Figure] = {
         "Generator construction",
         "Table of the generator's layers with their output shapes and numbers of parameters, and the total.",
         lambda data: diagrams.layer_table(
-            data, f"{_shape(data['input_shape'])} numbers become {_shape(data['output_shape'][-1])} of noise"
+            data, f"{_shape(data['input_shape'])} numbers become {_shape(data['output_shape'][-1])} samples of noise"
         ),
     ),
     "fig10_discriminator": Figure(
@@ -174,11 +175,11 @@ def save(
     about = FIGURES[name]
     figure = about.draw(data)
     width, height = figure.get_size_inches()
-    lines = textwrap.wrap(caption, int((width - 2 * diagrams.EDGE) * 20.5))
-    small = {"size": 7, "color": diagrams.QUIET, "linespacing": 1.05}
-    figure.text(diagrams.EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
+    lines = textwrap.wrap(caption, int((width - 2 * EDGE) * 20.5))
+    small = {"size": 7, "color": QUIET, "linespacing": 1.05}
+    figure.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
     if is_smoke:
-        mark = {"size": 6.2 * width, "weight": "bold", "color": diagrams.GENERATED, "alpha": 0.3, "rotation": 15}
+        mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
         figure.text(0.5, 0.5, WATERMARK, **mark, ha="center", va="center", zorder=10, gid="watermark")
     paths = [Path(folder) / f"{name}.{kind}" for kind in saved_as]
     with matplotlib.style.context(_STYLE):

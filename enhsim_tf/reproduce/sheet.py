@@ -1,0 +1,127 @@
+"""The sheet that every figure is drawn on: its heading, its panels, its colours, and labels that stand beside their curves.
+
+The colours survive a grey printer and colour-blind eyes: they differ in lightness, and where two of them meet in one
+panel also in line style, width or label.
+"""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+from matplotlib.axes import Axes
+
+REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
+QUIET, LINE = "#595959", "#8c8c8c"  # small print; outlines
+IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker, for words in the colour of a curve
+BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
+SINGLE, DOUBLE = 3.5, 7.2  # widths of a journal's columns, inches
+FOOT = 0.26  # inches left free at the bottom of each sheet, for the caption line
+EDGE = 0.10  # inches from the sheet's edges to its text
+
+
+def new_sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[matplotlib.figure.Figure, float]:
+    """An empty figure with its message on top.
+
+    Args:
+        width: Inches.
+        height: Inches.
+        title: The message, wrapped to the width.
+        subtitle: What qualifies it, wrapped to the width.
+
+    Returns:
+        The figure, and how many inches the heading takes from its top.
+    """
+    figure = matplotlib.figure.Figure(figsize=(width, height))
+    down = 0.10
+    for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 13.5), (subtitle, 7.5, "normal", QUIET, 18.5)):
+        for line in textwrap.wrap(text, int((width - 2 * EDGE) * letters_an_inch)):
+            figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color)
+            down += 1.35 * size / 72
+        down += 0.04
+    return figure, down
+
+
+def panels(
+    figure: matplotlib.figure.Figure,
+    down: float,
+    rows: int,
+    columns: int,
+    right: float = 0.15,
+    gap: tuple[float, float] = (0.24, 0.14),
+    height_ratios: Sequence[float] | None = None,
+    **shared: bool,
+) -> np.ndarray:
+    """Axes in a grid below the heading.
+
+    Args:
+        figure: The sheet.
+        down: Inches from the sheet's top to the grid.
+        rows: Number of rows.
+        columns: Number of columns.
+        right: Inches from the grid to the sheet's right edge.
+        gap: Inches between rows and between columns.
+        height_ratios: Heights of the rows, relative to each other.
+        **shared: `sharex` and `sharey`, as Matplotlib has them.
+
+    Returns:
+        Array of axes of shape `(rows, columns)`.
+    """
+    width, height = figure.get_size_inches()
+    left, bottom = 0.66, FOOT + 0.38
+    grid = {
+        "left": left / width,
+        "right": 1 - right / width,
+        "bottom": bottom / height,
+        "top": 1 - down / height,
+        "hspace": gap[0] * rows / (height - down - bottom - gap[0] * (rows - 1)),
+        "wspace": gap[1] * columns / (width - left - right - gap[1] * (columns - 1)),
+        "height_ratios": height_ratios,
+    }
+    return figure.subplots(rows, columns, squeeze=False, gridspec_kw=grid, **shared)
+
+
+def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
+    """The time and the value axis of a grid, each with its unit, named once."""
+    figure, (width, height) = axes[0, 0].figure, axes[0, 0].figure.get_size_inches()
+    last, first = axes[-1, -1].get_position(), axes[0, 0].get_position()
+    figure.text((first.x0 + last.x1) / 2, (FOOT + 0.04) / height, f"time ({data['time_unit']})", ha="center")
+    figure.text(0.17 / width, (first.y1 + last.y0) / 2, f"value ({data['unit']})", rotation=90, ha="center", va="center")
+
+
+def beside(axes: Axes, height: float, text: str, color: str) -> None:
+    """Puts a label right of axes.
+
+    Args:
+        axes: The axes.
+        height: Where, from 0 at their foot to 1.
+        text: The label.
+        color: Of the curve it names; the label may be darker.
+    """
+    style = {"color": IN_PRINT.get(color, color), "va": "center", "linespacing": 1.05, "annotation_clip": False}
+    axes.annotate(text, (1, height), (5, 0), "axes fraction", "offset points", **style)
+
+
+def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
+    """Labels right of the ends of curves, moved apart where they would touch; values of a curve, or one height, and colour."""
+    low, high = axes.get_ylim()
+    inches = axes.get_position().height * axes.figure.get_size_inches()[1]
+    ends = sorted((float(np.ravel(values)[-1]), name, color) for name, (values, color) in curves.items())
+    at = np.array([(value - low) / (high - low) for value, _, _ in ends])
+    room = np.array([0.13 * (1 + name.count("\n")) / inches for _, name, _ in ends])
+    for _ in range(200):  # neighbours push each other apart until nobody touches
+        overlap = np.maximum((room[1:] + room[:-1]) / 2 - np.diff(at), 0)
+        at[1:] += overlap / 2
+        at[:-1] -= overlap / 2
+    for height, (_, name, color) in zip(at, ends, strict=True):
+        beside(axes, height, name, color)
+
+
+def title_words(axes: Axes, words: Sequence[tuple[str, str]]) -> None:
+    """A title whose words have the colours of the curves they name."""
+    width, place = axes.get_position().width * axes.figure.get_size_inches()[0], 0.0
+    for word, color in words:
+        style = {"color": IN_PRINT.get(color, color), "weight": "bold", "annotation_clip": False}
+        axes.annotate(word, (place, 1), (0, 4), "axes fraction", "offset points", **style)
+        place += (0.06 * len(word) + 0.12) / width

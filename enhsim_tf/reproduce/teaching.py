@@ -1,0 +1,129 @@
+"""What the notebooks share: the experiment, its figures and its claims, shown in Jupyter.
+
+It trains, measures and draws nothing of its own: stages come from the cache that `reproduce` fills, figures from the
+function that writes `figures/`, sentences and verdicts from the ledger.
+"""
+
+import contextlib
+import functools
+import io
+import json
+import logging
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib.figure
+import matplotlib.style
+import numpy as np
+from IPython.display import Markdown, display
+from PIL import Image
+
+from enhsim_tf.errors import InputError
+from enhsim_tf.reproduce import claims, figures
+from enhsim_tf.reproduce.experiments import Experiment
+from enhsim_tf.reproduce.figure_data import FIGURE_DATA
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.reproduce.stages import Stages, default_cache
+from enhsim_tf.terminal import start_tensorflow
+
+_TAKES = {"full": "minutes", "smoke": "seconds"}
+# stages that take time, in their order, and what of the experiment asks for each
+_STAGES = {"telemetry": "store", "enhancer": "enhancer_folder", "noise GAN": "noise_folder", "enhancement": "enhancement"}
+_STAGES |= {"speed": "speed", "false alarms": "false_alarms", "resemblance": "resemblance", "degraded": "degraded"}
+_LEDGER = {known.id: known for known in claims.CLAIMS}
+_ROOT = Path(__file__).parents[2]
+_SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
+
+
+class _Lookup(Stages):
+    """Stages that are looked for and never done."""
+
+    def run(self, name, make, *others, **options):
+        @functools.wraps(make)  # a stage is found by the source of what makes it
+        def refuse(folder):
+            raise LookupError(name)
+
+        return super().run(name, refuse, *others, **options)
+
+
+def open_experiment(budget: str | None = None) -> Experiment:
+    """Opens the paper's experiment and says which stages are still to be done and how long they take.
+
+    A stage is done when a cell first asks for it, with a progress bar for each training, and kept for all notebooks and
+    for `python -m enhsim_tf.reproduce`.
+
+    Args:
+        budget: `full` or `smoke`; None takes it from the environment variable `ENHSIM_TF_BUDGET`, or `full`.
+    """
+    budget = budget or os.environ.get("ENHSIM_TF_BUDGET", "full")
+    if budget not in _TAKES:
+        raise InputError(f"Expected ENHSIM_TF_BUDGET to be one of: {', '.join(_TAKES)}. Received: {budget!r}.")
+    settings, cache = make_settings(budget), default_cache()
+    missing = prepare(Experiment(settings, _Lookup(cache, tell=lambda line: None)))
+    results = _ROOT / "figures" / "results.json"
+    took = json.loads(results.read_text(encoding="utf-8")) if results.is_file() else {"budget": None}
+    known = {stage: f"about {seconds:.0f} s" for stage, seconds in took["timings"].items()} if took["budget"] == budget else {}
+    todo = ", ".join(f"{stage} ({known.get(stage, _TAKES[budget])})" for stage in missing)
+    print(
+        f"{budget.capitalize()} budget, seed {settings.seed}.",
+        f"Still to do, when first needed: {todo}." if todo else "Everything is ready.",
+    )
+    start_tensorflow()
+    logging.getLogger("tensorflow").setLevel("ERROR")  # its advice on speed is for loops, not for notebooks
+    return Experiment(settings, Stages(cache, tell=lambda line: None if line.endswith("(from the cache)") else print(line)), verbose=1)
+
+
+def prepare(experiment: Experiment) -> list[str]:
+    """Does every stage; returns those that could not be done, because the experiment's stages are only looked up."""
+    missing = []
+    for stage, attribute in _STAGES.items():
+        try:
+            getattr(experiment, attribute)
+        except LookupError:
+            missing.append(stage)
+    return missing
+
+
+def show(experiment: Experiment, name: str) -> dict[str, np.ndarray]:
+    """Shows a figure (one of `settings.FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
+    arrays, chosen = FIGURE_DATA[name](experiment), experiment.settings
+    caption = f"seed {chosen.seed} · {chosen.budget} budget · python -m enhsim_tf.reproduce --only {name.split('_')[0]}"
+    with tempfile.TemporaryDirectory() as folder:
+        (path,) = figures.save(name, arrays, folder, caption, chosen.budget == "smoke", saved_as=("png",))
+        _show_picture(path.read_bytes(), figures.FIGURES[name].alt)
+    return arrays
+
+
+@contextlib.contextmanager
+def drawing(alt: str, columns: int = 1, height: float = 2.4, **shared: bool) -> Iterator:
+    """A row of panels in the style of all, shown when the `with` block ends; `alt` says in words what they show."""
+    with matplotlib.style.context(("default", Path(__file__).with_name("style.mplstyle"))):
+        figure = matplotlib.figure.Figure(figsize=(7.2, height), layout="constrained")
+        yield figure.subplots(1, columns, **shared)
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png", metadata={"Software": None})
+    _show_picture(picture.getvalue(), alt)
+
+
+def _show_picture(png: bytes, alt: str) -> None:
+    picture, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
+    picture.quantize(48, dither=Image.Dither.NONE).save(small, "png", optimize=True)  # a third of the bytes, the same to the eye
+    about = {"width": int(picture.width * _SCREEN), "alt": alt}
+    display({"image/png": small.getvalue(), "text/plain": f"Figure: {alt}"}, metadata={"image/png": about}, raw=True)
+
+
+def claim(*ids: str) -> None:
+    """Shows claims of the paper, from the ledger: the sentence, where it stands, and what it is held to."""
+    for known in (_LEDGER[id] for id in ids):
+        held = f"{known.statistic}; {known.tolerance}"
+        display(Markdown(f"> **{known.id}** (paper: {known.section}) {known.sentence}\n>\n> *We hold it to:* {held}."))
+
+
+def verdict(experiment: Experiment, *ids: str) -> list[dict]:
+    """Judges claims by the ledger, shows verdicts and findings, and returns the records that `results.json` holds."""
+    records = claims.judge(tuple(_LEDGER[id] for id in ids), experiment)
+    for record in records:
+        display(Markdown(f"> **{record['id']}: {record['verdict']}.** {record['finding'][0].upper()}{record['finding'][1:]}."))
+    return records
