@@ -86,6 +86,7 @@ def two_sample_auc(generated: np.ndarray, real: np.ndarray, seed: int, num_folds
     from sklearn.ensemble import HistGradientBoostingClassifier
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import cross_val_predict
+    from threadpoolctl import threadpool_limits
 
     number = min(len(generated), len(real))
     if number < 2 * num_folds:
@@ -95,5 +96,6 @@ def two_sample_auc(generated: np.ndarray, real: np.ndarray, seed: int, num_folds
     folds = np.tile(np.arange(number) * num_folds // number, 2)
     splits = [(np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)) for fold in range(num_folds)]
     classifier = HistGradientBoostingClassifier(random_state=seed)
-    scores = cross_val_predict(classifier, features, labels, cv=splits, method="predict_proba")[:, 1]
+    with threadpool_limits(1, user_api="openmp"):  # threads that wait for each other on a busy machine take ten times as long
+        scores = cross_val_predict(classifier, features, labels, cv=splits, method="predict_proba")[:, 1]
     return float(roc_auc_score(labels, scores))

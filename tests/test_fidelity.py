@@ -26,9 +26,9 @@ def test_nrmse_by_hand():
     assert fidelity.nrmse(truth + [[1, 1], [-1, -3]], truth) == pytest.approx(np.sqrt(12 / 4 / 5))
 
 
-def test_nrmse_of_float32_is_computed_in_float64():
-    truth = np.tile(np.array([0, 1], np.float32), 50_000) + np.float32(4_096)
-    assert fidelity.nrmse(truth + np.float32(0.5), truth) == pytest.approx(1, rel=1e-9)
+def test_nrmse_of_a_small_unit_in_float32():
+    truth = np.array([0, 2, 4, 6], np.float32) * np.float32(1e-25)  # squares are below what float32 can say
+    assert fidelity.nrmse(truth[::-1].copy(), truth) == pytest.approx(2)
 
 
 def test_roughness_of_a_sine():
@@ -46,7 +46,7 @@ def test_roughness_of_white_noise_and_of_a_ramp():
 @pytest.mark.parametrize("directions", [1, 2, 7])
 def test_effective_rank_counts_equal_directions(directions):
     basis = np.linalg.qr(normal(20, 20))[0][:directions]
-    windows = 5 + 3 * np.concatenate([basis, -basis])  # a mean does not count
+    windows = np.arange(20) + 3 * np.concatenate([basis, -basis])  # the mean window does not count
     assert fidelity.effective_rank(windows) == pytest.approx(directions)
 
 
@@ -146,8 +146,8 @@ def test_two_samples_of_one_process_cannot_be_told_apart(seed):
 
 
 def test_two_samples_of_two_processes_can_and_the_same_seed_says_the_same():
-    first, again = (fidelity.two_sample_auc(autoregressive(100, 100, 0.5), normal(120, 100, seed=3), seed=0) for _ in range(2))
-    assert first > 0.99 and first == again
+    first, again = (fidelity.two_sample_auc(autoregressive(100, 100, 0.7), normal(120, 100, seed=3), seed=0) for _ in range(2))
+    assert first > 0.98 and first == again
 
 
 def test_two_sample_folds_hold_out_neighbours():
@@ -155,7 +155,7 @@ def test_two_sample_folds_hold_out_neighbours():
     # knows its level and so its kind
     levels = np.random.default_rng(0).permutation(40).reshape(2, 20)
     generated, real = (np.repeat(kind, 10)[:, None] + 0.01 * normal(200, 50) for kind in levels)
-    assert fidelity.two_sample_auc(generated, real, seed=0) < 0.9
+    assert fidelity.two_sample_auc(generated, real, seed=0) < 0.75
 
 
 def test_two_sample_auc_refuses_too_few_windows(refused):

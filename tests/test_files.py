@@ -14,10 +14,6 @@ from enhsim_tf import files
 ROOT = Path(__file__).parents[1]
 
 
-class Interruption(Exception):
-    """Stands for whatever stops a writer."""
-
-
 def content_of(folder):
     return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
@@ -51,9 +47,9 @@ def test_replace_file_takes_the_name_at_the_end_only(tmp_path):
 def test_interrupted_replace_file_leaves_what_was(tmp_path, before):
     for name, text in before.items():
         (tmp_path / name).write_text(text)
-    with pytest.raises(Interruption), files.replace_file(tmp_path / "values.json") as temporary:
+    with pytest.raises(KeyboardInterrupt), files.replace_file(tmp_path / "values.json") as temporary:
         temporary.write_text("half")
-        raise Interruption
+        raise KeyboardInterrupt
     assert content_of(tmp_path) == before
 
 
@@ -78,9 +74,9 @@ def test_interrupted_replace_folder_leaves_what_was(tmp_path, before):
     for name, text in before.items():
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).write_text(text)
-    with pytest.raises(Interruption), files.replace_folder(tmp_path / "model") as temporary:
+    with pytest.raises(KeyboardInterrupt), files.replace_folder(tmp_path / "model") as temporary:
         (temporary / "inside").write_text("half")
-        raise Interruption
+        raise KeyboardInterrupt
     assert content_of(tmp_path) == before
     assert len(list(tmp_path.iterdir())) == len(before)
 

@@ -90,7 +90,11 @@ def test_missing_day_is_noticed(tmp_path, refused):
         store.read("wheel")
 
 
-@pytest.mark.parametrize("content", [b"", b"PAR1 and no more"])
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"PAR1 and no more", b"PAR1" + bytes(20) + b"\x14\0\0\0PAR1"],
+    ids=["nothing", "a beginning", "a footer that says nothing"],
+)
 def test_damaged_day_is_refused(tmp_path, refused, content):
     store = ParquetStore(tmp_path)
     store.write(series(72, interval_s=3_600.0, start="2020-03-01", name="wheel"))

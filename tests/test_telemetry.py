@@ -9,6 +9,7 @@ from enhsim_tf.telemetry import (
     check_values,
     cut_windows,
     disjoint_offsets,
+    even_offsets,
     random_offsets,
     read_telemetry,
     split_by_time,
@@ -23,7 +24,7 @@ def write(path, content):
         path.write_bytes(content)
     elif isinstance(content, np.ndarray):
         np.save(path, content)
-    elif path.suffix == ".csv":
+    elif path.suffix.lower() == ".csv":
         content.to_csv(path, index=False)
     else:
         content.to_parquet(path)
@@ -180,7 +181,7 @@ def test_only_column_of_a_table_needs_no_name(tmp_path, suffix):
     table = pd.DataFrame({"when": np.arange(20), "value": np.arange(20.0) % 7})
     read = read_telemetry(write(tmp_path / f"a{suffix}", table), time="when")
     assert read.values.tolist() == (np.arange(20.0) % 7).tolist()
-    read = read_telemetry(write(tmp_path / f"b{suffix.upper()}", table).rename(tmp_path / f"c{suffix.upper()}"), column="value")
+    read = read_telemetry(write(tmp_path / f"b{suffix.upper()}", table), column="value")
     assert read.values.tolist() == (np.arange(20.0) % 7).tolist() and read.start is None
 
 
@@ -231,6 +232,13 @@ def test_disjoint_offsets_share_no_sample():
     assert disjoint_offsets(1_499, 500).tolist() == [0, 500]
     assert disjoint_offsets(1_500, 500).tolist() == [0, 500, 1_000]
     assert disjoint_offsets(499, 500).tolist() == []
+
+
+def test_even_offsets_reach_from_end_to_end():
+    assert even_offsets(110, 10, 5).tolist() == [0, 25, 50, 75, 100]
+    offsets = even_offsets(1_000, 60, 37)
+    assert (offsets[0], offsets[-1]) == (0, 940) and set(np.diff(offsets)) == {26, 27}  # 940 / 36 = 26.1
+    assert even_offsets(60, 60, 3).tolist() == [0, 0, 0]
 
 
 def test_cut_windows_by_hand():

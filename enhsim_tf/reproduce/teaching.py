@@ -37,6 +37,13 @@ _ROOT = Path(__file__).parents[2]
 _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 
 
+class Arrays(dict):
+    """Arrays by name, of which Jupyter shows the shapes instead of the contents."""
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name}: {np.shape(values)} {np.asarray(values).dtype}" for name, values in self.items())
+
+
 class _Lookup(Stages):
     """Stages that are looked for and never done."""
 
@@ -86,14 +93,14 @@ def prepare(experiment: Experiment) -> list[str]:
     return missing
 
 
-def show(experiment: Experiment, name: str) -> dict[str, np.ndarray]:
+def show(experiment: Experiment, name: str) -> Arrays:
     """Shows a figure (one of `settings.FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
     arrays, chosen = FIGURE_DATA[name](experiment), experiment.settings
     caption = f"seed {chosen.seed} · {chosen.budget} budget · python -m enhsim_tf.reproduce --only {name.split('_')[0]}"
     with tempfile.TemporaryDirectory() as folder:
         (path,) = figures.save(name, arrays, folder, caption, chosen.budget == "smoke", saved_as=("png",))
         _show_picture(path.read_bytes(), figures.FIGURES[name].alt)
-    return arrays
+    return Arrays(arrays)
 
 
 @contextlib.contextmanager
