@@ -3,11 +3,13 @@
 It knows windows and nothing of noise or of where windows come from.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import keras
 import numpy as np
 import tensorflow as tf
+
+from enhsim_tf.fused_adam import fused_adam
 
 
 def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> keras.Sequential:
@@ -82,7 +84,7 @@ def fit_windows(
     Returns:
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
     """
-    model.compile(keras.optimizers.Adam(learning_rate), loss="mean_squared_error", jit_compile=jit_compile)
+    model.compile(fused_adam(learning_rate), loss="mean_squared_error", jit_compile=jit_compile)
     order = tf.data.Dataset.from_tensor_slices((inputs, targets)).shuffle(len(inputs), seed=seed)
     held_out = None if validation is None else tf.data.Dataset.from_tensor_slices(validation).batch(256)
     history = model.fit(
@@ -96,6 +98,16 @@ def fit_windows(
     return {key: np.array(values) for key, values in history.history.items()}
 
 
-def enhance(model: Callable, coarse: np.ndarray, batch_size: int = 256) -> np.ndarray:
+def enhance(model: keras.Model, coarse: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
     """Maps coarse windows to enhanced ones (step 5), float32 of shape `(windows, samples)`."""
-    return model.predict(np.asarray(coarse, np.float32), batch_size=batch_size, verbose=0)
+    return predict_windows(model, np.asarray(coarse, np.float32), batch_size)
+
+
+def predict_windows(model: keras.Model, inputs: np.ndarray, batch_size: int) -> np.ndarray:
+    """What `model.predict` gives, without its data pipeline: the batches are slices, written to where they belong."""
+    if len(inputs) <= batch_size:
+        return np.asarray(model.predict_on_batch(inputs)) if len(inputs) else np.empty((0, *model.output_shape[1:]), np.float32)
+    outputs = np.empty((len(inputs), *model.output_shape[1:]), np.float32)
+    for first in range(0, len(inputs), batch_size):
+        outputs[first : first + batch_size] = model.predict_on_batch(inputs[first : first + batch_size])
+    return outputs
