@@ -61,7 +61,7 @@ def fit_windows(
     validation: tuple[np.ndarray, np.ndarray] | None = None,
     callbacks: Sequence[keras.callbacks.Callback] = (),
     verbose: int | str = "auto",
-    jit_compile: bool = True,
+    jit_compile: bool = False,
 ) -> dict[str, np.ndarray]:
     """Fits a model from windows to windows by mean squared error and Adam.
 
@@ -78,8 +78,8 @@ def fit_windows(
         validation: Held-out `(inputs, targets)`, or None.
         callbacks: Keras callbacks.
         verbose: Keras' progress bar: 0 none, 1 a bar.
-        jit_compile: Whether XLA compiles the step. It fuses Adam's passes over memory, which pays for wide layers; small
-            models train sooner without the seconds of compilation.
+        jit_compile: Whether XLA compiles the step. With the fused Adam there is little left for it to fuse, and it costs
+            seconds of compilation.
 
     Returns:
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
