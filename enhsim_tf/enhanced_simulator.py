@@ -7,7 +7,7 @@ import dataclasses
 import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,12 @@ from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, paired_windows, units_of
+from enhsim_tf.store import write_windows
 from enhsim_tf.telemetry import Telemetry, check_values, cut_windows, random_offsets
 
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
+_CHUNK = 4_096  # windows generated at a time
 _START_RANGE = 1_000_000  # samples; windows begin at a random one of these, so at every phase of the waves
 
 
@@ -135,7 +137,9 @@ class EnhancedSimulator:
     def enhance(self, coarse: np.ndarray) -> np.ndarray:
         """Enhanced, still clean windows (step 5) from coarse ones, float32 of the same shape `(windows, samples)`."""
         enhanced = enhancer_room.enhance(self.enhancer, (coarse - self.offset) / self.scale)
-        return enhanced * np.float32(self.scale) + np.float32(self.offset)
+        enhanced *= np.float32(self.scale)
+        enhanced += np.float32(self.offset)
+        return enhanced
 
     def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Generates realistic telemetry windows: enhanced signal plus generated noise ("Combined").
@@ -148,7 +152,25 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
-        return self.enhance(self.generate_coarse(num_windows, scenario, seed)) + self.noise.generate(num_windows, _noise_seed(seed))
+        windows, filled = np.empty((num_windows, self.window), np.float32), 0
+        for chunk in self.generate_chunks(num_windows, scenario, seed):
+            windows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+        return windows
+
+    def generate_chunks(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> Iterator[np.ndarray]:
+        """Yields the windows of `generate` in turn, some thousand at a time: any number of them in the same memory."""
+        rng, noise_rng = np.random.default_rng(seed), _noise_rng(seed)
+        begins = rng.integers(0, _START_RANGE, num_windows)
+        for first in range(0, num_windows, _CHUNK):
+            times = self.interval_s * (begins[first : first + _CHUNK, None] + np.arange(self.window))
+            windows = self.enhance(self.coarse.simulate(times, scenario, rng))
+            windows += self.noise.generate(len(windows), noise_rng)
+            yield windows
+
+    def generate_to_parquet(self, path: str | os.PathLike, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> None:
+        """Writes the windows of `generate` to a Parquet file as they are made; the memory needed does not grow with their number."""
+        write_windows(path, self.generate_chunks(num_windows, scenario, seed), self.window)
 
     def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
         """Generates one continuous series of any length, without seams.
@@ -176,7 +198,7 @@ class EnhancedSimulator:
         coarse = self.coarse.simulate(start_s + self.interval_s * np.arange(length)[None], scenario, rng)[0]
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
-        noise = self.noise.generate(num_windows, _noise_seed(seed))
+        noise = self.noise.generate(num_windows, _noise_rng(seed))
 
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # fade^2 of two windows half a window apart adds up to 1
         signal, power, total = np.zeros(length), np.zeros(length), np.zeros(length)
@@ -238,6 +260,6 @@ class EnhancedSimulator:
             raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None
 
 
-def _noise_seed(seed: int) -> int:
-    """A seed for the noise whose draws have nothing to do with those of the coarse windows from `seed` itself."""
-    return int(np.random.SeedSequence([seed, 1]).generate_state(1)[0])
+def _noise_rng(seed: int) -> np.random.Generator:
+    """Draws for the noise that have nothing to do with those for the coarse windows, which `seed` itself makes."""
+    return np.random.default_rng([seed, 1])

@@ -3,11 +3,13 @@
 It knows windows and nothing of noise or of where windows come from.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import keras
 import numpy as np
 import tensorflow as tf
+
+from enhsim_tf.fused_adam import fused_adam
 
 
 def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> keras.Sequential:
@@ -59,7 +61,7 @@ def fit_windows(
     validation: tuple[np.ndarray, np.ndarray] | None = None,
     callbacks: Sequence[keras.callbacks.Callback] = (),
     verbose: int | str = "auto",
-    jit_compile: bool = True,
+    jit_compile: bool = False,
 ) -> dict[str, np.ndarray]:
     """Fits a model from windows to windows by mean squared error and Adam.
 
@@ -76,13 +78,13 @@ def fit_windows(
         validation: Held-out `(inputs, targets)`, or None.
         callbacks: Keras callbacks.
         verbose: Keras' progress bar: 0 none, 1 a bar.
-        jit_compile: Whether XLA compiles the step. It fuses Adam's passes over memory, which pays for wide layers; small
-            models train sooner without the seconds of compilation.
+        jit_compile: Whether XLA compiles the step. With the fused Adam there is little left for it to fuse, and it costs
+            seconds of compilation.
 
     Returns:
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
     """
-    model.compile(keras.optimizers.Adam(learning_rate), loss="mean_squared_error", jit_compile=jit_compile)
+    model.compile(fused_adam(learning_rate), loss="mean_squared_error", jit_compile=jit_compile)
     order = tf.data.Dataset.from_tensor_slices((inputs, targets)).shuffle(len(inputs), seed=seed)
     held_out = None if validation is None else tf.data.Dataset.from_tensor_slices(validation).batch(256)
     history = model.fit(
@@ -96,6 +98,16 @@ def fit_windows(
     return {key: np.array(values) for key, values in history.history.items()}
 
 
-def enhance(model: Callable, coarse: np.ndarray, batch_size: int = 256) -> np.ndarray:
+def enhance(model: keras.Model, coarse: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
     """Maps coarse windows to enhanced ones (step 5), float32 of shape `(windows, samples)`."""
-    return model.predict(np.asarray(coarse, np.float32), batch_size=batch_size, verbose=0)
+    return predict_windows(model, np.asarray(coarse, np.float32), batch_size)
+
+
+def predict_windows(model: keras.Model, inputs: np.ndarray, batch_size: int) -> np.ndarray:
+    """What `model.predict` gives, without its data pipeline: the batches are slices, written to where they belong."""
+    if len(inputs) <= batch_size:
+        return np.asarray(model.predict_on_batch(inputs)) if len(inputs) else np.empty((0, *model.output_shape[1:]), np.float32)
+    outputs = np.empty((len(inputs), *model.output_shape[1:]), np.float32)
+    for first in range(0, len(inputs), batch_size):
+        outputs[first : first + batch_size] = model.predict_on_batch(inputs[first : first + batch_size])
+    return outputs

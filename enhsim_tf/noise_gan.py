@@ -11,6 +11,8 @@ import numpy as np
 import tensorflow as tf
 
 from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
+from enhsim_tf.enhancer import predict_windows
+from enhsim_tf.fused_adam import fused_adam
 
 REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
 
@@ -117,8 +119,8 @@ class NoiseGAN:
         self.batch_size, self.latent_span, self.scale = batch_size, latent_span, scale
         self.mixed_batch, self.generated_in_training_mode = mixed_batch, generated_in_training_mode
         self.loss = keras.losses.BinaryCrossentropy()
-        self.discriminator_optimizer = keras.optimizers.Adam(learning_rate)
-        self.generator_optimizer = keras.optimizers.Adam(learning_rate)
+        self.discriminator_optimizer = fused_adam(learning_rate)
+        self.generator_optimizer = fused_adam(learning_rate)
         self.discriminator_optimizer.build(self.discriminator.trainable_variables)
         self.generator_optimizer.build(self.generator.trainable_variables)
         self.seeds = keras.random.SeedGenerator(seed)
@@ -226,17 +228,17 @@ class NoiseGAN:
             record[f"loss_{kind}"] = float(self.loss(self._tags(tag), judged))
         return record
 
-    def generate(self, num_windows: int, seed: int, batch_size: int = 1_024) -> np.ndarray:
+    def generate(self, num_windows: int, seed: int | np.random.Generator, batch_size: int = 1_024) -> np.ndarray:
         """Generates noise (step 9), float32 of shape `(num_windows, samples)`; the same seed gives the same.
 
         Args:
             num_windows: Number of windows.
-            seed: Seed of the latent vectors.
+            seed: Seed of the latent vectors, or a generator that draws them and goes on from where it stands.
             batch_size: Windows a call of the network.
         """
         latent = np.random.default_rng(seed).standard_normal((num_windows, self.generator.input_shape[1]), np.float32)
-        noise = self.generator.predict(self.latent_span * latent, batch_size=batch_size, verbose=0)
-        return noise[:, :, 0] * np.float32(self.scale)
+        noise = predict_windows(self.generator, self.latent_span * latent, batch_size)[:, :, 0]
+        return noise * np.float32(self.scale)
 
     def get_config(self) -> dict:
         """The settings that `generate` needs, as plain JSON types."""

@@ -6,13 +6,14 @@ unit and name as they are and interprets none of them.
 
 import os
 import urllib.parse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import make_folder, replace_folder
+from enhsim_tf.files import make_folder, replace_file, replace_folder
 from enhsim_tf.telemetry import Telemetry
 
 _DAY_NS = 86_400 * 10**9
@@ -29,6 +30,29 @@ class TelemetryStore(Protocol):
 
     def names(self) -> list[str]:
         """The names of the series kept here, sorted."""
+
+
+def write_windows(path: str | os.PathLike, chunks: Iterable[np.ndarray], window: int) -> None:
+    """Writes windows to one Parquet file as they come: column `window`, lists of `window` float32 numbers.
+
+    The file appears when it is complete. Read it with any tool: `np.stack(pandas.read_parquet(path)["window"])`.
+
+    Args:
+        path: The file.
+        chunks: Windows, float32 arrays of shape `(windows, window)`; each becomes a row group.
+        window: Samples of a window.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    schema = pa.schema([("window", pa.list_(pa.float32(), window))])
+    # the bytes of equal significance side by side: signs and exponents compress, the mantissas' noise does not
+    options = {"compression": "zstd", "use_dictionary": False, "column_encoding": "BYTE_STREAM_SPLIT", "write_statistics": False}
+    make_folder(Path(path).parent)
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
+        for chunk in chunks:
+            values = pa.FixedSizeListArray.from_arrays(pa.array(np.ravel(chunk)), window)
+            writer.write_table(pa.table([values], schema), row_group_size=max(1, len(chunk)))
 
 
 class ParquetStore:

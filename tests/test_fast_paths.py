@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import keras
 import numpy as np
 import pytest
@@ -5,6 +8,8 @@ import tensorflow as tf
 
 from enhsim_tf import convolution_maximum as room
 from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
+from enhsim_tf.enhancer import enhance, fit_windows
+from enhsim_tf.fused_adam import fused_adam
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 
 WINDOW, FILTERS, WIDTH, STRIDE = 63, 14, 20, 4  # the last sample lies under no filter
@@ -154,3 +159,122 @@ def test_other_layers_are_left_to_keras(layers):
     assert num_layers_computed(model.layers) == 0
     assert num_layers_computed(small_discriminator().layers) == 2
     assert num_layers_computed(small_discriminator(dropout=0.3).layers) == 3
+
+
+def enhancer_and_windows():
+    from enhsim_tf.enhancer import build_enhancer
+
+    windows = np.random.default_rng(0).normal(size=(80, 24)).astype(np.float32)
+    return build_enhancer(24, 40), windows[:, ::-1].copy(), windows
+
+
+def test_enhancer_trains_as_under_keras_adam():
+    ours, source, target = enhancer_and_windows()
+    history = fit_windows(ours, source, target, epochs=5, batch_size=20, seed=3, verbose=0)  # 20 steps
+    plain, _, _ = enhancer_and_windows()
+    plain.compile(keras.optimizers.Adam(0.001), loss="mean_squared_error")
+    order = tf.data.Dataset.from_tensor_slices((source, target)).shuffle(80, seed=3).batch(20)
+    expected = plain.fit(order, epochs=5, verbose=0, shuffle=False).history
+    np.testing.assert_allclose(history["loss"], expected["loss"], rtol=2e-6)
+    for weight, of_plain in zip(ours.weights, plain.weights, strict=True):
+        np.testing.assert_allclose(weight.numpy(), of_plain.numpy(), atol=2e-6)
+
+
+def test_fused_adam_moves_the_weights_as_adam_does():
+    start, rng = np.linspace(-1, 1, 50).astype(np.float32), np.random.default_rng(1)
+    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(np.float32)  # from far below epsilon upwards
+    moved = []
+    for optimizer in (fused_adam(0.01), keras.optimizers.Adam(0.01)):
+        weight = keras.Variable(start)
+        optimizer.build([weight])
+        for gradient in gradients:
+            optimizer.apply([tf.constant(gradient)], [weight])
+        moved.append(weight.numpy() - start)
+    np.testing.assert_allclose(moved[0], moved[1], rtol=1e-4, atol=2e-6)
+    assert np.abs(moved[0]).max() > 0.1
+
+
+def small_simulator():
+    from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+
+    enhancer, _, _ = enhancer_and_windows()
+    waves = SquareWaveSimulator([SquareWave(period_s=10.0, low=-0.5, high=0.5)])
+    return EnhancedSimulator(waves, enhancer, NoiseGAN(build_generator(24, 4, 8), build_discriminator(24, 5, 4, 2)), offset=1.0, scale=2.0)
+
+
+@pytest.mark.parametrize("mode", [None, "friction", "dropout"])
+def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
+    from enhsim_tf import Degraded, enhanced_simulator
+
+    simulator, scenario = small_simulator(), mode and Degraded(mode)
+    whole = simulator.generate(23, scenario, seed=5)
+    monkeypatch.setattr(enhanced_simulator, "_CHUNK", 4)
+    np.testing.assert_allclose(simulator.generate(23, scenario, seed=5), whole, atol=1e-6)
+    coarse = simulator.generate_coarse(23, scenario, seed=5)
+    np.testing.assert_allclose(whole, simulator.enhance(coarse) + simulator.noise.generate(23, 5), atol=1e-6)
+    assert np.abs(whole - simulator.generate(23, scenario, seed=6)).max() > 0.01
+
+
+def test_windows_do_not_depend_on_the_batch_size():
+    simulator, coarse = small_simulator(), small_simulator().generate_coarse(23)
+    expected = simulator.enhancer.predict(coarse, verbose=0)
+    for batch_size in (1, 5, 23, 1_000):
+        np.testing.assert_allclose(enhance(simulator.enhancer, coarse, batch_size), expected, atol=1e-6)
+        np.testing.assert_allclose(simulator.noise.generate(23, 1, batch_size), simulator.noise.generate(23, 1), atol=1e-6)
+    assert enhance(simulator.enhancer, coarse[:0]).shape == (0, 24)
+
+
+def test_parquet_holds_the_generated_windows(tmp_path, monkeypatch):
+    import pandas as pd
+    import pyarrow.parquet as pq
+
+    from enhsim_tf import enhanced_simulator
+
+    monkeypatch.setattr(enhanced_simulator, "_CHUNK", 10)
+    simulator, path = small_simulator(), tmp_path / "new" / "windows.parquet"
+    simulator.generate_to_parquet(path, 23, seed=5)
+    np.testing.assert_array_equal(np.stack(pd.read_parquet(path)["window"]), simulator.generate(23, seed=5))
+    about = pq.ParquetFile(path)
+    assert about.metadata.num_row_groups == 3 and about.metadata.row_group(0).column(0).compression == "ZSTD"
+    assert str(about.schema_arrow.field("window").type) == "fixed_size_list<element: float>[24]"
+    assert [file.name for file in path.parent.iterdir()] == ["windows.parquet"]
+
+
+def test_a_failed_generation_leaves_the_old_file(tmp_path):
+    from enhsim_tf.store import write_windows
+
+    def broken():
+        yield np.zeros((2, 3), np.float32)
+        raise RuntimeError("stopped")
+
+    path = tmp_path / "windows.parquet"
+    path.write_bytes(b"old")
+    with pytest.raises(RuntimeError, match="stopped"):
+        write_windows(path, broken(), 3)
+    assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_models_are_the_papers_layers_and_load_without_this_package(tmp_path):
+    simulator = small_simulator()
+    ours, source, target = simulator.enhancer, *enhancer_and_windows()[1:]
+    fit_windows(ours, source, target, epochs=1, batch_size=20, seed=0, verbose=0)
+    simulator.noise.fit(np.zeros((30, 24), np.float32), num_iterations=1, verbose=False)
+    simulator.save(tmp_path / "saved")
+    layers = {
+        "enhancer": ["Dense"] * 4,
+        "generator": ["Dense", "BatchNormalization", "Dense", "Reshape"],
+        "discriminator": ["Conv1D", "GlobalMaxPooling1D", "Dense", "Dense"],
+    }
+    program = (
+        "import sys, keras\n"
+        "for name in ('enhancer', 'generator', 'discriminator'):\n"
+        "    model = keras.saving.load_model(f'{sys.argv[1]}/{name}.keras', safe_mode=True)\n"
+        "    print(name, *[type(layer).__name__ for layer in model.layers])\n"
+        "assert 'enhsim_tf' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program, tmp_path / "saved"], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [" ".join([name, *kinds]) for name, kinds in layers.items()]
+    lines = []
+    simulator.noise.discriminator.summary(print_fn=lines.append)
+    assert "Conv1D" in "".join(lines) and "GlobalMaxPooling1D" in "".join(lines)

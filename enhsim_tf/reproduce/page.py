@@ -133,10 +133,13 @@ def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]]) -> Pi
 
 
 def _spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The ranges over further seeds, where they belong to this budget and seed."""
+    """The ranges over further seeds; those of another budget or of an older run say nothing of this one."""
     path = folder / "spread.json"
     spread = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-    return spread if spread and spread["budget"] == found["budget"] and found["seed"] in spread["seeds"] else None
+    if spread is None or spread["budget"] != found["budget"] or found["seed"] not in spread["seeds"]:
+        return None
+    first = found["claims"][0]
+    return spread if short(first["value"]) in map(short, spread["claims"][first["id"]]["values"]) else None
 
 
 def _tally(words: Sequence[str], order: Mapping[str, str]) -> dict[str, int]:

@@ -1,0 +1,87 @@
+"""`python -m benchmarks`: measures, prints the table, writes `benchmarks/results.json` and draws two figures from it."""
+
+import argparse
+import json
+import os
+import platform
+import sys
+import time
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+ROWS = ("enhancer", "gan", "generation", "loading", "starting", "growth")
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command's options."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
+    parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
+    parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results.json", help="the results (default: %(default)s)")
+    parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder of the figures (default: %(default)s)")
+    options = parser.parse_args(arguments)
+    if options.quick and options.out == parser.get_default("out"):
+        parser.error("--quick needs another --out: results.json holds measurements")
+    return options
+
+
+def machine() -> dict:
+    """What the measurements were made on."""
+    versions = {}
+    for name in ("tensorflow", "keras", "tf_keras", "torch", "numpy", "pyarrow"):
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = None
+    return {
+        "processor": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        **versions,
+    }
+
+
+def line_of(row: dict) -> str:
+    """A row of the table."""
+    if "skipped" in row:
+        return f"{row['work']:50} {row['comparison']:24} skipped: {row['skipped']}"
+    if "growth" in row:
+        ends = [", ".join(f"{key} {value:.4g}" for key, value in each.items() if not isinstance(value, dict)) for each in row["growth"]]
+        return "\n    ".join([row["work"], *ends])
+    ours, unit, ratio = row["ours"], row["unit"], row["ratio"]
+    bar = f"<= {row['bar']:.2f}" if row.get("bar") else f"< {row['bar_s']} s" if "bar_s" in row else ""
+    words = {True: "reached", False: "NOT REACHED", None: ""}[row["reached"]]
+    measured = f"{ours['median']:8.3g} {unit:2}  {ratio['median']:5.2f} ({ratio['low']:.2f} to {ratio['high']:.2f})"
+    return f"{row['work']:50} {row['comparison']:24} {measured:32} {bar:8} {words}"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command."""
+    options = parse(arguments)
+    from benchmarks import rows as room
+    from benchmarks.figures import draw
+    from enhsim_tf.files import write_json
+
+    budget, began = room.QUICK if options.quick else room.Budget(), time.time()
+    kept = json.loads(options.out.read_text())["rows"] if options.only and options.out.exists() else []
+    found = []
+    for name in ROWS:
+        if options.only and name not in options.only:
+            found += [row for row in kept if row.get("of") == name]
+            continue
+        for row in room.ROWS[name](budget):
+            found.append({"of": name, **row})
+            print(line_of(row), flush=True)
+    for row in room.reproduction(found):
+        found.append({"of": "reproduction", **row})
+        print(line_of(row), flush=True)
+    made = {"quick": options.quick, "minutes": round((time.time() - began) / 60, 1), "machine": machine(), "rows": found}
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    write_json(options.out, made)
+    for file in [options.out, *draw(made, options.figures)]:
+        print(file)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""Plain Keras 3, as its guides teach it: `fit` and `predict` with numpy arrays, and one `tf.function` step for the GAN."""
+
+from collections.abc import Callable
+
+import keras
+import numpy as np
+import tensorflow as tf
+from keras import layers
+
+from benchmarks.ours import example_windows
+
+Work = tuple[Callable[[], object], int]
+
+
+def enhancer(window: int, hidden_units: int) -> keras.Model:
+    """The paper's enhancer."""
+    widths = (window, hidden_units, hidden_units)
+    hidden = [layers.Dense(width, activation="relu", kernel_initializer="he_uniform") for width in widths]
+    return keras.Sequential([keras.Input((window,)), *hidden, layers.Dense(window, kernel_initializer="he_uniform")])
+
+
+def networks(window: int, filters: int, dropout: float) -> tuple[keras.Model, keras.Model]:
+    """The paper's generator and discriminator."""
+    generator = keras.Sequential(
+        [
+            keras.Input((16,)),
+            layers.Dense(64, activation="relu", kernel_initializer="he_uniform"),
+            layers.BatchNormalization(),
+            layers.Dense(window, activation="tanh", kernel_initializer="he_uniform"),
+            layers.Reshape((window, 1)),
+        ]
+    )
+    drop = (lambda: [layers.Dropout(dropout)]) if dropout else list
+    discriminator = keras.Sequential(
+        [
+            keras.Input((window, 1)),
+            layers.Conv1D(filters, 20, strides=4, activation="relu", kernel_initializer="he_uniform"),
+            *drop(),
+            layers.GlobalMaxPooling1D(),
+            layers.Dense(25, activation="relu", kernel_initializer="he_uniform"),
+            *drop(),
+            layers.Dense(1, activation="sigmoid", kernel_initializer="he_uniform"),
+        ]
+    )
+    return generator, discriminator
+
+
+def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+    """`compile("adam", "mse")` and `fit`."""
+    source, target = example_windows(15 * num_steps, window)
+    model = enhancer(window, hidden_units)
+    model.compile("adam", "mse")
+    return lambda: model.fit(source, target, batch_size=15, epochs=1, verbose=0), num_steps
+
+
+def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
+    """One straightforward `tf.function` step: three tapes, Conv1D as it is."""
+    generator, discriminator = networks(window, filters, dropout)
+    loss = keras.losses.BinaryCrossentropy()
+    of_discriminator, of_generator = keras.optimizers.Adam(), keras.optimizers.Adam()
+    of_discriminator.build(discriminator.trainable_variables)
+    of_generator.build(generator.trainable_variables)
+
+    @tf.function
+    def step(real: tf.Tensor) -> None:
+        fake = generator(tf.random.normal((200, 16)), training=False)
+        for rows, tag in ((real, tf.ones((200, 1))), (fake, tf.zeros((200, 1)))):
+            with tf.GradientTape() as tape:
+                value = loss(tag, discriminator(rows, training=True))
+            gradients = tape.gradient(value, discriminator.trainable_variables)
+            of_discriminator.apply(gradients, discriminator.trainable_variables)
+        with tf.GradientTape() as tape:
+            value = loss(tf.ones((200, 1)), discriminator(generator(tf.random.normal((200, 16)), training=True), training=True))
+        of_generator.apply(tape.gradient(value, generator.trainable_variables), generator.trainable_variables)
+
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
+
+    def run() -> None:
+        for _ in range(num_iterations):
+            step(noise[rng.integers(0, len(noise), 200)])
+
+    return run, num_iterations
+
+
+def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+    """`predict` of both networks, as it comes."""
+    enhancing, (generator, _) = enhancer(window, hidden_units), networks(window, 500, 0.0)
+    coarse, _ = example_windows(num_windows, window)
+    latent = np.random.default_rng(0).normal(size=(num_windows, 16)).astype(np.float32)
+    return lambda: enhancing.predict(coarse, verbose=0) + generator.predict(latent, verbose=0)[:, :, 0], num_windows

@@ -1,0 +1,213 @@
+"""The rows of the table: what is compared with what, how often, and the bar it has to reach.
+
+Ways that are compared take turns, repetition by repetition, so that a machine that slows down slows all of them. A ratio
+is that of two neighbours in time; the median and the range of those ratios are reported.
+"""
+
+import dataclasses
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from benchmarks.worker import Worker
+
+PARAMETERS = 13_697_400
+TRAFFIC = 10 * 4 * PARAMETERS  # bytes a step: weights read twice, gradients written, Adam reads four arrays and writes three
+WINDOW_FLOP = 2 * (500 * 500 + 500 * 3_200 + 3_200 * 3_200 + 3_200 * 500)  # of a window through the enhancer
+
+
+@dataclasses.dataclass(frozen=True)
+class Budget:
+    """How much is done: the full budget, or a quick one that only shows that everything runs."""
+
+    repetitions: int = 9
+    steps: int = 40
+    iterations: int = 5
+    textbook_iterations: int = 3
+    windows: int = 4_096
+    sizes: tuple[int, ...] = (100, 1_000, 10_000, 100_000, 1_000_000)
+    lengths: tuple[int, ...] = (125, 250, 500, 1_000, 2_000)
+    size: dict = dataclasses.field(default_factory=dict)  # of the networks, where it is not the paper's
+    gan_size: dict = dataclasses.field(default_factory=dict)
+
+
+QUICK = Budget(2, 2, 1, 1, 64, (10, 40), (125, 250), {"window": 125, "hidden_units": 32}, {"window": 125, "filters": 8})
+
+
+def spread(values: list[float]) -> dict[str, float]:
+    """Median and range."""
+    return {"median": float(np.median(values)), "low": float(min(values)), "high": float(max(values))}
+
+
+def in_turns(ways: dict[str, Callable[[], float]], repetitions: int) -> dict[str, list[float]]:
+    """Calls the ways one after another, again and again; what each returned."""
+    found = {name: [] for name in ways}
+    for repetition in range(repetitions):
+        for name in list(ways)[:: 1 if repetition % 2 else -1]:  # no way always follows the same other
+            found[name].append(ways[name]())
+    return found
+
+
+def workers_in_turns(workers: dict[str, Worker], repetitions: int) -> tuple[dict[str, list[float]], dict[str, float], dict[str, str]]:
+    """Seconds a unit, peaks of memory in MB, and why a way was skipped."""
+    skipped = {name: worker.skipped for name, worker in workers.items() if worker.skipped}
+    found = in_turns({name: worker.repeat for name, worker in workers.items() if name not in skipped}, repetitions)
+    return found, {name: worker.close() for name, worker in workers.items() if name not in skipped}, skipped
+
+
+def compared(work: str, ours: list[float], comparison: str, theirs: list[float] | None, unit: str, bar: float | None, **more) -> dict:
+    """A row: times in the unit (ms or s), the ratio ours / theirs, and whether it is at most the bar."""
+    factor = {"ms": 1e3, "s": 1.0}[unit]
+    row = {"work": work, "unit": unit, "ours": spread([factor * each for each in ours]), "comparison": comparison}
+    if theirs is not None:
+        ratio = spread([mine / other for mine, other in zip(ours, theirs, strict=True)])
+        row |= {"theirs": spread([factor * each for each in theirs]), "ratio": ratio, "bar": bar}
+        row["reached"] = None if bar is None else ratio["median"] <= bar
+    return row | more
+
+
+def enhancer(budget: Budget) -> Iterator[dict]:
+    """One training step of the enhancer."""
+    given = {"num_steps": budget.steps, **budget.size}
+    workers = {
+        "ours": Worker("ours", "enhancer_step", **given),
+        "plain fit": Worker("keras_plain", "enhancer_step", **given),
+        "PyTorch, fused Adam": Worker("torch_enhancer", "enhancer_step", **given),
+        "floor": Worker("ours", "copy", num_bytes=TRAFFIC if not budget.size else 10_000),
+    }
+    found, peaks, skipped = workers_in_turns(workers, budget.repetitions)
+    floor = [TRAFFIC * each for each in found["floor"]]
+    rate = spread([1e-9 / each for each in found["floor"]])
+    for name, bar in (("plain fit", 0.7), ("PyTorch, fused Adam", 0.7)):
+        if name in skipped:
+            yield {"work": "enhancer step", "comparison": name, "skipped": skipped[name], "unit": "ms", "bar": bar}
+        else:
+            yield compared("enhancer step", found["ours"], name, found[name], "ms", bar, peak_mb=peaks["ours"], their_peak_mb=peaks[name])
+    limit = {"copy_gb_s": rate, "bytes": TRAFFIC}
+    yield compared("enhancer step", found["ours"], "memory-traffic floor", floor, "ms", 1.3, limit=limit, peak_mb=peaks["ours"])
+
+
+def gan(budget: Budget) -> Iterator[dict]:
+    """One adversarial iteration, without and with the dropout variants."""
+    for dropout, bars in ((0.0, (0.3, 0.65)), (0.3, (0.5, None))):
+        given = {"num_iterations": budget.iterations, "dropout": dropout, **budget.gan_size}
+        workers = {
+            "ours": Worker("ours", "gan_iteration", **given),
+            "textbook loop": Worker("textbook_gan", "gan_iteration", **(given | {"num_iterations": budget.textbook_iterations})),
+            "one tf.function": Worker("keras_plain", "gan_iteration", **given),
+        }
+        found, peaks, skipped = workers_in_turns(workers, budget.repetitions)
+        work = "GAN iteration" + (", dropout 0.3" if dropout else "")
+        for name, bar in zip(("textbook loop", "one tf.function"), bars, strict=True):
+            if name in skipped:
+                yield {"work": work, "comparison": name, "skipped": skipped[name], "unit": "ms", "bar": bar}
+            else:
+                yield compared(work, found["ours"], name, found[name], "ms", bar, peak_mb=peaks["ours"], their_peak_mb=peaks[name])
+
+
+def generation(budget: Budget) -> Iterator[dict]:
+    """Windows made, in memory and to Parquet; milliseconds a window."""
+    given = {"num_windows": budget.windows, **budget.size}
+    workers = {name: Worker("ours", name, **given) for name in ("enhance_and_noise", "generate", "generate_to_parquet")}
+    workers |= {"predict": Worker("keras_plain", "enhance_and_noise", **given), "product": Worker("ours", "matrix_product")}
+    found, peaks, _ = workers_in_turns(workers, budget.repetitions)
+    floor = [WINDOW_FLOP * each for each in found["product"]]
+    limit = {"gflop_s": spread([1e-9 / each for each in found["product"]]), "flop": WINDOW_FLOP}
+    both, whole = found["enhance_and_noise"], found["generate"]
+    name = "generation of a window, enhancer + noise"
+    yield compared(name, both, "matrix-product rate", floor, "ms", 1 / 0.8, limit=limit, peak_mb=peaks["enhance_and_noise"])
+    yield compared(name, both, "Keras' predict", found["predict"], "ms", None, their_peak_mb=peaks["predict"])
+    name = "generation of a window, coarse simulator included"
+    yield compared(name, whole, "matrix-product rate", floor, "ms", None, limit=limit, peak_mb=peaks["generate"])
+    parquet = found["generate_to_parquet"]
+    peak = {"peak_mb": peaks["generate_to_parquet"], "their_peak_mb": peaks["generate"]}
+    yield compared("generation of a window to Parquet", parquet, "generation in memory", whole, "ms", 1 / 0.6, **peak)
+
+
+def loading(budget: Budget) -> Iterator[dict]:
+    """Loading a saved simulator."""
+    workers = {name: Worker("ours", name, **budget.size) for name in ("load_simulator", "load_networks")}
+    found, peaks, _ = workers_in_turns(workers, budget.repetitions)
+    theirs = found["load_networks"]
+    yield compared(
+        "loading a simulator", found["load_simulator"], "load_model, three files", theirs, "s", None, peak_mb=peaks["load_simulator"]
+    )
+
+
+def starting(budget: Budget) -> Iterator[dict]:
+    """Commands that need no network."""
+
+    def timed(*arguments: str) -> Callable[[], float]:
+        def run() -> float:
+            began = time.perf_counter()
+            subprocess.run([sys.executable, *arguments], capture_output=True, check=False)
+            return time.perf_counter() - began
+
+        return run
+
+    command = ("-m", "enhsim_tf.reproduce")
+    ways = {
+        "--help": timed(*command, "--help"),
+        "an argument error": timed(*command, "--only", "fig99"),
+        "import enhsim_tf": timed("-c", "import enhsim_tf"),
+        "nothing": timed("-c", "pass"),
+        "import tensorflow": timed("-c", "import tensorflow"),
+    }
+    found = in_turns(ways, budget.repetitions)
+    for name in ("--help", "an argument error", "import enhsim_tf"):
+        row = compared(name, found[name], "import tensorflow", found["import tensorflow"], "s", None)
+        yield row | {"bar_s": 0.5, "reached": row["ours"]["median"] < 0.5, "python_s": spread(found["nothing"])}
+
+
+def growth(budget: Budget) -> Iterator[dict]:
+    """Time of generation against the number of windows, and of training against the window's length; memory of each."""
+    windows = []
+    for number in budget.sizes:
+        worker = Worker("ours", "generate_any", **budget.size)
+        seconds = worker.repeat(number)
+        windows.append({"num_windows": number, "seconds": seconds, "peak_mb": worker.close()})
+    yield {"work": "generation to Parquet against the number of windows", "growth": windows, "x": "num_windows"}
+    lengths = []
+    for length in budget.lengths:
+        hidden = budget.size.get("hidden_units", 3_200)
+        filters = budget.gan_size.get("filters", 500)
+        workers = {
+            "enhancer": Worker("ours", "enhancer_step", num_steps=max(2, budget.steps // 4), window=length, hidden_units=hidden),
+            "GAN": Worker("ours", "gan_iteration", num_iterations=budget.iterations, window=length, filters=filters),
+        }
+        found, peaks, _ = workers_in_turns(workers, min(3, budget.repetitions))
+        times = {name: 1e3 * float(np.median(each)) for name, each in found.items()}
+        lengths.append({"window": length, "enhancer_ms": times["enhancer"], "gan_ms": times["GAN"], "peak_mb": peaks})
+    yield {"work": "training against the length of a window", "growth": lengths, "x": "window"}
+
+
+def reproduction(rows: list[dict]) -> Iterator[dict]:
+    """The training of one full reproduction, put together from the steps measured above: a whole textbook run takes too long."""
+    found = {(row["work"], row.get("comparison")): row for row in rows}
+    enhancing, judging = found.get(("enhancer step", "plain fit"), {}), found.get(("GAN iteration", "textbook loop"), {})
+    if "ratio" in enhancing and "ratio" in judging:
+        seconds = {
+            side: {key: 4.0 * enhancing[side][key] + 1.0 * judging[side][key] for key in ("median", "low", "high")}
+            for side in ("ours", "theirs")
+        }
+        ratio = {"median": seconds["ours"]["median"] / seconds["theirs"]["median"]}
+        # the extremes of the two ratios, weighed by the comparison's share of time
+        weight = 4.0 * enhancing["theirs"]["median"] / seconds["theirs"]["median"]
+        for key in ("low", "high"):
+            ratio[key] = weight * enhancing["ratio"][key] + (1 - weight) * judging["ratio"][key]
+        yield {
+            "work": "full reproduce, training stages",
+            "comparison": "plain fit and the textbook loop",
+            "unit": "s",
+            **seconds,
+            "ratio": ratio,
+            "bar": 0.4,
+            "reached": ratio["median"] <= 0.4,
+            "note": "composed: 40 epochs of 100 steps and 1,000 iterations at the measured medians",
+        }
+
+
+ROWS = {"enhancer": enhancer, "gan": gan, "generation": generation, "loading": loading, "starting": starting, "growth": growth}

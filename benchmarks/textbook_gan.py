@@ -1,0 +1,58 @@
+"""The textbook GAN loop: `predict`, then three `train_on_batch`.
+
+It needs legacy Keras. Under Keras 3 "compile, freeze, compile the stack" freezes the discriminator for good; the loop
+would be quick and wrong. That it learns here is checked before anything is timed.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import tf_keras as keras
+from tf_keras import layers
+
+
+def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> tuple[Callable[[], object], int]:
+    """Iterations of 200 real, 200 generated and 200 judged rows."""
+    generator = keras.Sequential(
+        [
+            keras.Input((16,)),
+            layers.Dense(64, activation="relu", kernel_initializer="he_uniform"),
+            layers.BatchNormalization(),
+            layers.Dense(window, activation="tanh", kernel_initializer="he_uniform"),
+            layers.Reshape((window, 1)),
+        ]
+    )
+    drop = (lambda: [layers.Dropout(dropout)]) if dropout else list
+    discriminator = keras.Sequential(
+        [
+            keras.Input((window, 1)),
+            layers.Conv1D(filters, 20, strides=4, activation="relu", kernel_initializer="he_uniform"),
+            *drop(),
+            layers.GlobalMaxPooling1D(),
+            layers.Dense(25, activation="relu", kernel_initializer="he_uniform"),
+            *drop(),
+            layers.Dense(1, activation="sigmoid", kernel_initializer="he_uniform"),
+        ]
+    )
+    discriminator.compile(loss="binary_crossentropy", optimizer="adam", metrics=["accuracy"])
+    discriminator.trainable = False
+    combined = keras.Sequential([generator, discriminator])
+    combined.compile(loss="binary_crossentropy", optimizer="adam")
+
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
+    ones, zeros = np.ones((200, 1), np.float32), np.zeros((200, 1), np.float32)
+
+    def run() -> None:
+        for _ in range(num_iterations):
+            real = noise[rng.integers(0, len(noise), 200)]
+            generated = generator.predict(rng.normal(size=(200, 16)), verbose=0)
+            discriminator.train_on_batch(real, ones)
+            discriminator.train_on_batch(generated, zeros)
+            combined.train_on_batch(rng.normal(size=(200, 16)), ones)
+
+    before = [weight.copy() for weight in discriminator.get_weights()]
+    run()
+    if all(np.array_equal(*pair) for pair in zip(before, discriminator.get_weights(), strict=True)):
+        raise RuntimeError("Expected a discriminator that learns. Received: one that stands still.")
+    return run, num_iterations
