@@ -3,7 +3,6 @@
 It puts the rooms below together and trains none of their networks by hand.
 """
 
-import dataclasses
 import json
 import os
 import zipfile
@@ -193,9 +192,10 @@ class EnhancedSimulator:
         num_windows = 1 + max(0, -(-(num_samples - window) // hop))
         length = window + (num_windows - 1) * hop
         rng = np.random.default_rng(seed)
-        if scenario is not None:  # the last window may reach beyond the end; the onset stays where it was asked for
-            scenario = dataclasses.replace(scenario, onset=scenario.onset * num_samples / length)
-        coarse = self.coarse.simulate(start_s + self.interval_s * np.arange(length)[None], scenario, rng)[0]
+        times = start_s + self.interval_s * np.arange(length)[None]
+        coarse = self.coarse.simulate(times, rng=rng)[0]
+        if scenario is not None:  # the last window may reach beyond the end, which the scenario knows nothing of
+            coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
         noise = self.noise.generate(num_windows, _noise_rng(seed))

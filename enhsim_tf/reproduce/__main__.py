@@ -49,6 +49,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.experiments import Experiment
     from enhsim_tf.reproduce.figure_data import FIGURE_DATA
     from enhsim_tf.reproduce.figures import save
+    from enhsim_tf.reproduce.page import write_page
     from enhsim_tf.reproduce.report import fill_readme, results, table
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
@@ -88,6 +89,7 @@ def run(options: argparse.Namespace) -> int:
         more = {seed: judge(CLAIMS, experiment_of(seed)) for seed in others}
         write_json(folder / "spread.json", ranges({options.seed: records} | more, options.budget))
         tell(f"ranges over seeds {options.seed} to {others[-1]} in {folder}/spread.json")
+    tell(f"the whole run on one page: {write_page(folder, found, chosen)}")
     if is_smoke or source is not None:
         tell("A smoke run and a channel of one's own have no expected verdicts; those above are of this run alone.")
         return 0

@@ -7,8 +7,6 @@ Owns how a run is shown as a page; the words and numbers come from `results.json
 import base64
 import dataclasses
 import itertools
-import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
 from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
 from enhsim_tf.reproduce.figures import FIGURES
+from enhsim_tf.reproduce.report import PAPER, read_spread, short
 from enhsim_tf.reproduce.settings import deviations
 
 NAME = "report.html"
@@ -87,12 +86,12 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     text = environment.get_template("page.html.jinja").render(
         found=found,
         is_smoke=found["budget"] == "smoke",
-        is_paper=found["source"] == "the paper's example",
+        is_paper=found["source"] == PAPER,
         pipeline=next((picture for picture in pictures if picture.name == PIPELINE), None),
         pictures=[picture for picture in pictures if picture.name != PIPELINE],
         numbers={picture.name: picture.number for picture in pictures},
         widest=max((picture.width for picture in pictures), default=1),
-        spread=_spread(folder, found),
+        spread=read_spread(folder, found),
         tally=_tally([claim["verdict"] for claim in found["claims"]], _KINDS),
         groups={name: list(group) for name, group in itertools.groupby(rows, lambda row: row["setting"].partition(".")[0])},
         num_settings=len(rows),
@@ -103,13 +102,6 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     with replace_file(folder / NAME) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return folder / NAME
-
-
-def short(value: float | None) -> str:
-    """A number with three significant digits, from 1,000 on with all before the point; a dash where there is none."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:,.0f}"
 
 
 def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]]) -> Picture:
@@ -130,16 +122,6 @@ def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]]) -> Pi
     shown = [claim for claim in claims if claim["figure"] == name]
     size = f"{len(content['png']) / 1000:,.0f} kB"
     return Picture(name, about.number, about.title, about.alt, width, height, uris["png"], uris["svg"], size, shown)
-
-
-def _spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The ranges over further seeds; those of another budget or of an older run say nothing of this one."""
-    path = folder / "spread.json"
-    spread = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-    if spread is None or spread["budget"] != found["budget"] or found["seed"] not in spread["seeds"]:
-        return None
-    first = found["claims"][0]
-    return spread if short(first["value"]) in map(short, spread["claims"][first["id"]]["values"]) else None
 
 
 def _tally(words: Sequence[str], order: Mapping[str, str]) -> dict[str, int]:

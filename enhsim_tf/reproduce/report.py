@@ -1,6 +1,7 @@
 """What a run leaves behind: the table on the terminal, `results.json`, and the generated parts of the README."""
 
 import json
+import math
 import platform
 import re
 import shutil
@@ -16,6 +17,8 @@ from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.settings import deviations
 from enhsim_tf.reproduce.stages import VERSIONS
 
+PAPER = "the paper's example"  # what `results.json` names as the source where no file of real telemetry is
+
 
 def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s: float) -> dict[str, Any]:
     """Everything a run found, as `results.json` holds it; each stage with the seconds it took when it was done."""
@@ -24,7 +27,7 @@ def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s:
     return {
         "budget": experiment.settings.budget,
         "seed": experiment.settings.seed,
-        "source": "the paper's example" if experiment.is_paper else experiment.source.path.name,
+        "source": PAPER if experiment.is_paper else experiment.source.path.name,
         "verdict": title_verdict(claims),
         "versions": {"python": platform.python_version(), **VERSIONS},
         "claims": claims,
@@ -39,13 +42,19 @@ def table(claims: list[dict]) -> str:
     width = max(60, min(shutil.get_terminal_size((120, 24)).columns, 140))
     lines = []
     for claim in claims:
-        lines.append(f"{claim['id']}  {claim['verdict']:24}  {claim['statistic']}: {_short(claim['value'])} ({claim['tolerance']})")
+        lines.append(f"{claim['id']}  {claim['verdict']:24}  {claim['statistic']}: {short(claim['value'])} ({claim['tolerance']})")
         lines += textwrap.wrap(claim["finding"], width, initial_indent="    ", subsequent_indent="    ")
     return "\n".join(lines)
 
 
-def _read(file: Path) -> dict | None:
-    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The ranges over further seeds; those of another budget or of an older run say nothing of this one."""
+    path = folder / "spread.json"
+    spread = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    if spread is None or spread["budget"] != found["budget"] or found["seed"] not in spread["seeds"]:
+        return None
+    first = found["claims"][0]
+    return spread if short(first["value"]) in map(short, spread["claims"][first["id"]]["values"]) else None
 
 
 def fill_readme(path: Path, folder: Path) -> None:
@@ -57,12 +66,10 @@ def fill_readme(path: Path, folder: Path) -> None:
     """
     if not path.is_file():
         return
-    found, spread = (_read(folder / name) for name in ("results.json", "spread.json"))
-    if spread is not None and _short(found["claims"][0]["value"]) not in map(_short, spread["claims"]["C1"]["values"]):
-        spread = None  # ranges of an older run say nothing of this one
+    found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     text = path.read_text(encoding="utf-8")
     parts = {
-        "claims": claims_table(found, spread),
+        "claims": claims_table(found, read_spread(folder, found)),
         "channels": channels_table(sorted(folder.glob("*/results.json"))),
         "deviations": deviations_table(),
         "timings": timings_table(found),
@@ -81,9 +88,9 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
     """The claims as a Markdown table, with the range over seeds where it is known."""
     lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value = _short(claim["value"])
-        if spread is not None:
-            value += " ({} to {})".format(*map(_short, spread["claims"][claim["id"]]["range"]))
+        value = short(claim["value"])
+        if spread is not None and spread["claims"][claim["id"]]["range"] is not None:
+            value += " ({} to {})".format(*map(short, spread["claims"][claim["id"]]["range"]))
         lines.append(
             f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "
             f"| **{claim['verdict']}** | {claim['finding']} |"
@@ -92,8 +99,11 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
     return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget{seeds}. From `figures/results.json`."
 
 
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}" if abs(value) < 1000 else f"{value:,.0f}"
+def short(value: float | None) -> str:
+    """A number with three significant digits, from 1,000 on with all before the point; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:,.0f}"
 
 
 def channels_table(files: Sequence[Path]) -> str:

@@ -172,7 +172,13 @@ def deviations() -> list[dict[str, str]]:
     for name, group in groups(Settings()).items():
         for field in dataclasses.fields(group):
             about = field.metadata
-            value = f"{field.default:,}" if isinstance(field.default, int) and not isinstance(field.default, bool) else str(field.default)
-            words = {"setting": f"{name}.{field.name}", "ours": f"{value} {about['unit']}" if about["unit"] != "1" else value}
+            words = {"setting": f"{name}.{field.name}", "ours": _in_words(field.default, about["unit"])}
             rows.append({**words, "paper": about["paper"], "author": about["author"], "source": about["source"]})
     return rows
+
+
+def _in_words(value: Any, unit: str) -> str:
+    if isinstance(value, str | bool):  # their "unit" says what the choices are
+        return {True: "yes", False: "no"}.get(value, value)
+    number = f"{value:,}" if isinstance(value, int) else f"{value:,g}"
+    return number if unit == "1" else f"{number} {unit}"
