@@ -102,8 +102,8 @@ def imports_of(source: str) -> list[str]:
     """Names of the package's modules that a source imports, without the package's own name."""
     found = []
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("enhsim_tf."):
-            found.append(node.module.removeprefix("enhsim_tf."))
-        elif isinstance(node, ast.ImportFrom) and node.module == "enhsim_tf":
-            found += [alias.name for alias in node.names]
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "enhsim_tf":
+            module = node.module.partition(".")[2]
+            is_folder = not module or (_PACKAGE / module.replace(".", "/")).is_dir()
+            found += [f"{module}.{alias.name}".strip(".") for alias in node.names] if is_folder else [module]
     return found
