@@ -1,0 +1,372 @@
+"""The product: a sum of known parts, series without seams, folders that come back to the bit or are refused."""
+
+import copy
+import functools
+import json
+
+import keras
+import numpy as np
+import pytest
+
+from enhsim_tf import enhanced_simulator
+from enhsim_tf.enhanced_simulator import EnhancedSimulator
+from enhsim_tf.enhancer import build_enhancer
+from enhsim_tf.files import sha256
+from enhsim_tf.noise import GaussianNoise, extract_noise, noise_unit
+from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.simulator import MODES, Degraded, SquareWave, SquareWaveSimulator
+from enhsim_tf.telemetry import Telemetry
+
+COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
+FILES = ["discriminator.keras", "enhancer.keras", "generator.keras", "manifest.json", "settings.json"]
+
+
+def identity(window):
+    """An enhancer that answers its input, to the bit."""
+    model = keras.Sequential([keras.Input((window,)), keras.layers.Dense(window)])
+    model.layers[0].set_weights([np.eye(window), np.zeros(window)])
+    return model
+
+
+def known(noise_sd=0.0, window=500, **arguments):
+    """Made of known processes: the coarse signal itself plus white noise."""
+    return EnhancedSimulator(COARSE, identity(window), GaussianNoise(noise_sd, window), **arguments)
+
+
+def small(window=60, seed=0):
+    """Made of real, untrained, narrow networks."""
+    generator, discriminator = build_generator(window, 4, 8, seed=seed), build_discriminator(window, 8, seed=seed)
+    noise = NoiseGAN(generator, discriminator, latent_span=1.5, scale=0.3, seed=seed)
+    return EnhancedSimulator(
+        COARSE, build_enhancer(window, 16, seed=seed), noise, interval_s=2.0, offset=0.1, scale=0.7, trained={"seed": seed}
+    )
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A simulator and the folder it was saved to; nobody writes there."""
+    simulator, folder = small(), tmp_path_factory.mktemp("saved") / "model"
+    simulator.save(folder)
+    return simulator, folder
+
+
+@pytest.fixture
+def copied(saved, tmp_path):
+    """A copy of the saved folder that a test may damage."""
+    for file in saved[1].iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    return tmp_path
+
+
+def vouch_for(folder):
+    """Makes the manifest agree with the files, as somebody who means harm would."""
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["sha256"] = {name: sha256(folder / name) for name in manifest["sha256"]}
+    (folder / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+
+
+# windows
+
+
+def test_coarse_windows_begin_at_random_samples_of_the_coarse_simulator():
+    windows = known(interval_s=2.0).generate_coarse(300, seed=0)
+    assert windows.shape == (300, 500) and windows.dtype == np.float32
+    begins = {COARSE.simulate(begin + 2.0 * np.arange(500)[None]).tobytes(): begin for begin in range(0, 480, 2)}
+    phases = [begins[window.tobytes()] for window in windows]  # every window is one of the 240 there are
+    assert len(set(phases)) > 0.6 * 240 and np.mean(phases) == pytest.approx(239, abs=5 * 480 / np.sqrt(12 * 300))
+
+
+def test_enhanced_windows_are_in_the_telemetry_s_unit():
+    coarse = COARSE.simulate(np.arange(60.0)[None])
+    same = known(window=60, offset=0.25, scale=4.0).enhance(coarse)
+    np.testing.assert_allclose(same, coarse, atol=1e-6)
+    constant = identity(60)
+    constant.layers[0].set_weights([np.zeros((60, 60)), np.ones(60)])  # always answers one scale above the offset
+    enhanced = EnhancedSimulator(COARSE, constant, GaussianNoise(0, 60), offset=0.25, scale=4.0).enhance(coarse)
+    assert (enhanced == 4.25).all() and enhanced.dtype == np.float32
+    doubled = identity(60)
+    doubled.layers[0].set_weights([2 * np.eye(60), np.zeros(60)])
+    enhanced = EnhancedSimulator(COARSE, doubled, GaussianNoise(0, 60), offset=0.25, scale=4.0).enhance(coarse)
+    np.testing.assert_allclose(enhanced - 0.25, 2 * (coarse - 0.25), atol=1e-5)
+
+
+def test_generated_windows_are_the_enhanced_signal_plus_the_noise():
+    simulator = known(noise_sd=0.3)
+    noise = simulator.generate(200, seed=4) - simulator.generate_coarse(200, seed=4)
+    assert np.std(noise) == pytest.approx(0.3, rel=5 / np.sqrt(2 * noise.size))
+    assert (known().generate(20, Degraded("drift"), seed=4) == known().generate_coarse(20, Degraded("drift"), seed=4)).all()
+
+
+@pytest.mark.parametrize("scenario", [None, Degraded("dropout", 0.8), Degraded("friction", 0.8)], ids=str)
+def test_same_seed_same_windows_and_series(scenario):
+    simulator = small()
+    keras.utils.set_random_seed(1)  # must not matter
+    windows, series = simulator.generate(20, scenario, seed=3), simulator.generate_series(500, scenario, seed=3)
+    keras.utils.set_random_seed(2)
+    assert windows.shape == (20, 60) and windows.dtype == series.dtype == np.float32
+    assert (windows == simulator.generate(20, scenario, seed=3)).all()
+    assert (series == simulator.generate_series(500, scenario, seed=3)).all()
+    assert (windows != simulator.generate(20, scenario, seed=4)).any(axis=1).all()
+    assert (series != simulator.generate_series(500, scenario, seed=4)).any()
+
+
+# series
+
+
+@pytest.mark.parametrize("num_samples", [1, 499, 500, 501, 12_345])
+def test_series_of_any_length(num_samples):
+    series = small(window=500).generate_series(num_samples, seed=1)
+    assert series.shape == (num_samples,) and series.dtype == np.float32 and np.isfinite(series).all()
+
+
+def test_series_of_no_length_is_refused(refused):
+    for number in (0, -5):
+        with refused(f"num_samples={number}"):
+            known(window=60).generate_series(number)
+
+
+@pytest.mark.parametrize("window", [60, 61])
+@pytest.mark.parametrize("num_samples", [1, 59, 60, 61, 90, 1_234])
+def test_series_of_an_identity_enhancer_is_the_coarse_series(window, num_samples):
+    simulator = known(window=window, interval_s=3.0)
+    for start_s in (0.0, 97.0):
+        expected = COARSE.simulate(start_s + 3.0 * np.arange(num_samples)[None])[0]
+        assert (simulator.generate_series(num_samples, start_s=start_s) == expected).all()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("num_samples", [40, 60, 700, 1_234])
+def test_scenario_of_a_series_is_that_of_its_own_length(mode, num_samples):
+    # not of the last window, which may reach beyond the end
+    scenario, times = Degraded(mode, severity=0.6, onset=0.35), np.arange(float(num_samples))[None]
+    series = known(window=60).generate_series(num_samples, scenario, seed=6)
+    expected = COARSE.simulate(times, scenario, np.random.default_rng(6))[0]
+    np.testing.assert_allclose(series, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("onset", [0.1, 0.29, 0.5, 0.73])
+def test_onset_of_a_series_lands_where_it_was_asked_for(onset):
+    for num_samples in (300, 1_000, 1_111):
+        degraded = known(window=60).generate_series(num_samples, Degraded("drift", 1.0, onset))
+        changed = np.flatnonzero(degraded != known(window=60).generate_series(num_samples))
+        assert changed[0] == int(round(onset * num_samples, 6)) + 1  # the ramp begins at zero
+
+
+def test_noise_of_a_series_has_no_seams():
+    window, sd = 100, 0.3
+    noise = known(noise_sd=sd, window=window).generate_series(200_000, seed=2) - known(window=window).generate_series(200_000)
+    by_position = noise.reshape(-1, window // 2)  # a window begins and another ends at position 0
+    edges, middle = by_position[:, [0, 1, -2, -1]], by_position[:, 2:-2]
+    for part in (edges, middle):
+        assert np.var(part) == pytest.approx(sd**2, rel=5 * np.sqrt(2 / part.size))
+    # position for position
+    assert np.var(by_position, axis=0) == pytest.approx(np.full(window // 2, sd**2), rel=5 * np.sqrt(2 / len(by_position)))
+    # white noise stays white, across the seams too
+    assert np.mean(noise[1:] * noise[:-1]) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(len(noise)))
+    across = by_position[1:, 0] * by_position[:-1, -1]
+    assert np.mean(across) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(len(across)))
+
+
+@pytest.mark.parametrize("num_samples", [1_000, 1_400])
+def test_noise_of_a_series_fades_at_neither_end(num_samples):
+    noise = known(noise_sd=0.3, window=1_000).generate_series(num_samples, seed=2) - known(window=1_000).generate_series(num_samples)
+    for part in (noise, noise[:400], noise[-400:]):
+        assert np.var(part) == pytest.approx(0.3**2, rel=5 * np.sqrt(2 / part.size))
+
+
+def test_noise_has_draws_of_its_own():
+    # with the seed of the coarse windows its draws would be made of the same random bits
+    class Drawing(GaussianNoise):
+        def generate(self, num_windows, seed):
+            drawn.append(np.random.default_rng(copy.deepcopy(seed)).integers(1_000_000))
+            return super().generate(num_windows, seed)
+
+    drawn, simulator = [], EnhancedSimulator(COARSE, identity(60), Drawing(0.1, 60))
+    for seed in (0, 1, 2, 1):
+        simulator.generate(2, seed=seed)
+        simulator.generate_series(70, seed=seed)
+    assert drawn[2:4] == drawn[6:8] and len(set(drawn)) == 3
+    assert not set(drawn) & {np.random.default_rng(seed).integers(1_000_000) for seed in (0, 1, 2)}
+
+
+# folders
+
+
+def test_saved_folder_holds_what_it_says(saved):
+    simulator, folder = saved
+    assert sorted(file.name for file in folder.iterdir()) == FILES
+    assert [file.name for file in folder.parent.iterdir()] == ["model"]
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["sha256"] == {name: sha256(folder / name) for name in FILES if name != "manifest.json"}
+
+
+def test_save_load_generate_gives_equal_bits(saved):
+    simulator, folder = saved
+    loaded = EnhancedSimulator.load(folder)
+    assert loaded.coarse.waves == COARSE.waves
+    assert (loaded.window, loaded.interval_s, loaded.offset, loaded.scale) == (60, 2.0, 0.1, 0.7)
+    assert loaded.trained == simulator.trained == {"seed": 0}
+    scenario = Degraded("friction", 0.5)
+    assert loaded.generate(50, scenario, seed=3).tobytes() == simulator.generate(50, scenario, seed=3).tobytes()
+    assert loaded.generate_series(500, seed=3).tobytes() == simulator.generate_series(500, seed=3).tobytes()
+    rows = np.random.default_rng(0).standard_normal((4, 60, 1)).astype(np.float32)
+    judged = [np.asarray(each.noise.discriminator(rows)) for each in (loaded, simulator)]
+    assert (judged[0] == judged[1]).all()
+
+
+def test_saving_again_replaces_the_folder(saved, copied):
+    (copied / "stray.txt").write_text("x")
+    other = small(seed=1)
+    other.save(copied)
+    assert sorted(file.name for file in copied.iterdir()) == FILES
+    assert (EnhancedSimulator.load(copied).generate(3, seed=0) == other.generate(3, seed=0)).all()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_flipped_byte_is_noticed(copied, refused, name):
+    content = (copied / name).read_bytes()
+    every = 3 if name == "manifest.json" else len(content) // 4  # nothing but its own form protects the manifest
+    for place in range(0, len(content), every):
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        (copied / name).write_bytes(damaged)
+        with refused(str(copied)):
+            EnhancedSimulator.load(copied)
+            pytest.fail(f"a change of byte {place} went unnoticed, after {content[:place][-30:]}")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_missing_file_is_noticed(copied, refused, name):
+    (copied / name).unlink()
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+MANIFESTS = {
+    "not JSON": "not JSON",
+    "no text": b"\xff\xfe\x00",
+    "nothing": "",
+    "a list": "[]",
+    "a number": "3",
+    "another format": lambda manifest: {**manifest, "format": "somebody.else/7"},
+    "a format of two lines": lambda manifest: {**manifest, "format": "a\nb"},
+    "no format": lambda manifest: {"sha256": manifest["sha256"]},
+    "no checksums": lambda manifest: {"format": manifest["format"]},
+    "checksums in a list": lambda manifest: {**manifest, "sha256": list(manifest["sha256"])},
+    "a file too few": lambda manifest: {**manifest, "sha256": dict(list(manifest["sha256"].items())[1:])},
+    "a file too many": lambda manifest: {**manifest, "sha256": {**manifest["sha256"], "../manifest.json": "0"}},
+    "another checksum": lambda manifest: {**manifest, "sha256": {**manifest["sha256"], "settings.json": "0"}},
+}
+
+
+@pytest.mark.parametrize("name", MANIFESTS)
+def test_foreign_manifest_is_refused(copied, refused, name):
+    content, path = MANIFESTS[name], copied / "manifest.json"
+    if callable(content):
+        content = json.dumps(content(json.loads(path.read_text())))
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+def test_foreign_folders_are_refused(tmp_path, refused):
+    with refused("absent"):
+        EnhancedSimulator.load(tmp_path / "absent")
+    with refused(str(tmp_path)):
+        EnhancedSimulator.load(tmp_path)  # empty
+    (tmp_path / "notes.txt").write_text("x")
+    with refused(str(tmp_path)):
+        EnhancedSimulator.load(tmp_path)
+    with refused("notes.txt"):
+        EnhancedSimulator.load(tmp_path / "notes.txt")
+
+
+SETTINGS = {
+    "no settings": "{}",
+    "a list": "[]",
+    "a wave too many words": lambda settings: {**settings, "coarse": {"waves": [{"period_s": 3, "colour": "red"}]}},
+    "no waves": lambda settings: {**settings, "coarse": {"waves": []}},
+    "a wave without a period": lambda settings: {**settings, "coarse": {"waves": [{}]}},
+    "words for numbers": lambda settings: {**settings, "interval_s": "often"},
+    "an argument nobody knows": lambda settings: {**settings, "noise": {"colour": "pink"}},
+}
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_that_cannot_be_are_refused_though_their_checksum_is_right(copied, refused, name):
+    content, path = SETTINGS[name], copied / "settings.json"
+    path.write_text(json.dumps(content(json.loads(path.read_text()))) if callable(content) else content)
+    vouch_for(copied)
+    with refused():
+        EnhancedSimulator.load(copied)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive"])
+def test_network_that_cannot_be_is_refused_though_its_checksum_is_right(copied, refused, content):
+    (copied / "enhancer.keras").write_bytes(content)
+    vouch_for(copied)
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+def test_network_that_carries_code_is_refused(copied, refused):
+    model = keras.Sequential([keras.Input((60,)), keras.layers.Lambda(lambda values: values + 1)])
+    model.save(copied / "enhancer.keras")
+    vouch_for(copied)
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+# the fit
+
+
+def measured(number=1_500):
+    """A noisy sine of 50 samples in a unit far from one."""
+    times = 2.0 * np.arange(number)
+    values = 1_000 + 50 * np.sin(2 * np.pi * times / 100) + 4 * np.random.default_rng(0).standard_normal(number)
+    return Telemetry(values.astype(np.float32), interval_s=2.0)
+
+
+@pytest.fixture
+def small_batches(monkeypatch):
+    """A step of the noise networks on 200 rows takes long to trace."""
+    monkeypatch.setattr(enhanced_simulator, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
+
+
+def fitted(seed=0, **arguments):
+    counts = {"num_windows": 60, "epochs": 4, "num_iterations": 2, "window": 60, "verbose": 0}
+    return EnhancedSimulator.fit(measured(), seed=seed, **{**counts, **arguments})
+
+
+def test_fit_to_short_telemetry_end_to_end(small_batches):
+    simulator = fitted()
+    assert (simulator.window, simulator.interval_s) == (60, 2.0)
+    assert simulator.coarse.waves[0].period_s == pytest.approx(100, rel=0.005)
+    # the enhancer has learnt the sine: it is nearer to it than the coarse square wave is
+    windows = simulator.generate_coarse(40, seed=1)
+    clean = simulator.enhance(windows)
+    amplitude = np.sqrt(2) * np.std(clean)
+    assert np.mean(clean) == pytest.approx(1_000, abs=5) and amplitude == pytest.approx(50, rel=0.15)
+    phases = np.fft.rfft(windows, axis=1)[:, 1]
+    assert np.mean(np.abs(np.diff(clean, axis=1))) < 0.6 * 50 and np.isfinite(phases).all()
+    # the noise, hardly trained, is at the scale of the telemetry's noise: ten standard deviations at most
+    noise, _ = extract_noise(measured().values, 25)
+    added = simulator.generate(40, seed=1) - clean
+    assert simulator.noise.scale == pytest.approx(noise_unit(noise))
+    assert added.any() and np.abs(added).max() <= simulator.noise.scale * 1.001
+
+    again = fitted()
+    assert (simulator.generate(5, seed=2) == again.generate(5, seed=2)).all()
+
+
+def test_fit_with_another_seed_and_without_normalisation(small_batches):
+    simulator = fitted(seed=5, normalise=False, epochs=1, num_iterations=0, coarse=COARSE)
+    assert (simulator.offset, simulator.scale, simulator.noise.scale) == (0, 1, 1)
+    assert simulator.coarse is COARSE
+    for weight, begun in zip(simulator.noise.generator.weights, build_generator(60, seed=5).weights, strict=True):
+        assert (np.asarray(weight) == np.asarray(begun)).all()
+
+
+def test_fit_refuses_less_than_two_windows(refused):
+    with refused("119", "120 samples", "two windows"):
+        EnhancedSimulator.fit(measured(119), window=60, verbose=0)

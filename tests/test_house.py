@@ -1,0 +1,267 @@
+"""The walls of the house: floors, quiet imports, documented rooms, owned draws."""
+
+import ast
+import importlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "enhsim_tf"
+TREES = {
+    path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): ast.parse(path.read_text()) for path in PACKAGE.rglob("*.py")
+}
+
+FLOORS = {
+    "reproduce": 3,
+    "__main__": 3,
+    "robustness": 2,
+    "fleet": 2,
+    "enhanced_simulator": 2,
+    "enhancer": 1,
+    "noise_gan": 1,
+    "convolution_maximum": 1,
+    "fused_adam": 1,
+    "noise": 1,
+    "detectors": 1,
+    "simulator": 1,
+    "periodicity": 1,
+    "store": 1,
+    "telemetry": 0,
+    "signals": 0,
+    "fidelity": 0,
+    "files": 0,
+    "errors": 0,
+    "terminal": 0,
+    "__init__": 4,  # the door: it may name every room
+}
+WITHOUT_TENSORFLOW = [
+    "",
+    "errors",
+    "files",
+    "telemetry",
+    "signals",
+    "fidelity",
+    "store",
+    "periodicity",
+    "simulator",
+    "noise",
+    "detectors",
+    "terminal",
+]
+
+
+def room_of(module):
+    return module.split(".")[0]
+
+
+def rooms_imported_by(module, tree):
+    """Rooms of the package that a module imports anywhere, its functions included."""
+    package = ["enhsim_tf", *module.split(".")[:-1]]
+    names = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            names += [".".join([*base, *([node.module] if node.module else []), alias.name]) for alias in node.names]
+    parts = [name.split(".") for name in names]
+    return {part[1] if len(part) > 1 and part[1] in FLOORS else "__init__" for part in parts if part[0] == "enhsim_tf"}
+
+
+def test_every_room_has_its_floor():
+    assert {room_of(module) for module in TREES} <= set(FLOORS)
+    assert len(TREES) >= 15
+
+
+@pytest.mark.parametrize("module", TREES)
+def test_imports_go_down_the_floors(module):
+    rooms = rooms_imported_by(module, TREES[module]) - {room_of(module)}
+    upwards = {room for room in rooms if FLOORS[room] > FLOORS[room_of(module)]}
+    if room_of(module) in ("reproduce", "__main__"):
+        upwards.discard("__init__")  # for its version
+    assert not upwards
+    if room_of(module) != "reproduce":
+        assert "reproduce" not in rooms  # only the wing knows the paper's numbers, and nobody asks the wing
+
+
+def test_rooms_of_one_floor_do_not_import_in_a_circle():
+    left = {module: {room for room in rooms_imported_by(module, tree) if room in TREES} for module, tree in TREES.items()}
+    while left:
+        free = [module for module, rooms in left.items() if not rooms & (set(left) - {module})]
+        assert free, f"a circle among {sorted(left)}"
+        for module in free:
+            del left[module]
+
+
+def test_the_reading_of_imports_sees_every_form():
+    text = "import enhsim_tf.noise\nfrom enhsim_tf import store, __version__\ndef f():\n    from enhsim_tf.files import sha256\n    from . import noise_gan\n"
+    assert rooms_imported_by("signals", ast.parse(text)) == {"noise", "store", "files", "noise_gan", "__init__"}
+    assert rooms_imported_by("reproduce.figures", ast.parse("from .. import fidelity\nimport numpy")) == {"fidelity"}
+
+
+def test_rooms_without_networks_import_no_tensorflow():
+    modules = [f"enhsim_tf.{room}".rstrip(".") for room in WITHOUT_TENSORFLOW] + ["enhsim_tf.reproduce.settings"]
+    script = f"import sys\nfor module in {modules}:\n    __import__(module)\nprint([name for name in ('tensorflow', 'keras') if name in sys.modules])"
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert (ended.stdout.strip(), ended.returncode) == ("[]", 0), ended.stderr
+
+
+def test_public_names_lead_where_they_say():
+    import enhsim_tf
+
+    assert {"EnhancedSimulator", "NoiseGAN", "build_enhancer", "InputError"} <= set(enhsim_tf.__all__)
+    for name in enhsim_tf.__all__:
+        value = getattr(enhsim_tf, name)
+        assert value.__name__ == name and value is getattr(importlib.import_module(value.__module__), name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = enhsim_tf.nothing
+
+
+def public_definitions():
+    """`(where, node, fields)` of every public class, function and method; the fields of a class are those of its `__init__`."""
+    for module, tree in TREES.items():
+        if any(part.startswith("_") and part != "__main__" for part in module.split(".")):
+            continue
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                yield f"{module}.{node.name}", node
+                for inner in node.body if isinstance(node, ast.ClassDef) else ():
+                    if isinstance(inner, ast.FunctionDef) and not inner.name.startswith("_"):
+                        yield f"{module}.{node.name}.{inner.name}", inner
+
+
+DEFINITIONS = dict(public_definitions())
+
+
+def arguments_of(function):
+    """The arguments that have a name for the caller: not `self`, `cls` or `**options`."""
+    given = function.args
+    arguments = [*given.posonlyargs, *given.args, *given.kwonlyargs]
+    return [argument for argument in arguments if argument.arg not in ("self", "cls")]
+
+
+def parameters_of(node):
+    """Names of what a function or class takes: of its `__init__`, or the fields of a data class."""
+    if isinstance(node, ast.FunctionDef):
+        return [argument.arg for argument in arguments_of(node)]
+    for inner in node.body:
+        if isinstance(inner, ast.FunctionDef) and inner.name == "__init__":
+            return parameters_of(inner)
+    if any("dataclass" in ast.unparse(decorator) for decorator in node.decorator_list):
+        return [inner.target.id for inner in node.body if isinstance(inner, ast.AnnAssign)]
+    return []
+
+
+def test_there_is_something_to_check():
+    assert len(DEFINITIONS) > 60 and {"simulator.SquareWave", "noise_gan.NoiseGAN.fit", "fidelity.nrmse"} <= set(DEFINITIONS)
+    assert parameters_of(DEFINITIONS["simulator.SquareWave"])[:2] == ["period_s", "phase"]
+
+
+@pytest.mark.parametrize("where", DEFINITIONS)
+def test_public_names_are_documented(where):
+    node = DEFINITIONS[where]
+    text = ast.get_docstring(node)
+    assert text, "no docstring"
+    assert text.splitlines()[0].rstrip().endswith((".", ":")), "the summary is not a sentence on one line"
+    parameters = parameters_of(node)
+    if len(parameters) > 2 and not (isinstance(node, ast.ClassDef) and "Settings" in node.name):
+        described = re.findall(r"^    ([\w, `]+): ", text.partition("Args:")[2], re.MULTILINE)
+        described = {name.strip(" `") for names in described for name in names.split(",")}
+        assert not [name for name in parameters if name not in described], "arguments without a description"
+
+
+@pytest.mark.parametrize("where", DEFINITIONS)
+def test_public_names_have_type_hints(where):
+    node = DEFINITIONS[where]
+    functions = [node] if isinstance(node, ast.FunctionDef) else []
+    if isinstance(node, ast.ClassDef):
+        functions = [inner for inner in node.body if isinstance(inner, ast.FunctionDef) and inner.name in ("__init__", "__call__")]
+    for function in functions:
+        assert not [argument.arg for argument in arguments_of(function) if argument.annotation is None]
+        assert function.returns is not None or function.name == "__init__"
+
+
+@pytest.mark.parametrize("module", TREES)
+def test_modules_say_what_they_own(module):
+    assert ast.get_docstring(TREES[module])
+
+
+OWNERS = {"default_rng", "Generator", "SeedSequence", "BitGenerator", "PCG64"}
+SEEDED = {"HeUniform", "GlorotUniform", "RandomNormal", "RandomUniform", "Dropout", "GaussianNoise", "shuffle"}
+
+
+def unowned_draws(tree):
+    """Calls that draw from a global state, or build what draws without naming its seed."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names]
+            found += [f"import {name}" for name in names if name == "random"]
+        if not isinstance(node, ast.Call):
+            continue
+        name, seeded = ast.unparse(node.func), any(keyword.arg == "seed" for keyword in node.keywords)
+        *path, last = name.split(".")
+        if path[-2:] in (["np", "random"], ["numpy", "random"]) and (last not in OWNERS or (last == "default_rng" and not node.args)):
+            found.append(name)
+        stateless = seeded or last in ("split", "fold_in") or last.startswith("stateless_")  # the seed is an argument
+        if (path[:2] == ["tf", "random"] and not stateless) or last in ("set_random_seed", "set_seed"):
+            found.append(name)
+        if path[-2:] == ["keras", "random"] and not (seeded or (last == "SeedGenerator" and node.args)):
+            found.append(name)
+        if path and last in SEEDED and path[0] in ("keras", "tf") and not seeded:
+            found.append(name)
+        if last in ("Dense", "Conv1D") and path[0] == "keras" and not any(keyword.arg == "kernel_initializer" for keyword in node.keywords):
+            found.append(f"{name} without kernel_initializer")
+    return found
+
+
+@pytest.mark.parametrize("module", TREES)
+def test_every_draw_has_an_owner(module):
+    assert not unowned_draws(TREES[module])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "np.random.normal(3)",
+        "np.random.seed(0)",
+        "np.random.default_rng()",
+        "tf.random.normal((3,))",
+        "tf.random.set_seed(0)",
+        "keras.utils.set_random_seed(1)",
+        "keras.random.normal((3,))",
+        "keras.layers.Dropout(0.3)",
+        "keras.layers.Dense(3)",
+        "import random",
+    ],
+)
+def test_draws_without_an_owner_would_be_seen(text):
+    assert unowned_draws(ast.parse(text))
+
+
+@pytest.mark.parametrize("module", TREES)
+def test_no_exception_is_caught_blindly(module):
+    for node in ast.walk(TREES[module]):
+        if isinstance(node, ast.ExceptHandler):
+            assert node.type is not None and ast.unparse(node.type) not in ("Exception", "BaseException")
+
+
+def test_every_room_has_its_tests():
+    with_others = {"periodicity": "simulator", "terminal": "house", "fused_adam": "fast_paths"}
+    rooms = {module for module in TREES if "." not in module} - {"__init__", "__main__", "errors"}
+    assert {f"test_{with_others.get(room, room)}.py" for room in rooms} <= {path.name for path in (ROOT / "tests").iterdir()}
+
+
+def test_tensorflow_starts_without_notes_and_standard_error_is_given_back():
+    script = (
+        "import sys\nfrom enhsim_tf.terminal import start_tensorflow\nstart_tensorflow()\n"
+        "print('tensorflow' in sys.modules)\nprint('heard', file=sys.stderr)\nstart_tensorflow()\nimport os\nos.write(2, b'again')"
+    )
+    quiet = {name: value for name, value in os.environ.items() if name != "TF_CPP_MIN_LOG_LEVEL"}
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, env=quiet)
+    assert (ended.stdout, ended.stderr, ended.returncode) == ("True\n", "heard\nagain", 0)

@@ -1,0 +1,270 @@
+"""The command, end to end: what it writes, and that a run found done, killed or repeated ends with the same numbers."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.reproduce import claims, figure_data, figures, page
+from enhsim_tf.reproduce.__main__ import main
+from enhsim_tf.reproduce.settings import FIGURES
+
+ROOT = Path(__file__).parents[1]
+COMMAND = [sys.executable, "-m", "enhsim_tf.reproduce"]
+STAGES = ["telemetry", "enhancer", "noise GAN", "enhancement", "speed", "false alarms", "resemblance", "degraded"]
+
+
+def _command(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=600)
+
+
+def _committed():
+    """What no smoke run may touch: the figures and the README, with their times."""
+    files = [ROOT / "README.md", *sorted((ROOT / "figures").rglob("*"))]
+    return [(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
+
+
+def _without_timing(found):
+    return [claim for claim in found["claims"] if claim["id"] != "C2"]
+
+
+def _results(out):
+    return json.loads((out / "results.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory):
+    """One undisturbed smoke run."""
+    folder, before = tmp_path_factory.mktemp("smoke"), _committed()
+    done = _command("--budget", "smoke", "--out", folder / "out", "--cache", folder / "cache")
+    assert done.returncode == 0, done.stderr
+    touched = before != _committed()
+    return SimpleNamespace(out=folder / "out", cache=folder / "cache", done=done, found=_results(folder / "out"), touched=touched)
+
+
+# -- help ------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["--seed", "-1"], 2), (["--only", "fig99"], 2)])
+def test_answers_that_need_no_network_import_none(arguments, code):
+    slow = "{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}"
+    program = f"""
+import sys
+from enhsim_tf.reproduce.__main__ import main
+try:
+    code = main({arguments!r})
+except SystemExit as left:
+    code = left.code
+print()
+print(code, sorted({slow} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.stdout.splitlines()[-1] == f"{code} []", done.stderr
+    if code == 0:
+        assert "--budget" in done.stdout and "exit code" in done.stdout
+
+
+# -- a smoke run -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_smoke_run_draws_every_figure_and_marks_it(smoke):
+    expected = {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")} | {"results.json", "report.html"}
+    assert {file.name for file in smoke.out.iterdir()} == expected, "nothing is missing and nothing half written is left"
+    for name in FIGURES:
+        assert (smoke.out / f"{name}.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+        drawn = (smoke.out / f"{name}.svg").read_text(encoding="utf-8")
+        ElementTree.fromstring(drawn)
+        assert "SMOKE" in drawn and "seed 0" in drawn and "smoke budget" in drawn
+
+
+def test_a_smoke_run_touches_nothing_that_is_committed(smoke):
+    assert not smoke.touched
+
+
+def test_results_hold_the_ledger_and_the_table_says_the_same(smoke):
+    found = smoke.found
+    assert (found["budget"], found["seed"], found["from_cache"]) == ("smoke", 0, [])
+    assert list(found["timings"]) == [*STAGES, "figures"] and min(found["timings"].values()) > 0
+    assert {"python", "tensorflow", "keras", "numpy"} <= set(found["versions"])
+    assert [claim["id"] for claim in found["claims"]] == [claim.id for claim in claims.CLAIMS]
+    for claim in found["claims"]:
+        assert {"id", "sentence", "section", "figure", "statistic", "value", "tolerance", "verdict", "finding"} <= set(claim)
+        assert claim["verdict"] in {"reproduced", "partly", "not reproduced", "not tested by the paper"}
+        assert isinstance(claim["value"], float) and np.isfinite(claim["value"])
+        assert any(line.startswith(claim["id"]) and claim["verdict"] in line for line in smoke.done.stdout.splitlines())
+    assert found["verdict"] in smoke.done.stdout and str(smoke.out) in smoke.done.stdout
+
+
+def test_progress_bars_are_quiet_where_there_is_no_terminal(smoke):
+    assert "\r" not in smoke.done.stdout + smoke.done.stderr
+    assert not any(word in smoke.done.stderr for word in ("Epoch", "it/s", "iteration", "Traceback"))
+
+
+@pytest.fixture(scope="module")
+def again(smoke, tmp_path_factory):
+    """The same once more, with the arrays and a second seed."""
+    out, before = tmp_path_factory.mktemp("again"), _committed()
+    done = _command("--budget", "smoke", "--out", out, "--cache", smoke.cache, "--arrays", "--spread", 1)
+    assert done.returncode == 0, done.stderr
+    assert before == _committed()
+    return SimpleNamespace(out=out, done=done, found=_results(out))
+
+
+def test_a_second_run_finds_everything_done(smoke, again):
+    assert again.found["from_cache"] == STAGES
+    assert again.found["claims"] == smoke.found["claims"]
+    for name in STAGES:
+        assert again.found["timings"][name] == smoke.found["timings"][name], "what it took when it was done"
+    for name in FIGURES:
+        assert (again.out / f"{name}.png").read_bytes() == (smoke.out / f"{name}.png").read_bytes()
+
+
+def test_another_seed_gives_other_numbers(again):
+    spread = json.loads((again.out / "spread.json").read_text(encoding="utf-8"))
+    assert (spread["budget"], spread["seeds"]) == ("smoke", [0, 1])
+    for claim in again.found["claims"]:
+        low, high = spread["claims"][claim["id"]]["range"]
+        assert low <= claim["value"] <= high and len(spread["claims"][claim["id"]]["verdicts"]) == 2
+        if claim["id"] in ("C1", "C4", "C6", "C9"):
+            assert low < high
+
+
+def test_the_arrays_behind_each_figure_are_the_claims_numbers(again):
+    arrays = {name: np.load(again.out / f"{name}.npz", allow_pickle=False) for name in FIGURES}
+    value = {claim["id"]: claim["value"] for claim in again.found["claims"]}
+    assert arrays["fig04_enhanced_simulation"]["nrmse"] == value["C1"]
+    ranks = arrays["fig06_real_or_generated_noise"]
+    assert ranks["rank_generated"] / ranks["rank_real"] == pytest.approx(value["C6"])
+    accuracy = [arrays["fig12_accuracy_loss"][f"accuracy_{kind}"] for kind in ("real", "generated")]
+    assert np.mean(accuracy, axis=0)[len(accuracy[0]) // 2 :].mean() == pytest.approx(value["C5"])
+    assert arrays["fig03_enhancer"]["total"] == 13_697_400
+    source = arrays["fig02_source_target"]["source"]
+    assert source.shape[1] == 500 and set(np.abs(np.unique(source))) == {0.25, 0.75}
+
+
+def test_only_one_figure_trains_nothing(tmp_path, capsys, smoke):
+    arguments = ["--budget", "smoke", "--only", "fig02", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--arrays"]
+    assert main(arguments) == 0
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [f"fig02_source_target.{kind}" for kind in ("npz", "png", "svg")]
+    (stage,) = (tmp_path / "cache").iterdir()
+    assert stage.name.startswith("telemetry-")
+    told = capsys.readouterr()
+    assert "enhancer" not in told.out and "C1" not in told.out
+    assert (tmp_path / "out" / "fig02_source_target.png").read_bytes() == (smoke.out / "fig02_source_target.png").read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_table_with_times_keeps_them(tmp_path, kind):
+    times = np.datetime64("2021-03-04T05:06:07") + np.arange(2_000) * np.timedelta64(30, "s")
+    values = np.sin(np.arange(2_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(2_000)
+    table = pd.DataFrame({"utc": times, "volts": values, "amperes": 0.0})
+    table.to_csv(tmp_path / "x.csv", index=False) if kind == "csv" else table.to_parquet(tmp_path / "x.parquet")
+    arguments = ["--telemetry", tmp_path / f"x.{kind}", "--column", "volts", "--time", "utc", "--only", "fig14", "--arrays"]
+    assert main([str(argument) for argument in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]]) == 0
+    found = np.load(tmp_path / "out" / "fig14_telemetry_store.npz", allow_pickle=False)
+    assert np.array_equal(found["time"], times) and found["interval_s"] == 30 and found["num_samples"] == 2_000
+    np.testing.assert_allclose(found["values"], values, atol=1e-6)
+
+
+# -- killed and started again ----------------------------------------------------------------------------------------------
+
+
+def _start_and_kill(arguments, pattern, pause_s):
+    """Starts the command and kills it `pause_s` after it said a line like `pattern`; returns what it said."""
+    process = subprocess.Popen([*COMMAND, *arguments], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    said = []
+    for text in process.stdout:
+        said.append(" ".join(text.split()))
+        if re.fullmatch(pattern, said[-1]):
+            time.sleep(pause_s)
+            break
+    process.send_signal(signal.SIGKILL)
+    said += [" ".join(text.split()) for text in process.stdout]
+    assert process.wait() == -signal.SIGKILL, f"it was to be killed at {pattern!r}, and said {said}"
+    return said
+
+
+def test_killed_in_each_stage_it_ends_with_the_same_numbers(smoke, tmp_path):
+    cache, out = tmp_path / "cache", tmp_path / "out"
+    arguments = ["--budget", "smoke", "--out", str(out), "--cache", str(cache)]
+    pauses = {"enhancer": 1.5, "noise GAN": 1.5, "false alarms": 0.7}  # long stages are killed well inside
+    for number, stage in enumerate(STAGES):
+        said = _start_and_kill(arguments, rf"{stage} \.\.\.", pauses.get(stage, 0.05))
+        for earlier in STAGES[: max(number - 1, 0)]:  # the last one before was killed in its turn and is done anew
+            assert any(line.startswith(earlier) and "(from the cache)" in line for line in said), "an earlier stage is found done"
+        assert not list(cache.glob(f"{stage}-*")), "no part of the killed stage stands under its name"
+    _start_and_kill(arguments, r"degraded [0-9.]+ s", 3)  # while it draws
+    for image in out.glob("[!.]*.png"):
+        assert image.read_bytes()[-8:-4] == b"IEND", "every figure is whole"
+    assert not (out / "results.json").exists()
+
+    done = _command(*arguments)
+    assert done.returncode == 0, done.stderr
+    found = _results(out)
+    assert found["from_cache"] == STAGES
+    assert _without_timing(found) == _without_timing(smoke.found), "to the last digit, in another cache"
+
+
+# -- full budget: exit codes and the README, with the work itself left out -------------------------------------------------
+
+
+@pytest.fixture
+def pretended(tmp_path, monkeypatch):
+    """In an empty folder: a full run whose verdicts are given, whose figures are empty and which trains nothing."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(figure_data, "FIGURE_DATA", dict.fromkeys(FIGURES, lambda experiment: {}))
+    monkeypatch.setattr(figures, "save", lambda name, data, folder, caption, is_smoke: [])
+    monkeypatch.setattr(page, "write_page", lambda folder, found, figures: folder / "report.html")
+
+    def run(*arguments, **verdicts):
+        records = [
+            {
+                "id": claim.id,
+                "expected": claim.expected,
+                "verdict": verdicts.get(claim.id, claim.expected),
+                "value": 1.0,
+                "close_call": claim.close_call,
+            }
+            | {key: "words" for key in ("sentence", "section", "figure", "statistic", "tolerance", "finding")}
+            for claim in claims.CLAIMS
+        ]
+        monkeypatch.setattr(claims, "judge", lambda all_of_them, experiment: records)
+        return main(["--cache", str(tmp_path / "cache"), *arguments])
+
+    return run
+
+
+def test_exit_code_is_0_as_expected_and_1_when_a_verdict_changed(pretended, tmp_path, capsys):
+    assert pretended() == 0 and (tmp_path / "figures" / "results.json").is_file()
+    assert "changed" not in capsys.readouterr().out
+    assert pretended(C2="not reproduced", C6="reproduced") == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "Verdicts that changed: C2, C6"
+    assert pretended(C1="reproduced", C5="partly") == 0, "a close call may fall to either side"
+    assert pretended("--budget", "smoke", C2="not reproduced") == 0, "a smoke run has no expected verdicts"
+    assert (tmp_path / "smoke" / "results.json").is_file()
+
+
+def test_a_full_run_into_figures_fills_the_readme_and_no_other_run_does(pretended, tmp_path):
+    readme = "# Title\n" + (ROOT / "README.md").read_text(encoding="utf-8").split("\n", 1)[1]
+    (tmp_path / "README.md").write_text(readme, encoding="utf-8")
+    for arguments in (["--out", "elsewhere"], ["--budget", "smoke"], ["--only", "fig02"]):
+        assert pretended(*arguments) == 0
+        assert (tmp_path / "README.md").read_text(encoding="utf-8") == readme
+    assert pretended() == 0
+    filled = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert filled.startswith("# [Re, in part] Title\n") and filled.count("| words (words) |") == filled.count("| words |") == 9
+
+
+def test_a_readme_of_somebody_else_does_not_spoil_a_run(pretended, tmp_path):
+    (tmp_path / "README.md").write_text("# My own project\n")
+    assert pretended() == 0
+    assert (tmp_path / "README.md").read_text() == "# My own project\n"

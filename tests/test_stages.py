@@ -1,0 +1,227 @@
+"""Stages: done once, found again, done anew when anything they depend on changed, and never left half done."""
+
+import ast
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import enhsim_tf
+from enhsim_tf.errors import InputError
+from enhsim_tf.reproduce import experiments, stages
+from enhsim_tf.reproduce.stages import Stages, default_cache, imports_of, load_arrays, save_arrays
+
+PACKAGE = Path(enhsim_tf.__file__).parent
+
+
+@pytest.fixture
+def rooms(tmp_path, monkeypatch):
+    """A package of three rooms: `upper` works with `lower`, `apart` stands by itself."""
+    package = tmp_path / "enhsim_tf"
+    (package / "reproduce").mkdir(parents=True)
+    (package / "reproduce" / "upper.py").write_text("from enhsim_tf.lower import x\n")
+    (package / "lower.py").write_text("x = 1\n")
+    (package / "apart.py").write_text("y = 1\n")
+    monkeypatch.setattr(stages, "_PACKAGE", package)
+    return package
+
+
+class Work:
+    """A stage that counts how often it is done, and all that it depends on."""
+
+    def __init__(self, cache):
+        self.cache, self.made = cache, []
+
+    def run(self, settings=("a", 1), rooms=("reproduce.upper",), fresh=False, name="work", before=None):
+        done = Stages(self.cache, fresh, tell=lambda line: None)
+        after = ()
+        if before is not None:
+            done.run("before", self.make, (), before)
+            after = ("before",)
+        folder = done.run(name, self.make, rooms, settings, after)
+        return folder, done.cached[name]
+
+    def make(self, folder):
+        self.made.append(folder)
+        (folder / "result.txt").write_text(str(len(self.made)))
+
+
+@pytest.fixture
+def work(tmp_path, rooms):
+    return Work(tmp_path / "cache")
+
+
+def test_a_stage_is_done_once_and_found_again(work):
+    first, cached = work.run()
+    assert not cached and first.parent == work.cache and (first / "result.txt").read_text() == "1"
+    again, cached = work.run()  # a second object, as in a second run
+    assert cached and again == first and len(work.made) == 1
+
+
+def test_what_it_depends_on_is_a_value_not_an_object(work):
+    from enhsim_tf.reproduce.settings import make_settings
+
+    first, _ = work.run(settings=make_settings("smoke", 1))
+    assert work.run(settings=make_settings("smoke", 1)) == (first, True)
+    assert work.run(settings=make_settings("smoke", 2)) != (first, True)
+
+
+@pytest.mark.parametrize("changed", ["settings", "name", "rooms", "upstream"])
+def test_a_changed_dependence_does_it_anew(work, changed):
+    first, _ = work.run(before="one")
+    turned = {"settings": {"settings": ("a", 2)}, "name": {"name": "other"}, "rooms": {"rooms": ("apart",)}, "upstream": {}}[changed]
+    folder, cached = work.run(before="two" if changed == "upstream" else "one", **turned)
+    assert not cached and folder != first
+    assert first.is_dir(), "what was done stays: turning back finds it"
+    assert work.run(before="one") == (first, True)
+
+
+def test_changed_code_of_a_room_or_of_one_below_does_it_anew(work, rooms):
+    first, _ = work.run()
+    (rooms / "apart.py").write_text("y = 2\n")
+    assert work.run() == (first, True), "a room it does not work with"
+    (rooms / "lower.py").write_text("x = 2\n")
+    second, cached = work.run()
+    assert not cached and second != first, "a room below"
+    (rooms / "reproduce" / "upper.py").write_text("from enhsim_tf.lower import x  # why\n")
+    third, cached = work.run()
+    assert not cached and third not in (first, second), "its own room"
+
+
+def test_changed_code_of_the_stage_itself_does_it_anew(tmp_path, rooms):
+    def one(folder):
+        save_arrays(folder, {"x": 1})
+
+    def two(folder):
+        save_arrays(folder, {"x": 2})
+
+    values = [load_arrays(Stages(tmp_path / "cache", tell=lambda line: None).run("work", make, (), ()))["x"] for make in (one, two, one)]
+    assert values == [1, 2, 1]
+
+
+def test_other_versions_do_it_anew(work, monkeypatch):
+    first, _ = work.run()
+    monkeypatch.setattr(stages, "VERSIONS", stages.VERSIONS | {"numpy": "0.0"})
+    folder, cached = work.run()
+    assert not cached and folder != first
+    assert set(stages.VERSIONS) >= {"tensorflow", "keras", "numpy", "pandas", "scikit-learn"}
+
+
+def test_fresh_does_it_anew_in_place_of_the_old(work):
+    first, _ = work.run()
+    folder, cached = work.run(fresh=True)
+    assert (folder, cached) == (first, False) and (folder / "result.txt").read_text() == "2"
+    assert work.run() == (first, True)
+    assert [path.name for path in work.cache.iterdir()] == [first.name]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_a_stage_that_fails_leaves_nothing(tmp_path, rooms, error):
+    def fails(folder):
+        (folder / "half.txt").write_text("half")
+        raise error
+
+    for _ in range(2):
+        with pytest.raises(error):
+            Stages(tmp_path / "cache", tell=lambda line: None).run("work", fails, (), ())
+        assert not list((tmp_path / "cache").iterdir())
+
+
+def test_what_a_killed_run_left_is_not_taken_for_a_stage(work):
+    folder, _ = work.run()
+    half = folder.with_name(f".{folder.name}.0123abcd.tmp")
+    folder.rename(half)  # as it lies there when the process is killed just before the last step
+    assert work.run() == (folder, False) and len(work.made) == 2
+    (folder / "stage.json").unlink()  # a folder of that name that is not a whole stage
+    assert work.run() == (folder, False) and len(work.made) == 3
+
+
+def test_times_and_lines_tell_what_was_done(work, monkeypatch):
+    clock = iter([10.0, 12.5])
+    monkeypatch.setattr(stages.time, "perf_counter", lambda: next(clock))
+    told = []
+    for _ in range(2):
+        done = Stages(work.cache, tell=told.append)
+        folder = done.run("work", work.make, (), ())
+        assert done.seconds == {"work": 2.5}, "the time it took when it was done"
+    assert [line.split() for line in told] == [["work", "..."], ["work", "2.5", "s"], ["work", "2.5", "s", "(from", "the", "cache)"]]
+    assert json.loads((folder / "stage.json").read_text()) == {"stage": "work", "seconds": 2.5}
+
+
+def test_arrays_come_back_as_they_went(tmp_path):
+    arrays = {
+        "series": np.linspace(0, 1, 7, dtype=np.float32).reshape(7, 1),
+        "times": np.array(["2020-01-01T00:00:00.123"], "datetime64[ms]"),
+        "names": np.array(["stuck", "gain_loss"]),
+        "empty": np.zeros((0, 3)),
+        "flag": np.array(True),
+    }
+    save_arrays(tmp_path, arrays | {"number": 0.1}, "those")
+    found = load_arrays(tmp_path, "those")
+    assert set(found) == {*arrays, "number"} and found["number"].shape == () and found["number"] == 0.1
+    for key, array in arrays.items():
+        assert found[key].dtype == array.dtype and np.array_equal(found[key], array)
+    save_arrays(tmp_path, {"objects": np.array([{}], object)})
+    with pytest.raises(ValueError, match="pickle"):
+        load_arrays(tmp_path)
+
+
+def test_where_the_cache_is(tmp_path, monkeypatch, rooms):
+    monkeypatch.delenv("ENHSIM_TF_CACHE", raising=False)
+    assert default_cache() == Path.home() / ".cache" / "enhsim_tf"  # an installed package has no checkout around it
+    (rooms.parent / "pyproject.toml").touch()
+    assert default_cache() == rooms.parent / ".cache"
+    monkeypatch.setenv("ENHSIM_TF_CACHE", str(tmp_path / "elsewhere"))
+    assert default_cache() == tmp_path / "elsewhere"
+
+
+def test_a_cache_that_cannot_be_written_is_a_users_mistake(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="writ"):
+        Stages(tmp_path / "file" / "cache")
+
+
+def test_imports_of_reads_every_form():
+    source = "import os\nfrom enhsim_tf.noise import a, b\nfrom enhsim_tf import signals, files as f\n"
+    source += "from enhsim_tf.reproduce.data import c\nfrom enhsim_tf.reproduce import report\n"
+    source += "def g():\n    from enhsim_tf.enhancer import d\n    import numpy\n"
+    assert sorted(imports_of(source)) == ["enhancer", "files", "noise", "reproduce.data", "reproduce.report", "signals"]
+
+
+def test_the_rooms_of_every_stage_import_in_a_form_that_its_hash_follows():
+    waiting, seen = {room for rooms in vars(experiments).values() if isinstance(rooms, tuple) for room in rooms}, set()
+    while waiting - seen:
+        seen.add(room := (waiting - seen).pop())
+        source = (PACKAGE / f"{room.replace('.', '/')}.py").read_text(encoding="utf-8")  # each name is a room's
+        waiting |= set(imports_of(source))
+        for node in ast.walk(ast.parse(source)):
+            assert not (isinstance(node, ast.Import) and any(alias.name.startswith("enhsim_tf") for alias in node.names)), room
+            assert not (isinstance(node, ast.ImportFrom) and node.level), room
+    networks = {
+        "enhancer",
+        "noise_gan",
+        "convolution_maximum",
+        "noise",
+        "simulator",
+        "telemetry",
+        "store",
+        "signals",
+        "fidelity",
+        "detectors",
+    }
+    assert networks <= seen
+
+
+def test_how_the_networks_are_put_together_is_part_of_the_measured_stages(tmp_path, monkeypatch):
+    shutil.copytree(PACKAGE, tmp_path / "enhsim_tf")
+    monkeypatch.setattr(stages, "_PACKAGE", tmp_path / "enhsim_tf")
+
+    def key():
+        return Stages(tmp_path / "cache", tell=lambda line: None).run("work", lambda folder: None, experiments._MEASURED, ()).name
+
+    before = key()
+    (room,) = (file for file in (tmp_path / "enhsim_tf" / "reproduce").glob("*.py") if "return EnhancedSimulator(" in file.read_text())
+    room.write_text(room.read_text().replace("return EnhancedSimulator(", "return 2 * EnhancedSimulator("))
+    assert key() != before, f"what the claims are measured on was changed in {room.name}, and the cache does not see it"
