@@ -1,5 +1,6 @@
 """What a run leaves behind: the table on the terminal, `results.json`, and the generated parts of the README."""
 
+import collections
 import json
 import math
 import platform
@@ -88,12 +89,14 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
     """The claims as a Markdown table, with the range over seeds where it is known."""
     lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value = short(claim["value"])
+        value, verdict = short(claim["value"]), f"**{claim['verdict']}**"
         if spread is not None and spread["claims"][claim["id"]]["range"] is not None:
             value += " ({} to {})".format(*map(short, spread["claims"][claim["id"]]["range"]))
+            counted = collections.Counter(spread["claims"][claim["id"]]["verdicts"])
+            verdict += f" (over seeds: {', '.join(f'{number} {name}' for name, number in counted.items())})" if len(counted) > 1 else ""
         lines.append(
             f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "
-            f"| **{claim['verdict']}** | {claim['finding']} |"
+            f"| {verdict} | {claim['finding']} |"
         )
     seeds = "" if spread is None else f"; in brackets the range over seeds {', '.join(map(str, spread['seeds']))}"
     return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget{seeds}. From `figures/results.json`."

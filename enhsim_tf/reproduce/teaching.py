@@ -44,13 +44,17 @@ class Arrays(dict):
         return "\n".join(f"{name}: {np.shape(values)} {np.asarray(values).dtype}" for name, values in self.items())
 
 
+class _MissingStageError(Exception):
+    """A stage that was looked for and is still to be done."""
+
+
 class _Lookup(Stages):
     """Stages that are looked for and never done."""
 
     def run(self, name, make, *others, **options):
         @functools.wraps(make)  # a stage is found by the source of what makes it
         def refuse(folder):
-            raise LookupError(name)
+            raise _MissingStageError(name)
 
         return super().run(name, refuse, *others, **options)
 
@@ -67,16 +71,13 @@ def open_experiment(budget: str | None = None) -> Experiment:
     budget = budget or os.environ.get("ENHSIM_TF_BUDGET", "full")
     if budget not in _TAKES:
         raise InputError(f"Expected ENHSIM_TF_BUDGET to be one of: {', '.join(_TAKES)}. Received: {budget!r}.")
-    settings, cache = make_settings(budget), default_cache()
+    settings, cache, results = make_settings(budget), default_cache(), _ROOT / "figures" / "results.json"
+    took = json.loads(results.read_text(encoding="utf-8")) if results.is_file() else {}
+    known = took["timings"] if took.get("budget") == budget else {}
     missing = prepare(Experiment(settings, _Lookup(cache, tell=lambda line: None)))
-    results = _ROOT / "figures" / "results.json"
-    took = json.loads(results.read_text(encoding="utf-8")) if results.is_file() else {"budget": None}
-    known = {stage: f"about {seconds:.0f} s" for stage, seconds in took["timings"].items()} if took["budget"] == budget else {}
-    todo = ", ".join(f"{stage} ({known.get(stage, _TAKES[budget])})" for stage in missing)
-    print(
-        f"{budget.capitalize()} budget, seed {settings.seed}.",
-        f"Still to do, when first needed: {todo}." if todo else "Everything is ready.",
-    )
+    todo = [f"{stage} (about {known[stage]:.0f} s)" if stage in known else f"{stage} ({_TAKES[budget]})" for stage in missing]
+    print(f"{budget.capitalize()} budget, seed {settings.seed}.", end=" ")
+    print(f"Still to do, when first needed: {', '.join(todo)}." if todo else "Everything is ready.")
     start_tensorflow()
     logging.getLogger("tensorflow").setLevel("ERROR")  # its advice on speed is for loops, not for notebooks
     return Experiment(settings, Stages(cache, tell=lambda line: None if line.endswith("(from the cache)") else print(line)), verbose=1)
@@ -88,7 +89,7 @@ def prepare(experiment: Experiment) -> list[str]:
     for stage, attribute in _STAGES.items():
         try:
             getattr(experiment, attribute)
-        except LookupError:
+        except _MissingStageError:
             missing.append(stage)
     return missing
 
@@ -125,7 +126,8 @@ def claim(*ids: str) -> None:
     """Shows claims of the paper, from the ledger: the sentence, where it stands, and what it is held to."""
     for known in (_LEDGER[id] for id in ids):
         held = f"{known.statistic}; {known.tolerance}"
-        display(Markdown(f"> **{known.id}** (paper: {known.section}) {known.sentence}\n>\n> *We hold it to:* {held}."))
+        place = f"section {known.section}" if known.section[0].isdigit() else known.section
+        display(Markdown(f"> **{known.id}** (paper, {place}): {known.sentence}\n>\n> *We hold it to:* {held}."))
 
 
 def verdict(experiment: Experiment, *ids: str) -> list[dict]:
