@@ -128,7 +128,13 @@ class EnhancedSimulator:
         return cls(coarse, network, gan, telemetry.interval_s, offset, scale, trained)
 
     def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
-        """Coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`."""
+        """Generates coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`.
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Seed of everything drawn; the same seed gives the same.
+        """
         rng = np.random.default_rng(seed)
         begins = rng.integers(0, _START_RANGE, num_windows)
         return self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
@@ -158,7 +164,13 @@ class EnhancedSimulator:
         return windows
 
     def generate_chunks(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> Iterator[np.ndarray]:
-        """Yields the windows of `generate` in turn, some thousand at a time: any number of them in the same memory."""
+        """Yields the windows of `generate` in turn, some thousand at a time: any number of them in the same memory.
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Seed of everything drawn; the same seed gives the same.
+        """
         rng, noise_rng = np.random.default_rng(seed), _noise_rng(seed)
         begins = rng.integers(0, _START_RANGE, num_windows)
         for first in range(0, num_windows, _CHUNK):
@@ -168,7 +180,14 @@ class EnhancedSimulator:
             yield windows
 
     def generate_to_parquet(self, path: str | os.PathLike, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> None:
-        """Writes the windows of `generate` to a Parquet file as they are made; the memory needed does not grow with their number."""
+        """Writes the windows of `generate` to a Parquet file as they are made; the memory needed does not grow with their number.
+
+        Args:
+            path: The file.
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Seed of everything drawn; the same seed gives the same.
+        """
         write_windows(path, self.generate_chunks(num_windows, scenario, seed), self.window)
 
     def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
@@ -210,7 +229,14 @@ class EnhancedSimulator:
         return (signal / total + power / np.sqrt(total))[:num_samples].astype(np.float32)
 
     def save(self, folder: str | os.PathLike) -> None:
-        """Saves to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums."""
+        """Saves to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
+
+        Raises:
+            InputError: If something else than a saved simulator stands there, which is left as it is.
+        """
+        folder = Path(folder)
+        if folder.exists() and not (folder / "manifest.json").is_file() and not (folder.is_dir() and not any(folder.iterdir())):
+            raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which holds something else.")
         with replace_folder(folder) as temporary:
             for name, model in zip(_NETWORKS, (self.enhancer, self.noise.generator, self.noise.discriminator), strict=True):
                 model.save(temporary / f"{name}.keras", include_optimizer=False)
@@ -221,10 +247,11 @@ class EnhancedSimulator:
                 "offset": self.offset,
                 "scale": self.scale,
                 "trained": self.trained,
+                "keras": keras.__version__,
             }
             write_json(temporary / "settings.json", settings)
             checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
-            write_json(temporary / "manifest.json", {"format": _FORMAT, "keras": keras.__version__, "sha256": checksums})
+            write_json(temporary / "manifest.json", {"format": _FORMAT, "sha256": checksums})
 
     @classmethod
     def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
@@ -237,8 +264,9 @@ class EnhancedSimulator:
         try:
             manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
             known, checksums = manifest["format"] == _FORMAT, manifest["sha256"]
-            complete = set(checksums) == {"settings.json", *(f"{name}.keras" for name in _NETWORKS)}
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            complete = set(checksums) == {"settings.json", *(f"{name}.keras" for name in _NETWORKS)} and len(manifest) == 2
+            checksums = dict(checksums)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError(f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__}).") from None
         if not (known and complete):
             raise InputError(f"Expected the format {_FORMAT}. Received: {str(manifest['format'])[:80]!r} in {folder}.")

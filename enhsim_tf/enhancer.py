@@ -85,11 +85,15 @@ def fit_windows(
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
     """
     model.compile(fused_adam(learning_rate), loss="mean_squared_error", jit_compile=jit_compile)
-    order = tf.data.Dataset.from_tensor_slices((inputs, targets)).shuffle(len(inputs), seed=seed)
+    rng = np.random.default_rng(seed)
+    orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
+    inputs, targets = tf.constant(inputs), tf.constant(targets)
+    batches = tf.data.Dataset.from_tensor_slices(orders).flat_map(lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size))
     held_out = None if validation is None else tf.data.Dataset.from_tensor_slices(validation).batch(256)
     history = model.fit(
-        order.batch(batch_size).prefetch(2),
+        batches.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows))).prefetch(2),
         epochs=epochs,
+        steps_per_epoch=-(-len(inputs) // batch_size),
         validation_data=held_out,
         callbacks=list(callbacks),
         verbose=verbose,
@@ -99,12 +103,30 @@ def fit_windows(
 
 
 def enhance(model: keras.Model, coarse: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
-    """Maps coarse windows to enhanced ones (step 5), float32 of shape `(windows, samples)`."""
+    """Maps coarse windows to enhanced ones (step 5).
+
+    Args:
+        model: The enhancing network.
+        coarse: Coarse windows, shape `(windows, samples)`.
+        batch_size: Windows a call of the network.
+
+    Returns:
+        float32 array of shape `(windows, samples)`.
+    """
     return predict_windows(model, np.asarray(coarse, np.float32), batch_size)
 
 
 def predict_windows(model: keras.Model, inputs: np.ndarray, batch_size: int) -> np.ndarray:
-    """What `model.predict` gives, without its data pipeline: the batches are slices, written to where they belong."""
+    """What `model.predict` gives, without its data pipeline: the batches are slices, written to where they belong.
+
+    Args:
+        model: A Keras model.
+        inputs: float32 array whose first axis counts the rows.
+        batch_size: Rows a call of the model.
+
+    Returns:
+        The model's output for all rows.
+    """
     if len(inputs) <= batch_size:
         return np.asarray(model.predict_on_batch(inputs)) if len(inputs) else np.empty((0, *model.output_shape[1:]), np.float32)
     outputs = np.empty((len(inputs), *model.output_shape[1:]), np.float32)

@@ -71,7 +71,7 @@ def window_features(windows: np.ndarray) -> np.ndarray:
     steps = np.std(np.diff(values, axis=1), axis=1)
     correlation = np.mean(centred[:, 1:] * centred[:, :-1], axis=1) / variance
     power = np.abs(np.fft.rfft(centred, axis=1)) ** 2
-    edges = np.unique(np.geomspace(1, power.shape[1], 9).astype(int))
+    edges = np.unique(np.rint(np.geomspace(1, power.shape[1], 9)).astype(int))
     bands = [np.log(power[:, a:b].mean(axis=1) + tiny) for a, b in zip(edges[:-1], edges[1:], strict=True)]
     columns = [mean, np.log(variance) / 2, kurtosis, values.max(axis=1), np.log(steps + tiny), correlation, *bands]
     return np.stack(columns, axis=1)
@@ -82,6 +82,18 @@ def two_sample_auc(generated: np.ndarray, real: np.ndarray, seed: int, num_folds
 
     A two-sample test (Lopez-Paz and Oquab 2017): gradient-boosted trees, area under the ROC curve over held-out folds of
     consecutive windows, so that neighbours in time are never on both sides.
+
+    Args:
+        generated: Generated windows, shape `(windows, samples)`.
+        real: Real windows in the order of time; the smaller of both numbers is used.
+        seed: Seed of the trees.
+        num_folds: Number of folds.
+
+    Returns:
+        The area, from 0 to 1.
+
+    Raises:
+        InputError: If there are fewer than two windows a fold.
     """
     from sklearn.ensemble import HistGradientBoostingClassifier
     from sklearn.metrics import roc_auc_score

@@ -145,11 +145,7 @@ class NoiseGAN:
             self._update_discriminator(generated, self._tags(GENERATED))
 
         # the generator learns through the combined model: the tags are reversed, only its own weights move
-        with tf.GradientTape() as tape:
-            judged = self._judge(self.generator(self._draw_latent(self.seeds), training=True))
-            loss = self.loss(self._tags(REAL), judged)
-        weights = self.generator.trainable_variables
-        self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
+        self._update_generator()
 
     def _update_discriminator(self, rows: tf.Tensor, tags: tf.Tensor) -> None:
         weights = self.discriminator.trainable_variables
@@ -157,6 +153,13 @@ class NoiseGAN:
             tape.watch([weight.value for weight in weights])
             loss = self.loss(tags, self._judge(rows))
         self.discriminator_optimizer.apply(tape.gradient(loss, weights), weights)
+
+    def _update_generator(self) -> None:
+        with tf.GradientTape() as tape:
+            judged = self._judge(self.generator(self._draw_latent(self.seeds), training=True))
+            loss = self.loss(self._tags(REAL), judged)
+        weights = self.generator.trainable_variables
+        self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
 
     def _judge(self, rows: tf.Tensor) -> tf.Tensor:
         """The discriminator in training mode, its first layers by the fast path where they are what that computes."""

@@ -21,5 +21,14 @@ def sines(time_s: np.ndarray, periods_s: Sequence[float], amplitudes: Sequence[f
 
 
 def white_noise(num_samples: int, standard_deviation: float, rng: np.random.Generator) -> np.ndarray:
-    """Independent Gaussian noise, float64 of shape `(num_samples,)`."""
+    """Independent Gaussian noise.
+
+    Args:
+        num_samples: Number of samples.
+        standard_deviation: In the unit of the signal.
+        rng: Draws the noise.
+
+    Returns:
+        float64 array of shape `(num_samples,)`.
+    """
     return rng.normal(0.0, standard_deviation, num_samples)

@@ -121,7 +121,7 @@ def degrade(
         return signal(time_s)
     severity, (low, high) = scenario.severity, levels
     num_windows, num_samples = time_s.shape
-    onset = int(scenario.onset * num_samples)
+    onset = int(round(scenario.onset * num_samples, 6))
     time_s, late = time_s.copy(), time_s[:, onset:]
     begin = late[:, :1]
 
@@ -266,6 +266,16 @@ def units_of(coarse: SquareWaveSimulator) -> tuple[float, float]:
 
 
 def paired_windows(telemetry: Telemetry, coarse: SquareWaveSimulator, offsets: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coarse and true windows of the same times (steps 3 and 4): two float32 arrays of shape `(windows, samples)`."""
+    """Coarse and true windows of the same times (steps 3 and 4).
+
+    Args:
+        telemetry: The true series.
+        coarse: The coarse simulator.
+        offsets: First sample of each window, shape `(windows,)`.
+        window: Samples of a window.
+
+    Returns:
+        `(coarse, true)`, two float32 arrays of shape `(windows, window)`.
+    """
     times = telemetry.offset_s + telemetry.interval_s * (np.asarray(offsets)[:, None] + np.arange(window))
     return coarse.simulate(times), cut_windows(telemetry.values, offsets, window)

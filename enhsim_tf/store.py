@@ -72,6 +72,8 @@ class ParquetStore:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
+        if not telemetry.name or not len(telemetry):
+            raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
         make_folder(self.folder)
         start = np.datetime64((telemetry.start or "1970-01-01").removesuffix("+00:00"), "ns")
         since_start = np.round(telemetry.time_s * 1e9).astype(np.int64)
@@ -112,9 +114,9 @@ class ParquetStore:
             times = table["time"].cast(pa.int64()).to_numpy()
         except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
             raise InputError(
-                f"Expected Parquet files of this store in {files[0].parent}. Received: {error}. Write the series again."
+                f"Expected Parquet files of this store in {files[0].parent}. Received: {str(error).splitlines()[0]}. Write the series again."
             ) from None
-        if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 2:
+        if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 1e-3 * interval_s * 1e9:
             raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
         return Telemetry(values, interval_s, offset_s, about["start"] or None, about["name"], about["unit"])
 

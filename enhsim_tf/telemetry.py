@@ -106,7 +106,7 @@ def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str
     Raises:
         InputError: If the file cannot be read, the column is not there, or the values or times cannot be used.
     """
-    path = Path(path)
+    path, column = Path(path), None if column is None else str(column)
     if not path.is_file():
         raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is no file. Check the path.")
     readers = {".npy": _read_array, ".csv": _read_table, ".parquet": _read_table}
@@ -170,9 +170,11 @@ def _regular_interval(times, what: str) -> tuple[float, str]:
 
     numeric = pd.api.types.is_numeric_dtype(times)
     try:
-        stamps = pd.to_datetime(times, unit="s", utc=True) if numeric else pd.to_datetime(times, utc=True)
+        stamps = pd.to_datetime(times, unit="s", utc=True) if numeric else pd.to_datetime(times, utc=True, format="ISO8601")
     except (ValueError, TypeError):
-        raise InputError(f"Expected times as date-times or seconds. Received: {times.iloc[0]!r} in {what}. Name another --time.") from None
+        raise InputError(
+            f"Expected times as ISO 8601 date-times or seconds. Received: {times.iloc[0]!r} in {what}. Name another --time."
+        ) from None
     steps = np.diff(stamps.dt.tz_convert(None).to_numpy().astype("datetime64[ns]").astype(np.int64)) / 1e9
     interval = float(np.median(steps)) if len(steps) else 0.0
     if stamps.isna().any() or interval <= 0 or np.abs(steps - interval).max() > 0.01 * interval:
@@ -203,7 +205,20 @@ def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) ->
 
 
 def random_offsets(num_samples: int, window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
-    """First samples of windows "whose beginning and end are offset by a random amount" (paper, section 2.2)."""
+    """First samples of windows "whose beginning and end are offset by a random amount" (paper, section 2.2).
+
+    Args:
+        num_samples: Length of the series.
+        window: Samples of a window.
+        num_windows: Number of windows.
+        rng: Draws the offsets.
+
+    Returns:
+        Integer array of shape `(num_windows,)`.
+
+    Raises:
+        InputError: If the series is shorter than a window.
+    """
     if num_samples < window:
         raise InputError(f"Expected at least one window of {window} samples. Received: {num_samples} samples. Give a longer series.")
     return rng.integers(0, num_samples - window + 1, num_windows)
@@ -215,10 +230,28 @@ def disjoint_offsets(num_samples: int, window: int) -> np.ndarray:
 
 
 def even_offsets(num_samples: int, window: int, num_windows: int) -> np.ndarray:
-    """First samples of windows spread evenly over a series, in the order of time."""
+    """First samples of windows spread evenly over a series, in the order of time.
+
+    Args:
+        num_samples: Length of the series.
+        window: Samples of a window.
+        num_windows: Number of windows.
+
+    Returns:
+        Integer array of shape `(num_windows,)`.
+    """
     return np.linspace(0, num_samples - window, num_windows).astype(np.int64)
 
 
 def cut_windows(values: np.ndarray, offsets: np.ndarray, window: int) -> np.ndarray:
-    """The windows of `values` that begin at `offsets`, shape `(windows, samples)`."""
+    """Cuts windows out of a series.
+
+    Args:
+        values: Series of shape `(samples,)`.
+        offsets: First sample of each window, shape `(windows,)`.
+        window: Samples of a window.
+
+    Returns:
+        Array of shape `(windows, window)`, of the type of `values`.
+    """
     return np.lib.stride_tricks.sliding_window_view(values, window)[offsets]

@@ -6,6 +6,7 @@ Everything that the stages of `experiments` share and that trains nothing.
 import dataclasses
 import functools
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,13 @@ _MIN_DISJOINT = 20  # disjoint windows below which a part is read through overla
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Where real telemetry comes from: a file, and which of its columns."""
+    """Where real telemetry comes from.
+
+    Args:
+        path: The file.
+        column: Which column holds the values.
+        time: Which column holds the times, or None.
+    """
 
     path: Path
     column: str | None = None
@@ -31,7 +38,17 @@ class Source:
 
 @dataclasses.dataclass(frozen=True)
 class Channel:
-    """One series with its parts, its coarse simulator and, where known in closed form, its true signal."""
+    """One series with its parts, its coarse simulator and, where known in closed form, its true signal.
+
+    Args:
+        telemetry: The whole series.
+        train: Its training part.
+        calibration: The part that thresholds come from, or None.
+        test: The part that everything is measured on.
+        coarse: Its coarse simulator.
+        periods_s: Periods of the sines it is made of, or None where nobody knows.
+        amplitudes: Their amplitudes, or None.
+    """
 
     telemetry: Telemetry
     train: Telemetry
@@ -42,7 +59,7 @@ class Channel:
     amplitudes: tuple[float, ...] | None = None
 
     @property
-    def truth(self):
+    def truth(self) -> Callable[[np.ndarray], np.ndarray] | None:
         """The noiseless signal as a function of time, or None where nobody knows it."""
         return None if self.periods_s is None else functools.partial(sines, periods_s=self.periods_s, amplitudes=self.amplitudes)
 
@@ -59,8 +76,8 @@ def waves_of(settings: Settings) -> dict[str, tuple[tuple[float, ...], tuple[flo
 
 
 def least_part(settings: Settings) -> int:
-    """Fewest samples of a part: a window, and what the moving average cuts off around it."""
-    return settings.telemetry.window + settings.noise.moving_average - 1
+    """Fewest samples of a part: ten overlapping windows of noise, and what the moving average cuts off around them."""
+    return settings.telemetry.window + 9 + settings.noise.moving_average - 1
 
 
 def draw(settings: Settings, purpose: str) -> np.random.Generator:
@@ -69,7 +86,13 @@ def draw(settings: Settings, purpose: str) -> np.random.Generator:
 
 
 def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -> None:
-    """Places the telemetry in the store: the paper's example, or a real channel."""
+    """Places the telemetry in the store: the paper's example, or a real channel.
+
+    Args:
+        store: The store.
+        settings: Every number.
+        source: A file of real telemetry, or None for the paper's example.
+    """
     chosen = settings.telemetry
     if source is not None:
         store.write(read_telemetry(source.path, source.column, source.time, 2 * least_part(settings)))
@@ -154,7 +177,16 @@ class Data:
         return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}
 
     def noise_windows(self, part: str, num_windows: int | None, purpose: str = "") -> np.ndarray:
-        """Windows of the noise that the moving average leaves of a part; arguments as of `windows`."""
+        """Windows of the noise that the moving average leaves of a part.
+
+        Args:
+            part: `train`, `calibration` or `test`.
+            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
+            purpose: Names the draw of the offsets.
+
+        Returns:
+            float32 array of shape `(windows, samples)`.
+        """
         rng = self.draw(purpose)
         noises = [extract_noise(getattr(channel, part).values, self.settings.noise.moving_average)[0] for channel in self.channels]
         return np.concatenate([cut_windows(noise, self._offsets(len(noise), num_windows, rng), self.window) for noise in noises])

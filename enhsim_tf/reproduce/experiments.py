@@ -6,6 +6,7 @@ Each property is done when a figure or a claim asks for it, once, and kept by `s
 import functools
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from enhsim_tf.reproduce.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.simulator import MODES, Degraded
 from enhsim_tf.store import ParquetStore
 from enhsim_tf.terminal import start_tensorflow
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 _DATA = ("reproduce.data",)
 _ENHANCER = (*_DATA, "enhancer")
@@ -146,7 +150,7 @@ class Experiment:
         return load_arrays(self.noise_folder)
 
     @functools.cached_property
-    def simulator(self):
+    def simulator(self) -> "EnhancedSimulator":
         """The `EnhancedSimulator` of the first channel, put together from both networks."""
         start_tensorflow()
         import keras

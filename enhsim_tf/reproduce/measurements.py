@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from enhsim_tf import fidelity
 from enhsim_tf.detectors import DenseAutoencoder, IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.reproduce.settings import DetectorSettings
 from enhsim_tf.simulator import Degraded
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 
 def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, float]:
@@ -62,8 +66,14 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
     return measures | ranks | {"num_windows": float(len(real))}
 
 
-def speed(simulator, num_windows: int, repeats: int = 5) -> dict[str, float]:
-    """Seconds of telemetry made in one second of work, coarse and with everything; medians over repeats."""
+def speed(simulator: "EnhancedSimulator", num_windows: int, repeats: int = 5) -> dict[str, float]:
+    """Seconds of telemetry made in one second of work, coarse and with everything; medians over repeats.
+
+    Args:
+        simulator: The enhanced simulator.
+        num_windows: Windows generated at a time.
+        repeats: How often.
+    """
     seconds = {"coarse": [], "generate": []}
     simulator.generate(num_windows, seed=0)  # the first call builds the networks' functions
     for repeat in range(repeats):

@@ -22,7 +22,14 @@ PAPER = "the paper's example"  # what `results.json` names as the source where n
 
 
 def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s: float) -> dict[str, Any]:
-    """Everything a run found, as `results.json` holds it; each stage with the seconds it took when it was done."""
+    """Everything a run found, as `results.json` holds it; each stage with the seconds it took when it was done.
+
+    Args:
+        experiment: What was run.
+        claims: The judged claims.
+        drawn_s: Seconds that the figures took.
+        total_s: Seconds that this run took.
+    """
     stages = experiment.stages
     timings = stages.seconds | {"figures": drawn_s}
     return {

@@ -28,7 +28,16 @@ FIGURES = (
 
 
 def setting(value: Any, unit: str, source: str, paper: str = "-", author: str = "-", smoke: Any = None) -> Any:
-    """A field with its unit, its source, what the paper and the author's code say, and its count in a smoke run."""
+    """A field with its number and where that comes from.
+
+    Args:
+        value: The number.
+        unit: Its unit; for words what the choices are.
+        source: Where it comes from, and for ours the reason.
+        paper: What the paper says.
+        author: What the author's public code says.
+        smoke: Its count in a smoke run, for counts.
+    """
     about = {"unit": unit, "source": source, "paper": paper, "author": author, "smoke": smoke}
     return dataclasses.field(default=value, metadata=about)
 

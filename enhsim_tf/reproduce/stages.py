@@ -77,7 +77,13 @@ class Stages:
 
 
 def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -> None:
-    """Keeps arrays and numbers of a stage."""
+    """Keeps arrays and numbers of a stage.
+
+    Args:
+        folder: Where.
+        arrays: Arrays and numbers by name.
+        name: Name of the file, without its `.npz`.
+    """
     np.savez_compressed(folder / f"{name}.npz", **{key: np.asarray(value) for key, value in arrays.items()})
 
 

@@ -106,7 +106,14 @@ def show(experiment: Experiment, name: str) -> Arrays:
 
 @contextlib.contextmanager
 def drawing(alt: str, columns: int = 1, height: float = 2.4, **shared: bool) -> Iterator:
-    """A row of panels in the style of all, shown when the `with` block ends; `alt` says in words what they show."""
+    """A row of panels in the style of all, shown when the `with` block ends.
+
+    Args:
+        alt: What they show, in words.
+        columns: Number of panels.
+        height: Height in inches.
+        **shared: What `matplotlib.figure.Figure.subplots` takes, for example `sharey`.
+    """
     with matplotlib.style.context(("default", Path(__file__).with_name("style.mplstyle"))):
         figure = matplotlib.figure.Figure(figsize=(7.2, height), layout="constrained")
         yield figure.subplots(1, columns, **shared)
