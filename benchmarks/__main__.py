@@ -1,6 +1,7 @@
 """`python -m benchmarks`: measures, prints the table, writes `benchmarks/results.json` and draws two figures from it."""
 
 import argparse
+import dataclasses
 import json
 import os
 import platform
@@ -17,11 +18,14 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
     parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
     parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
+    parser.add_argument("--repetitions", type=int, help="of each comparison, instead of the budget's 7")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results.json", help="the results (default: %(default)s)")
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder of the figures (default: %(default)s)")
     options = parser.parse_args(arguments)
     if options.quick and options.out == parser.get_default("out"):
         parser.error("--quick needs another --out: results.json holds measurements")
+    if options.repetitions is not None and options.repetitions < 1:
+        parser.error(f"--repetitions must be 1 or more, not {options.repetitions}")
     return options
 
 
@@ -63,6 +67,8 @@ def main(arguments: list[str] | None = None) -> int:
     from enhsim_tf.files import write_json
 
     budget, began = room.QUICK if options.quick else room.Budget(), time.time()
+    if options.repetitions:
+        budget = dataclasses.replace(budget, repetitions=options.repetitions)
     kept = json.loads(options.out.read_text())["rows"] if options.only and options.out.exists() else []
     found = []
     for name in ROWS:
