@@ -45,25 +45,12 @@ def machine() -> dict:
     }
 
 
-def line_of(row: dict) -> str:
-    """A row of the table."""
-    if "skipped" in row:
-        return f"{row['work']:50} {row['comparison']:24} skipped: {row['skipped']}"
-    if "growth" in row:
-        ends = [", ".join(f"{key} {value:.4g}" for key, value in each.items() if not isinstance(value, dict)) for each in row["growth"]]
-        return "\n    ".join([row["work"], *ends])
-    ours, unit, ratio = row["ours"], row["unit"], row["ratio"]
-    bar = f"<= {row['bar']:.2f}" if row.get("bar") else f"< {row['bar_s']} s" if "bar_s" in row else ""
-    words = {True: "reached", False: "NOT REACHED", None: ""}[row["reached"]]
-    measured = f"{ours['median']:8.3g} {unit:2}  {ratio['median']:5.2f} ({ratio['low']:.2f} to {ratio['high']:.2f})"
-    return f"{row['work']:50} {row['comparison']:24} {measured:32} {bar:8} {words}"
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command."""
     options = parse(arguments)
     from benchmarks import rows as room
     from benchmarks.figures import draw
+    from benchmarks.report import fill_readme, line_of
     from enhsim_tf.files import write_json
 
     budget, began = room.QUICK if options.quick else room.Budget(), time.time()
@@ -86,6 +73,8 @@ def main(arguments: list[str] | None = None) -> int:
     write_json(options.out, made)
     for file in [options.out, *draw(made, options.figures)]:
         print(file)
+    if options.out == Path(__file__).parent / "results.json":
+        fill_readme(Path(__file__).parents[1] / "README.md", made)
     return 0
 
 

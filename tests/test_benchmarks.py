@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks import rows
-from benchmarks.__main__ import ROWS, line_of, main, parse
+from benchmarks.__main__ import ROWS, main, parse
 from benchmarks.figures import draw
+from benchmarks.report import fill_readme, line_of, markdown
 from benchmarks.worker import Worker
 
 
@@ -84,10 +85,24 @@ def test_a_quick_run_measures_and_keeps_other_rows(tmp_path, monkeypatch):
     out = tmp_path / "results.json"
     kept = {"of": "gan", "work": "GAN iteration", "comparison": "x", "skipped": "y", "unit": "ms"}
     out.write_text(json.dumps({"rows": [kept]}))
-    assert main(["--quick", "--only", "loading", "--only", "starting", "--out", str(out), "--figures", str(tmp_path)]) == 0
+    assert main(["--quick", "--only", "loading", "--out", str(out), "--figures", str(tmp_path)]) == 0
     found = json.loads(out.read_text())
     assert found["quick"] is True and kept in found["rows"]
     (loading,) = [row for row in found["rows"] if row["of"] == "loading"]
     assert loading["ratio"]["low"] <= loading["ratio"]["median"] <= loading["ratio"]["high"]
     assert np.isfinite(loading["ours"]["median"]) and loading["peak_mb"] > 100
     assert {row["of"] for row in found["rows"]} <= set(ROWS)
+
+
+def test_the_readme_gets_the_table_between_its_markers(tmp_path):
+    slow = measured("enhancer step", "plain fit", 90.0, 100.0)
+    found = {"rows": [slow, {"work": "a", "comparison": "b", "skipped": "no c"}], "machine": {"cores": 2, "tensorflow": "1.0"}}
+    path = tmp_path / "README.md"
+    path.write_text("before\n<!-- speed: generated -->\nold\n<!-- end of speed -->\nafter\n")
+    fill_readme(path, found)
+    text = path.read_text()
+    assert text == f"before\n<!-- speed: generated -->\n{markdown(found)}\n<!-- end of speed -->\nafter\n"
+    assert "| enhancer step | 90 ms | plain fit | 0.90 (0.90 to 0.90) | at most 0.70 | **not reached** |" in text and "no c" in text
+    path.write_text("no markers")
+    fill_readme(path, found)
+    assert path.read_text() == "no markers"
