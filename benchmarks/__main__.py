@@ -1,6 +1,7 @@
 """`python -m benchmarks`: measures, prints the table, writes `benchmarks/results.json` and draws two figures from it."""
 
 import argparse
+import dataclasses
 import json
 import os
 import platform
@@ -17,11 +18,14 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
     parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
     parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
+    parser.add_argument("--repetitions", type=int, help="of each comparison, instead of the budget's 7")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results.json", help="the results (default: %(default)s)")
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder of the figures (default: %(default)s)")
     options = parser.parse_args(arguments)
     if options.quick and options.out == parser.get_default("out"):
         parser.error("--quick needs another --out: results.json holds measurements")
+    if options.repetitions is not None and options.repetitions < 1:
+        parser.error(f"--repetitions must be 1 or more, not {options.repetitions}")
     return options
 
 
@@ -41,28 +45,17 @@ def machine() -> dict:
     }
 
 
-def line_of(row: dict) -> str:
-    """A row of the table."""
-    if "skipped" in row:
-        return f"{row['work']:50} {row['comparison']:24} skipped: {row['skipped']}"
-    if "growth" in row:
-        ends = [", ".join(f"{key} {value:.4g}" for key, value in each.items() if not isinstance(value, dict)) for each in row["growth"]]
-        return "\n    ".join([row["work"], *ends])
-    ours, unit, ratio = row["ours"], row["unit"], row["ratio"]
-    bar = f"<= {row['bar']:.2f}" if row.get("bar") else f"< {row['bar_s']} s" if "bar_s" in row else ""
-    words = {True: "reached", False: "NOT REACHED", None: ""}[row["reached"]]
-    measured = f"{ours['median']:8.3g} {unit:2}  {ratio['median']:5.2f} ({ratio['low']:.2f} to {ratio['high']:.2f})"
-    return f"{row['work']:50} {row['comparison']:24} {measured:32} {bar:8} {words}"
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command."""
     options = parse(arguments)
     from benchmarks import rows as room
     from benchmarks.figures import draw
+    from benchmarks.report import fill_readme, line_of
     from enhsim_tf.files import write_json
 
     budget, began = room.QUICK if options.quick else room.Budget(), time.time()
+    if options.repetitions:
+        budget = dataclasses.replace(budget, repetitions=options.repetitions)
     kept = json.loads(options.out.read_text())["rows"] if options.only and options.out.exists() else []
     found = []
     for name in ROWS:
@@ -80,6 +73,8 @@ def main(arguments: list[str] | None = None) -> int:
     write_json(options.out, made)
     for file in [options.out, *draw(made, options.figures)]:
         print(file)
+    if options.out == Path(__file__).parent / "results.json":
+        fill_readme(Path(__file__).parents[1] / "README.md", made)
     return 0
 
 

@@ -70,6 +70,7 @@ def _growth(grown: dict[str, list[dict]]):
     _curve(right, length, [each["enhancer_ms"] for each in lengths], "#0072b2", "enhancer, one step")
     _curve(right, length, [each["gan_ms"] for each in lengths], "#d55e00", "noise GAN, one iteration")
     right.set(xlabel="samples of a window", ylabel="time in ms", title="training")
+    right.set_ylim(10, 1_000)
     right.set_xticks(length, [str(each) for each in length])
     right.minorticks_off()
     for axes in (left, right):

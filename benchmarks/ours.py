@@ -99,10 +99,9 @@ def load_simulator(**size: int) -> Work:
 def load_networks(**size: int) -> Work:
     """The comparison: `keras.saving.load_model` on the same three files, nothing checked."""
     folder = tempfile.TemporaryDirectory()
-    saved = os.path.join(folder.name, "saved")
-    simulator(**size).save(saved)
+    simulator(**size).save(os.path.join(folder.name, "saved"))
     names = ("enhancer", "generator", "discriminator")
-    return lambda: [keras.saving.load_model(os.path.join(saved, f"{name}.keras"), compile=False) for name in names], 1
+    return lambda: [keras.saving.load_model(os.path.join(folder.name, "saved", f"{name}.keras"), compile=False) for name in names], 1
 
 
 def matrix_product(size: int = 3_200) -> Work:

@@ -23,7 +23,7 @@ WINDOW_FLOP = 2 * (500 * 500 + 500 * 3_200 + 3_200 * 3_200 + 3_200 * 500)  # of 
 class Budget:
     """How much is done: the full budget, or a quick one that only shows that everything runs."""
 
-    repetitions: int = 9
+    repetitions: int = 7
     steps: int = 40
     iterations: int = 5
     textbook_iterations: int = 3

@@ -1,0 +1,108 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import rows
+from benchmarks.__main__ import ROWS, main, parse
+from benchmarks.figures import draw
+from benchmarks.report import fill_readme, line_of, markdown
+from benchmarks.worker import Worker
+
+
+def test_ways_take_turns():
+    calls = []
+    found = rows.in_turns({"a": lambda: calls.append("a") or len(calls), "b": lambda: calls.append("b") or len(calls)}, 3)
+    assert "".join(calls) == "baabba"
+    assert found == {"a": [2, 3, 6], "b": [1, 4, 5]}
+
+
+def test_a_row_compares_neighbours():
+    row = rows.compared("work", [0.001, 0.002, 0.009], "other", [0.002, 0.002, 0.003], "ms", 0.9)
+    assert row["ours"] == {"median": 2.0, "low": 1.0, "high": 9.0}
+    assert row["ratio"] == pytest.approx({"median": 1.0, "low": 0.5, "high": 3.0})
+    assert row["reached"] is False
+    assert rows.compared("work", [1.0], "other", [2.0], "s", 0.5)["reached"] is True
+    assert rows.compared("work", [1.0], "other", [2.0], "s", None)["reached"] is None
+
+
+def measured(work, comparison, ours, theirs):
+    return rows.compared(work, [ours / 1e3], comparison, [theirs / 1e3], "ms", 0.7)
+
+
+def test_the_reproduction_is_put_together_from_steps():
+    found = [measured("enhancer step", "plain fit", 20.0, 40.0), measured("GAN iteration", "textbook loop", 50.0, 200.0)]
+    (row,) = rows.reproduction(found)
+    assert row["ours"]["median"] == pytest.approx(0.020 * 4_000 + 0.050 * 1_000)
+    assert row["ratio"]["median"] == pytest.approx(130 / 360)
+    assert row["ratio"]["low"] == pytest.approx(130 / 360)  # one repetition: no range
+    assert row["reached"] is True
+    assert list(rows.reproduction(found[:1])) == []
+
+
+def test_the_traffic_and_the_work_of_the_enhancer():
+    layers = [(500, 500), (500, 3_200), (3_200, 3_200), (3_200, 500)]
+    assert rows.PARAMETERS == sum(inputs * outputs + outputs for inputs, outputs in layers)
+    assert rows.WINDOW_FLOP == 2 * sum(inputs * outputs for inputs, outputs in layers)
+
+
+def test_figures_are_drawn_from_the_results(tmp_path):
+    growth = [
+        {"x": "num_windows", "work": "w", "growth": [{"num_windows": n, "seconds": n / 9, "peak_mb": 500.0} for n in (10, 100)]},
+        {"x": "window", "work": "t", "growth": [{"window": n, "enhancer_ms": n / 9, "gan_ms": n / 3, "peak_mb": {}} for n in (125, 250)]},
+    ]
+    found = {"rows": [measured("enhancer step", "plain fit", 20.0, 40.0), {"work": "a", "comparison": "b", "skipped": "c"}, *growth]}
+    files = draw(found, tmp_path)
+    assert {file.name for file in files} == {f"speed_{name}.{kind}" for name in ("ratios", "growth") for kind in ("png", "svg")}
+    assert all(file.stat().st_size > 5_000 for file in files)
+    assert all(line_of(row) for row in found["rows"])
+    assert draw({"rows": []}, tmp_path) == []
+
+
+def test_a_worker_says_why_it_is_skipped(monkeypatch, tmp_path):
+    (tmp_path / "torch.py").write_text("raise ImportError('no torch here')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    worker = Worker("torch_enhancer", "enhancer_step", num_steps=1)
+    assert worker.skipped == "no torch here"
+
+
+def test_quick_needs_a_place_of_its_own(capsys):
+    with pytest.raises(SystemExit):
+        parse(["--quick"])
+    assert "results.json holds measurements" in capsys.readouterr().err
+
+
+def test_help_needs_no_tensorflow():
+    program = "import sys, benchmarks.__main__\nassert 'tensorflow' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[1])
+
+
+def test_a_quick_run_measures_and_keeps_other_rows(tmp_path, monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[1])
+    out = tmp_path / "results.json"
+    kept = {"of": "gan", "work": "GAN iteration", "comparison": "x", "skipped": "y", "unit": "ms"}
+    out.write_text(json.dumps({"rows": [kept]}))
+    assert main(["--quick", "--only", "loading", "--out", str(out), "--figures", str(tmp_path)]) == 0
+    found = json.loads(out.read_text())
+    assert found["quick"] is True and kept in found["rows"]
+    (loading,) = [row for row in found["rows"] if row["of"] == "loading"]
+    assert loading["ratio"]["low"] <= loading["ratio"]["median"] <= loading["ratio"]["high"]
+    assert np.isfinite(loading["ours"]["median"]) and loading["peak_mb"] > 100
+    assert {row["of"] for row in found["rows"]} <= set(ROWS)
+
+
+def test_the_readme_gets_the_table_between_its_markers(tmp_path):
+    slow = measured("enhancer step", "plain fit", 90.0, 100.0)
+    found = {"rows": [slow, {"work": "a", "comparison": "b", "skipped": "no c"}], "machine": {"cores": 2, "tensorflow": "1.0"}}
+    path = tmp_path / "README.md"
+    path.write_text("before\n<!-- speed: generated -->\nold\n<!-- end of speed -->\nafter\n")
+    fill_readme(path, found)
+    text = path.read_text()
+    assert text == f"before\n<!-- speed: generated -->\n{markdown(found)}\n<!-- end of speed -->\nafter\n"
+    assert "| enhancer step | 90 ms | plain fit | 0.90 (0.90 to 0.90) | at most 0.70 | **not reached** |" in text and "no c" in text
+    path.write_text("no markers")
+    fill_readme(path, found)
+    assert path.read_text() == "no markers"
