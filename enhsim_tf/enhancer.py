@@ -12,14 +12,20 @@ import tensorflow as tf
 from enhsim_tf.fused_adam import fused_adam
 
 
-def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> keras.Sequential:
-    """A stack of Dense layers, relu on all but the last, each with its own seeded He initialiser.
+def seeded_initialiser(name: str, seed: int) -> keras.initializers.Initializer:
+    """An initialiser by its Keras name, for example `he_uniform`, that draws from `seed`."""
+    return type(keras.initializers.get(name))(seed=seed)
+
+
+def dense_stack(window: int, units: Sequence[int], seed: int, name: str, initialiser: str = "he_uniform") -> keras.Sequential:
+    """A stack of Dense layers, relu on all but the last, each with an initialiser and a seed of its own.
 
     Args:
         window: Samples of an input window.
         units: Units of each layer.
         seed: Seed of the weights.
         name: Name of the model.
+        initialiser: Keras name of the weights' initialiser.
     """
     model = keras.Sequential([keras.Input((window,))], name=name)
     for number, width in enumerate(units):
@@ -28,14 +34,16 @@ def dense_stack(window: int, units: Sequence[int], seed: int, name: str) -> kera
             keras.layers.Dense(
                 width,
                 activation=None if last else "relu",
-                kernel_initializer=keras.initializers.HeUniform(seed=seed * 1000 + number),
+                kernel_initializer=seeded_initialiser(initialiser, seed * 1000 + number),
                 name="Output" if last else f"Hidden_{number}" if number else "Input",
             )
         )
     return model
 
 
-def build_enhancer(window: int = 500, hidden_units: int = 3_200, num_hidden: int = 2, seed: int = 0) -> keras.Sequential:
+def build_enhancer(
+    window: int = 500, hidden_units: int = 3_200, num_hidden: int = 2, seed: int = 0, initialiser: str = "he_uniform"
+) -> keras.Sequential:
     """Builds the paper's enhancing network, Figure 3: Dense layers of 500, 3,200, 3,200 and 500 units.
 
     Args:
@@ -43,11 +51,12 @@ def build_enhancer(window: int = 500, hidden_units: int = 3_200, num_hidden: int
         hidden_units: Units of each hidden layer.
         num_hidden: Number of hidden layers.
         seed: Seed of the weights.
+        initialiser: Keras name of the weights' initialiser.
 
     Returns:
         An uncompiled Keras model from shape `(windows, window)` to the same; 13,697,400 parameters by default.
     """
-    return dense_stack(window, (window, *[hidden_units] * num_hidden, window), seed, "enhancer")
+    return dense_stack(window, (window, *[hidden_units] * num_hidden, window), seed, "enhancer", initialiser)
 
 
 def fit_windows(
@@ -62,8 +71,9 @@ def fit_windows(
     callbacks: Sequence[keras.callbacks.Callback] = (),
     verbose: int | str = "auto",
     jit_compile: bool = False,
+    loss: str = "mean_squared_error",
 ) -> dict[str, np.ndarray]:
-    """Fits a model from windows to windows by mean squared error and Adam.
+    """Fits a model from windows to windows by Adam, with the mean squared error as loss.
 
     The order of the windows is drawn from `seed`, anew in each epoch.
 
@@ -80,11 +90,12 @@ def fit_windows(
         verbose: Keras' progress bar: 0 none, 1 a bar.
         jit_compile: Whether XLA compiles the step. With the fused Adam there is little left for it to fuse, and it costs
             seconds of compilation.
+        loss: Keras name of the loss.
 
     Returns:
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
     """
-    model.compile(fused_adam(learning_rate), loss="mean_squared_error", jit_compile=jit_compile)
+    model.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile)
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
     inputs, targets = tf.constant(inputs), tf.constant(targets)

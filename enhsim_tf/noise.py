@@ -37,7 +37,7 @@ def extract_noise(values: np.ndarray, width: int = 25) -> tuple[np.ndarray, np.n
 
 def noise_unit(noise: np.ndarray) -> float:
     """The scale at which noise has a standard deviation of 0.1, well inside the range of a tanh generator."""
-    return float(np.std(noise)) / 0.1
+    return float(np.std(noise, dtype=np.float64)) / 0.1
 
 
 class GaussianNoise:
@@ -54,7 +54,7 @@ class GaussianNoise:
     @classmethod
     def fit(cls, windows: np.ndarray) -> "GaussianNoise":
         """Fits to noise windows of shape `(windows, samples)`."""
-        return cls(np.std(windows), windows.shape[1])
+        return cls(np.std(windows, dtype=np.float64), windows.shape[1])
 
     def generate(self, num_windows: int, seed: int) -> np.ndarray:
         """Draws noise, float32 of shape `(num_windows, samples)`; the same seed draws the same."""

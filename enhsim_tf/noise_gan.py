@@ -11,14 +11,14 @@ import numpy as np
 import tensorflow as tf
 
 from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
-from enhsim_tf.enhancer import predict_windows
+from enhsim_tf.enhancer import predict_windows, seeded_initialiser
 from enhsim_tf.fused_adam import fused_adam
 
 REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
 
 
 def build_generator(
-    window: int = 500, latent: int = 16, hidden_units: int = 64, activation: str = "tanh", seed: int = 0
+    window: int = 500, latent: int = 16, hidden_units: int = 64, activation: str = "tanh", seed: int = 0, initialiser: str = "he_uniform"
 ) -> keras.Sequential:
     """Builds the paper's generator, Figure 9: Dense 64, BatchNormalization, Dense 500, Reshape.
 
@@ -28,11 +28,12 @@ def build_generator(
         hidden_units: Units of the first layer.
         activation: Activation of the last Dense layer; tanh keeps the noise within -1 and 1.
         seed: Seed of the weights.
+        initialiser: Keras name of the weights' initialiser.
 
     Returns:
         An uncompiled Keras model from shape `(windows, latent)` to `(windows, window, 1)`.
     """
-    first, last = (keras.initializers.HeUniform(seed=seed * 1000 + number) for number in (100, 101))
+    first, last = (seeded_initialiser(initialiser, seed * 1000 + number) for number in (100, 101))
     return keras.Sequential(
         [
             keras.Input((latent,)),
@@ -46,7 +47,14 @@ def build_generator(
 
 
 def build_discriminator(
-    window: int = 500, filters: int = 500, width: int = 20, stride: int = 4, narrow_units: int = 25, dropout: float = 0.0, seed: int = 0
+    window: int = 500,
+    filters: int = 500,
+    width: int = 20,
+    stride: int = 4,
+    narrow_units: int = 25,
+    dropout: float = 0.0,
+    seed: int = 0,
+    initialiser: str = "he_uniform",
 ) -> keras.Sequential:
     """Builds the paper's discriminator, Figure 10: one convolution, its maximum, narrowing to one sigmoid neuron.
 
@@ -58,11 +66,12 @@ def build_discriminator(
         narrow_units: Units of the layer before the last.
         dropout: Share dropped after the convolution and after the narrow layer; 0 leaves the layers out.
         seed: Seed of the weights.
+        initialiser: Keras name of the weights' initialiser.
 
     Returns:
         An uncompiled Keras model from shape `(windows, window, 1)` to `(windows, 1)`, the probability of being real.
     """
-    kernels = [keras.initializers.HeUniform(seed=seed * 1000 + number) for number in (200, 201, 202)]
+    kernels = [seeded_initialiser(initialiser, seed * 1000 + number) for number in (200, 201, 202)]
 
     def dropped(number: int) -> list[keras.layers.Layer]:
         return [keras.layers.Dropout(dropout, seed=seed * 1000 + number)] if dropout else []

@@ -6,6 +6,7 @@ that its caller does not own, and it never interprets values: a series is what i
 
 import dataclasses
 import os
+import tokenize
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -75,7 +76,8 @@ def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndar
         raise InputError(f"Expected samples. Received: none from {what}. Give a file that holds a series.")
     if values.dtype.kind not in "fiub":
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column.")
-    values = values.astype(np.float32)
+    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is refused below
+        values = values.astype(np.float32)
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
         kind = "NaN" if np.isnan(values[bad[0]]) else "infinite"
@@ -107,7 +109,7 @@ def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str
         InputError: If the file cannot be read, the column is not there, or the values or times cannot be used.
     """
     path, column = Path(path), None if column is None else str(column)
-    if not path.is_file():
+    if not _is_file(path):
         raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is no file. Check the path.")
     readers = {".npy": _read_array, ".csv": _read_table, ".parquet": _read_table}
     if path.suffix.lower() not in readers:
@@ -118,6 +120,13 @@ def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str
     return Telemetry(values, interval_s=interval_s, start=start, name=path.stem)
 
 
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that no file system takes
+        return False
+
+
 def _read_array(path: Path, column: str | None, time: str | None):
     if time is not None:
         raise InputError(
@@ -125,9 +134,9 @@ def _read_array(path: Path, column: str | None, time: str | None):
         )
     try:
         array = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:  # what damaged headers raise
         raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({str(error).splitlines()[0]}). Save it again."
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({(str(error).splitlines() or [type(error).__name__])[0]}). Save it again."
         ) from None
     if not isinstance(array, np.ndarray) or array.ndim not in (1, 2):
         shape = getattr(array, "shape", "an archive")

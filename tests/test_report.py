@@ -162,14 +162,19 @@ def test_the_readme_says_seed_and_budget_and_what_each_stage_took(filled):
     assert "| telemetry | 1.2 |" in text and "| enhancer | 60.5 |" in text and "| **sum** | **65** |" in text
 
 
-def _spread(value, budget="smoke", seeds=(7, 8)):
-    claims = {"C1": {"range": [0.1, 0.2], "values": [value, 0.1]}, "C2": {"range": [1, 2e6], "values": [1, 2e6]}}
-    return {"budget": budget, "seeds": seeds, "claims": claims | {"C9": {"range": None, "values": [None, None]}}}
+def _spread(value, budget="smoke", seeds=(7, 8, 9)):
+    claims = {
+        "C1": {"range": [0.1, 0.2], "values": [value, 0.1, 0.2], "verdicts": ["reproduced"] * 3},
+        "C2": {"range": [1, 2e6], "values": [1, 2e6, 3], "verdicts": ["partly", "not reproduced", "partly"]},
+        "C9": {"range": None, "values": [None] * 3, "verdicts": ["not measured"] * 3},
+    }
+    return {"budget": budget, "seeds": seeds, "claims": claims}
 
 
 def test_the_readme_gives_the_range_over_seeds_where_it_is_known(filled):
     text = filled(spread=_spread(0.12345))
-    assert "0.123 (0.1 to 0.2)" in text and "1,234,568 (1 to 2,000,000)" in text and "seeds 7, 8" in text
+    assert "0.123 (0.1 to 0.2)" in text and "1,234,568 (1 to 2,000,000)" in text and "seeds 7, 8, 9" in text
+    assert "**partly** (over seeds: 2 partly, 1 not reproduced)" in text and text.count("over seeds:") == 1
     for other in (_spread(0.15), _spread(0.12345, budget="full"), _spread(0.12345, seeds=(0, 1))):
         assert "over seeds" not in filled(spread=other), "ranges of another run"
 

@@ -105,8 +105,8 @@ def check(options: argparse.Namespace) -> None:
     """Refuses what cannot be used before anything is made; needs no TensorFlow."""
     from enhsim_tf.errors import InputError
 
-    if options.seed < 0:
-        raise InputError(f"Expected a seed of 0 or more. Received: --seed {options.seed}.")
+    if not 0 <= options.seed < 2**32 - max(options.spread, 0):
+        raise InputError(f"Expected a seed from 0 to before 2**32, with the further ones. Received: --seed {options.seed}.")
     if options.spread < 0:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.errors import InputError
 from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.signals import sines, white_noise
 from enhsim_tf.simulator import Degraded, SquareWave, SquareWaveSimulator, degrade, paired_windows, units_of
 from enhsim_tf.store import ParquetStore
-from enhsim_tf.telemetry import Telemetry, cut_windows, even_offsets, random_offsets, read_telemetry, split_by_time
+from enhsim_tf.telemetry import Telemetry, check_values, cut_windows, even_offsets, random_offsets, read_telemetry, split_by_time
 
 _MIN_DISJOINT = 20  # disjoint windows below which a part is read through overlapping ones
 
@@ -132,6 +133,13 @@ class Data:
         test_length = max(int((1 - self.settings.split.real_train) * len(series)), least)
         gap = min(self.window, max(0, len(series) - test_length - least))
         train, test = series.part(0, len(series) - test_length - gap), series.part(len(series) - test_length, len(series))
+        for name, part in (("training", train), ("test", test)):
+            check_values(part.values, f"the {name} part of {series.name}")
+            noise = extract_noise(part.values, self.settings.noise.moving_average)[0]
+            if np.std(noise, dtype=np.float64) <= 1e-5 * np.std(part.values, dtype=np.float64):  # float32 resolves no less
+                raise InputError(
+                    f"Expected noise around the moving average. Received: none in the {name} part of {series.name}. Choose another channel."
+                )
         return Channel(series, train, None, test, SquareWaveSimulator.fit(train, num_levels=self.settings.enhancer.num_levels))
 
     def draw(self, purpose: str) -> np.random.Generator:

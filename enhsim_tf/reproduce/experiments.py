@@ -95,9 +95,18 @@ class Experiment:
         wanted = "truth" if self.settings.telemetry.target == "clean" else "target"
         pairs = (train["coarse"], train[wanted], held_out["coarse"], held_out[wanted])
         source, target, *validation = ((windows - offset) / scale for windows in pairs)
-        network = build_enhancer(self.data.window, chosen.hidden_units, chosen.num_hidden, seed)
+        network = build_enhancer(self.data.window, chosen.hidden_units, chosen.num_hidden, seed, chosen.initialiser)
         history = fit_windows(
-            network, source, target, chosen.epochs, chosen.batch_size, seed, chosen.learning_rate, tuple(validation), verbose=self.verbose
+            network,
+            source,
+            target,
+            chosen.epochs,
+            chosen.batch_size,
+            seed,
+            chosen.learning_rate,
+            tuple(validation),
+            verbose=self.verbose,
+            loss=chosen.loss,
         )
         network.save(folder / "enhancer.keras", include_optimizer=False)
         save_arrays(folder, history)
@@ -116,8 +125,10 @@ class Experiment:
 
         chosen, training, seed, window = self.settings.noise, self.settings.adversarial, self.settings.seed, self.data.window
         gan = NoiseGAN(
-            build_generator(window, chosen.latent, chosen.generator_units, chosen.generator_activation, seed),
-            build_discriminator(window, chosen.filters, chosen.filter_width, chosen.stride, chosen.narrow_units, chosen.dropout, seed),
+            build_generator(window, chosen.latent, chosen.generator_units, chosen.generator_activation, seed, chosen.initialiser),
+            build_discriminator(
+                window, chosen.filters, chosen.filter_width, chosen.stride, chosen.narrow_units, chosen.dropout, seed, chosen.initialiser
+            ),
             batch_size=training.batch_size,
             learning_rate=training.learning_rate,
             latent_span=chosen.latent_span,
@@ -131,7 +142,13 @@ class Experiment:
 
         def follow(iteration: int, gan: NoiseGAN) -> None:
             noise = gan.generate(200, seed=seed)
-            followed.append((np.std(noise) / np.std(real), fidelity.autocorrelation(noise, 1)[1], fidelity.effective_rank(noise)))
+            followed.append(
+                (
+                    np.std(noise, dtype=np.float64) / np.std(real, dtype=np.float64),
+                    fidelity.autocorrelation(noise, 1)[1],
+                    fidelity.effective_rank(noise),
+                )
+            )
 
         history = gan.fit(real, training.num_iterations, training.record_every, follow, verbose=bool(self.verbose))
         for name in ("generator", "discriminator"):

@@ -76,6 +76,8 @@ def fill_readme(path: Path, folder: Path) -> None:
         return
     found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     text = path.read_text(encoding="utf-8")
+    if ": generated -->" not in text:  # somebody else's
+        return
     parts = {
         "claims": claims_table(found, read_spread(folder, found)),
         "channels": channels_table(sorted(folder.glob("*/results.json"))),

@@ -8,7 +8,10 @@ the paper is a field that can be turned. A smoke budget changes counts only: the
 import dataclasses
 from typing import Any
 
+from enhsim_tf.errors import InputError
+
 OURS = "ours"
+BUDGETS = ("smoke", "full")
 FIGURES = (
     "fig01_pipeline",
     "fig02_source_target",
@@ -94,6 +97,8 @@ class EnhancerSettings:
     epochs: int = setting(40, "epochs", "paper, section 2.2", "40", "a parameter", smoke=2)
     batch_size: int = setting(15, "windows", "paper, section 2.2", "15", "a parameter")
     learning_rate: float = setting(0.001, "1", f"{OURS}: Adam's default; 0.01 is large for 3,200 units", "-", "0.01")
+    loss: str = setting("mean_squared_error", "loss", "author's code", "-", "mean squared error")
+    initialiser: str = setting("he_uniform", "initialiser", "author's code", "-", "he_uniform")
     num_levels: int = setting(2, "levels", 'paper, section 1: "a square wave"', "square wave")
 
 
@@ -110,6 +115,7 @@ class NoiseSettings:
     filter_width: int = setting(20, "samples", "paper, section 2.3", "20", "20")
     stride: int = setting(4, "samples", "paper, section 2.3", "4", "4")
     narrow_units: int = setting(25, "units", "author's code, one of two files", '"progressively narrowed"', "25, or half the window")
+    initialiser: str = setting("he_uniform", "initialiser", "author's code", "-", "he_uniform")
     dropout: float = setting(0.0, "share", "paper: not mentioned", "-", "0.3 after the convolution and the narrow layer")
 
 
@@ -166,12 +172,20 @@ def make_settings(budget: str = "full", seed: int = 0, **turned: Any) -> Setting
         budget: `full`, or `smoke` for the smaller counts.
         seed: Seed of everything drawn.
         **turned: `group__field=value`, for example `noise__dropout=0.3`.
+
+    Raises:
+        InputError: If the budget, a group or a field is unknown.
     """
     settings = Settings(budget=budget, seed=seed)
+    known = {f"{name}__{field.name}" for name, group in groups(settings).items() for field in dataclasses.fields(group)}
+    unknown = sorted(set(turned) - known)
+    if budget not in BUDGETS or unknown:
+        received = f"budget={budget!r}" if budget not in BUDGETS else f"{unknown[0]}={turned[unknown[0]]!r}"
+        raise InputError(f"Expected a budget of {' or '.join(BUDGETS)} and settings as group__field. Received: {received}.")
     for name, group in groups(settings).items():
         counts = {field.name: field.metadata["smoke"] for field in dataclasses.fields(group) if field.metadata["smoke"] is not None}
         chosen = {key.split("__", 1)[1]: value for key, value in turned.items() if key.split("__", 1)[0] == name}
-        settings = dataclasses.replace(settings, **{name: dataclasses.replace(group, **(counts if budget == "smoke" else {}), **chosen)})
+        settings = dataclasses.replace(settings, **{name: dataclasses.replace(group, **((counts if budget == "smoke" else {}) | chosen))})
     return settings
 
 
