@@ -1,0 +1,148 @@
+"""`python -m notebooks.build`: executes the sources `NN_name.py` and writes `NN_name.ipynb` beside them.
+
+Each notebook is stamped with the checksum of its source and the budget it ran at. `--check` executes nothing and says
+which notebooks are no longer what their sources are; exit code 1 if there is one.
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+import jupytext
+import nbclient
+import nbformat
+
+from enhsim_tf.files import make_folder, replace_file, sha256
+
+FOLDER = Path(__file__).parent
+STAMP = "enhsim_tf"  # the notebook's metadata that hold its stamp
+MAX_BYTES = 1_000_000
+TIMEOUT_S = 1_800  # for one cell: a fresh clone trains in it
+
+
+def sources() -> list[Path]:
+    """The notebooks' sources, in the order of their numbers."""
+    return sorted(FOLDER.glob("[0-9][0-9]_*.py"))
+
+
+def read(source: Path) -> nbformat.NotebookNode:
+    """A source as a notebook without outputs, always the same for the same source."""
+    notebook = jupytext.read(source, fmt="py:percent")
+    notebook.metadata = {
+        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+        "language_info": {"name": "python"},
+    }
+    for number, cell in enumerate(notebook.cells):
+        cell.id = f"cell-{number:02}"
+    return notebook
+
+
+def execute(source: Path, budget: str, cache: Path | None = None) -> nbformat.NotebookNode:
+    """Executes a source in a kernel of its own, in the folder of the notebooks as Jupyter does, and stamps it.
+
+    Args:
+        source: One of `sources()`.
+        budget: `full` or `smoke`.
+        cache: Where finished stages are kept; None keeps them where `reproduce` does.
+
+    Raises:
+        nbclient.exceptions.CellExecutionError: If a cell raises.
+    """
+    notebook = read(source)
+    environment = (
+        os.environ | {"ENHSIM_TF_BUDGET": budget} | ({} if cache is None else {"ENHSIM_TF_CACHE": str(cache)})
+    )
+    client = nbclient.NotebookClient(
+        notebook,
+        timeout=TIMEOUT_S,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(source.parent)}},
+        record_timing=False,
+        coalesce_streams=True,
+        extra_arguments=["--IPKernelApp.log_level=ERROR"],
+    )
+    client.execute(env=environment)
+    notebook.metadata["language_info"] = {
+        "name": "python"
+    }  # what the kernel says of itself differs from machine to machine
+    notebook.metadata[STAMP] = {"source": source.name, "sha256": sha256(source), "budget": budget}
+    return notebook
+
+
+def faults(source: Path) -> list[str]:
+    """What is wrong with the notebook beside a source; nothing if it is the source, executed at full budget."""
+    path = source.with_suffix(".ipynb")
+    if not path.is_file():
+        return ["not there"]
+    notebook, expected, found = nbformat.read(path, as_version=4), read(source), []
+    stamp = notebook.metadata.get(STAMP, {})
+    if stamp.get("sha256") != sha256(source) or [cell.source for cell in notebook.cells] != [
+        cell.source for cell in expected.cells
+    ]:
+        found.append("stale: its source has changed")
+    if stamp.get("budget") != "full":
+        found.append(f"executed at {stamp.get('budget', 'no')} budget")
+    if not all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code"):
+        found.append("not executed from first to last cell")
+    if path.stat().st_size >= MAX_BYTES:
+        found.append(f"{path.stat().st_size:,} bytes, {MAX_BYTES:,} or more")
+    return found
+
+
+def check() -> int:
+    """Prints what is wrong with each notebook and returns the exit code."""
+    wrong = {source.stem: faults(source) for source in sources()}
+    lost = set(FOLDER.glob("*.ipynb")) - {source.with_suffix(".ipynb") for source in sources()}
+    wrong |= {path.stem: ["it has no source"] for path in lost}
+    for name, reasons in wrong.items():
+        print(f"{name:32} {'; '.join(reasons) or 'current'}")
+    return int(any(wrong.values()))
+
+
+def build(budget: str, only: str | None) -> int:
+    """Executes the notebooks, all or the one that is named by its number; a smoke build goes to `smoke/`."""
+    chosen = [source for source in sources() if only in (None, source.stem, source.stem[:2])]
+    if not chosen:
+        print(
+            f"error: Expected --only with one of {', '.join(source.stem[:2] for source in sources())}. Received: {only!r}.",
+            file=sys.stderr,
+        )
+        return 2
+    from enhsim_tf.reproduce.teaching import open_experiment, prepare
+
+    prepare(open_experiment(budget))  # so that no progress bar of a training stays in a notebook
+    folder = FOLDER if budget == "full" else make_folder(FOLDER.parent / "smoke")
+    for source in chosen:
+        began = time.perf_counter()
+        notebook = execute(source, budget)
+        path = folder / source.with_suffix(".ipynb").name
+        with replace_file(path) as temporary:
+            nbformat.write(notebook, temporary)
+        print(
+            f"{source.stem:32} {time.perf_counter() - began:6.1f} s {path.stat().st_size / 1e3:6.0f} kB",
+            flush=True,
+        )
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command."""
+    parser = argparse.ArgumentParser(prog="python -m notebooks.build", description=__doc__.split("\n\n")[0])
+    parser.add_argument(
+        "--budget",
+        choices=("full", "smoke"),
+        default="full",
+        help="smoke writes into smoke/ (default: full)",
+    )
+    parser.add_argument("--only", metavar="NN", help="one notebook, for example 04")
+    parser.add_argument(
+        "--check", action="store_true", help="say which notebooks are stale, and execute nothing"
+    )
+    options = parser.parse_args(arguments)
+    return check() if options.check else build(options.budget, options.only)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
