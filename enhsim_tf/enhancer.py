@@ -98,11 +98,9 @@ def fit_windows(
     model.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile)
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
-    inputs, targets = tf.constant(inputs), tf.constant(targets)
-    batches = tf.data.Dataset.from_tensor_slices(orders).flat_map(lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size))
-    held_out = None if validation is None else tf.data.Dataset.from_tensor_slices(validation).batch(256)
+    held_out = None if validation is None else _untuned(tf.data.Dataset.from_tensor_slices(validation).batch(256))
     history = model.fit(
-        batches.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows))).prefetch(2),
+        batches(inputs, targets, orders, batch_size),
         epochs=epochs,
         steps_per_epoch=-(-len(inputs) // batch_size),
         validation_data=held_out,
@@ -111,6 +109,27 @@ def fit_windows(
         shuffle=False,  # the data set shuffles, with its own seed
     )
     return {key: np.array(values) for key, values in history.history.items()}
+
+
+def batches(inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_size: int) -> tf.data.Dataset:
+    """Pairs of input and target windows, batch after batch, epoch after epoch.
+
+    Args:
+        inputs: Input windows, float32 of shape `(windows, samples)`.
+        targets: Target windows of the same shape.
+        orders: Order of the windows in each epoch, integers of shape `(epochs, windows)`.
+        batch_size: Windows a batch; the last of an epoch may have fewer.
+    """
+    inputs, targets = tf.constant(inputs), tf.constant(targets)
+    rows = tf.data.Dataset.from_tensor_slices(orders).flat_map(lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size))
+    return _untuned(rows.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows))).prefetch(2))
+
+
+def _untuned(data: tf.data.Dataset) -> tf.data.Dataset:
+    """The data set without its tuning thread, whose naps double up to a minute: dropping the data set waits for the last one."""
+    options = tf.data.Options()
+    options.autotune.enabled = False
+    return data.with_options(options)
 
 
 def enhance(model: keras.Model, coarse: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
