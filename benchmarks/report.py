@@ -1,9 +1,9 @@
 """The results as text: a line of the terminal's table, and the README's table."""
 
-import re
 from pathlib import Path
 
 from enhsim_tf.files import replace_file
+from enhsim_tf.reproduce.report import fill_parts
 
 
 def line_of(row: dict) -> str:
@@ -39,9 +39,7 @@ def markdown(results: dict) -> str:
 
 
 def fill_readme(path: Path, results: dict) -> None:
-    """Writes the table between the README's speed markers, where it has them."""
-    text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    pattern = re.compile(r"(<!-- speed: generated -->\n).*?(<!-- end of speed -->)", re.DOTALL)
-    if pattern.search(text):
-        with replace_file(path) as temporary:
-            temporary.write_text(pattern.sub(lambda match: f"{match[1]}{markdown(results)}\n{match[2]}", text), encoding="utf-8")
+    """Writes the table between the README's speed markers."""
+    text = path.read_text(encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(fill_parts(text, {"speed": markdown(results)}, path.name), encoding="utf-8")

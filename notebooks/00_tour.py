@@ -80,9 +80,8 @@ enhanced = show(experiment, "fig04_enhanced_simulation")
 # %%
 before, after = float(enhanced["identity_nrmse"]), float(enhanced["nrmse"])
 print(f"error in standard deviations of the true signal: coarse {before:.3f}, enhanced {after:.3f}")
-assert (
-    after < {"full": before / 4, "smoke": 1.0}[experiment.settings.budget]
-)  # two epochs barely beat the mean
+bound = {"full": before / 4, "smoke": 1.0}  # two epochs barely beat the mean
+assert after < bound[experiment.settings.budget]
 
 # %% [markdown]
 # The result is smooth and right, and useless for training a detector: real telemetry is never that clean.

@@ -46,9 +46,7 @@ real_noise = experiment.data.noise_windows("train", 1_000, "notebook")[:, :100, 
 discriminator, generator = build_discriminator(100, filters=32, seed=0), build_generator(100, seed=0)
 
 discriminator.compile("adam", "binary_crossentropy")
-discriminator.trainable = (
-    False  # meant for the stack below; Keras 2 had already noted what the line above may train
-)
+discriminator.trainable = False  # meant for the stack below
 combined = keras.Sequential([generator, discriminator])
 combined.compile("adam", "binary_crossentropy")
 

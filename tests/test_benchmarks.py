@@ -11,6 +11,7 @@ from benchmarks.__main__ import ROWS, main, parse
 from benchmarks.figures import draw
 from benchmarks.report import fill_readme, line_of, markdown
 from benchmarks.worker import Worker
+from enhsim_tf.errors import InputError
 
 
 def test_ways_take_turns():
@@ -104,5 +105,6 @@ def test_the_readme_gets_the_table_between_its_markers(tmp_path):
     assert text == f"before\n<!-- speed: generated -->\n{markdown(found)}\n<!-- end of speed -->\nafter\n"
     assert "| enhancer step | 90 ms | plain fit | 0.90 (0.90 to 0.90) | at most 0.70 | **not reached** |" in text and "no c" in text
     path.write_text("no markers")
-    fill_readme(path, found)
+    with pytest.raises(InputError, match="markers of 'speed' once in README.md"):
+        fill_readme(path, found)
     assert path.read_text() == "no markers"

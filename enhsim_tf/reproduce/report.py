@@ -84,14 +84,29 @@ def fill_readme(path: Path, folder: Path) -> None:
         "deviations": deviations_table(),
         "timings": timings_table(found),
     }
+    text = fill_parts(text, parts, path.name)
+    text = re.sub(r"\A# (\[.*?\] )?", f"# {found['verdict']} ", text)
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def fill_parts(text: str, parts: Mapping[str, str], where: str) -> str:
+    """A text with new contents between its markers.
+
+    Args:
+        text: Markdown that holds the markers of each part once.
+        parts: Contents by name.
+        where: The text's name, for the error.
+
+    Raises:
+        InputError: If the markers of a part are not there once.
+    """
     for name, content in parts.items():
         pattern = re.compile(rf"(<!-- {name}: generated -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
         text, count = pattern.subn(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
         if count != 1:
-            raise InputError(f"Expected the markers of '{name}' once in {path.name}. Received: {count}. Put them back.")
-    text = re.sub(r"\A# (\[.*?\] )?", f"# {found['verdict']} ", text)
-    with replace_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+            raise InputError(f"Expected the markers of '{name}' once in {where}. Received: {count}. Put them back.")
+    return text
 
 
 def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = None) -> str:
