@@ -17,7 +17,7 @@ from enhsim_tf import enhancer as enhancer_room
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.noise import extract_noise, noise_unit
-from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator, num_overlapping
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, paired_windows, units_of
 from enhsim_tf.store import write_windows
 from enhsim_tf.telemetry import Telemetry, check_values, cut_windows, random_offsets
@@ -193,8 +193,8 @@ class EnhancedSimulator:
     def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
         """Generates one continuous series of any length, without seams.
 
-        Windows that overlap by half are faded into each other: the enhanced signal with weights that add up to one,
-        the noise, which is independent from window to window, with weights whose squares do, so its variance stays.
+        Enhanced windows that overlap by half are faded into each other with weights that add up to one; the noise has a
+        way of its own (`NoiseGAN.generate_series`).
 
         Args:
             num_samples: Length of the series.
@@ -208,7 +208,7 @@ class EnhancedSimulator:
         if num_samples < 1:
             raise InputError(f"Expected at least one sample. Received: num_samples={num_samples}.")
         window, hop = self.window, self.window // 2
-        num_windows = 1 + max(0, -(-(num_samples - window) // hop))
+        num_windows = num_overlapping(num_samples, window)
         length = window + (num_windows - 1) * hop
         rng = np.random.default_rng(seed)
         times = start_s + self.interval_s * np.arange(length)[None]
@@ -217,16 +217,13 @@ class EnhancedSimulator:
             coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
-        noise = self.noise.generate(num_windows, _noise_rng(seed))
 
-        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # fade^2 of two windows half a window apart adds up to 1
-        signal, power, total = np.zeros(length), np.zeros(length), np.zeros(length)
-        for begin, clean, rough in zip(begins, enhanced, noise, strict=True):
-            stretch = slice(begin, begin + window)
-            signal[stretch] += fade**2 * clean
-            total[stretch] += fade**2
-            power[stretch] += fade * rough
-        return (signal / total + power / np.sqrt(total))[:num_samples].astype(np.float32)
+        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # of two windows half a window apart they add up to 1
+        signal, total = np.zeros((2, length))
+        for begin, clean in zip(begins, enhanced, strict=True):
+            signal[begin : begin + window] += fade * clean
+            total[begin : begin + window] += fade
+        return (signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed))
 
     def save(self, folder: str | os.PathLike) -> None:
         """Saves to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums.

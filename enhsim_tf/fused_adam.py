@@ -16,15 +16,16 @@ import numpy as np
 import tensorflow as tf
 
 
-def fused_adam(learning_rate: float) -> keras.optimizers.Adam:
+def fused_adam(learning_rate: float, **settings: object) -> keras.optimizers.Adam:
     """Keras' Adam, whose update of a variable is one operation.
 
     The update is replaced on this one object: for Keras, and in a saved model, it stays a plain Adam.
 
     Args:
-        learning_rate: The learning rate; the other settings are Keras' defaults.
+        learning_rate: The learning rate.
+        **settings: Other settings of Keras' Adam, where they are not its defaults.
     """
-    adam = keras.optimizers.Adam(learning_rate)
+    adam = keras.optimizers.Adam(learning_rate, **settings)
     # beta_2 as float32 gives another 1 - beta_2, see above
     rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
 

@@ -4,7 +4,7 @@ It knows windows of noise and nothing of telemetry. Outside, windows have the sh
 two networks `(windows, samples, 1)`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import keras
 import numpy as np
@@ -13,6 +13,7 @@ import tensorflow as tf
 from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
 from enhsim_tf.enhancer import predict_windows, seeded_initialiser
 from enhsim_tf.fused_adam import fused_adam
+from enhsim_tf.latent import Latent
 
 REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
 
@@ -108,6 +109,12 @@ class NoiseGAN:
             mode instead of inference mode.
         scale: The noise is divided by this for the networks and multiplied by it afterwards.
         seed: Seed of every draw in training, and of the networks built here.
+        slow_samples: For a generator that convolves: correlation time, in samples, of each slow channel of its latent
+            series; they come after the white channels.
+        discriminator_learning_rate: Adam's learning rate for the discriminator, or None for the same.
+        beta_1: Adam's decay of the first moment, for both networks.
+        averaging: Decay of a moving average over the generator's weights, which takes their place when training ends;
+            0 for none.
     """
 
     def __init__(
@@ -121,15 +128,21 @@ class NoiseGAN:
         generated_in_training_mode: bool = False,
         scale: float = 1.0,
         seed: int = 0,
+        slow_samples: Sequence[float] = (),
+        discriminator_learning_rate: float | None = None,
+        beta_1: float = 0.9,
+        averaging: float = 0.0,
     ):
         self.generator = build_generator(seed=seed) if generator is None else generator
         self.discriminator = build_discriminator(self.generator.output_shape[1], seed=seed) if discriminator is None else discriminator
+        self.latent = Latent(self.generator, self.discriminator.input_shape[1], latent_span, slow_samples)
         self.combined = keras.Sequential([self.generator, self.discriminator], name="combined")
-        self.batch_size, self.latent_span, self.scale = batch_size, latent_span, scale
+        self.batch_size, self.scale = batch_size, scale
         self.mixed_batch, self.generated_in_training_mode = mixed_batch, generated_in_training_mode
         self.loss = keras.losses.BinaryCrossentropy()
-        self.discriminator_optimizer = fused_adam(learning_rate)
-        self.generator_optimizer = fused_adam(learning_rate)
+        averaged = {"use_ema": True, "ema_momentum": averaging} if averaging else {}
+        self.discriminator_optimizer = fused_adam(discriminator_learning_rate or learning_rate, beta_1=beta_1)
+        self.generator_optimizer = fused_adam(learning_rate, beta_1=beta_1, **averaged)
         self.discriminator_optimizer.build(self.discriminator.trainable_variables)
         self.generator_optimizer.build(self.generator.trainable_variables)
         self.seeds = keras.random.SeedGenerator(seed)
@@ -187,7 +200,7 @@ class NoiseGAN:
         return tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=seeds))
 
     def _draw_latent(self, seeds: keras.random.SeedGenerator) -> tf.Tensor:
-        return self.latent_span * keras.random.normal((self.batch_size, self.generator.input_shape[1]), seed=seeds)
+        return self.latent.draw(self.batch_size, seeds)
 
     def _tags(self, tag: float) -> tf.Tensor:
         return tf.fill((self.batch_size, 1), tag)
@@ -227,6 +240,7 @@ class NoiseGAN:
                 if iteration < num_iterations:
                     self._step(noise)
                     bar.update()
+        self.generator_optimizer.finalize_variable_values(self.generator.trainable_variables)  # the average, where there is one
         return {key: np.array([record[key] for record in history]) for key in history[0]}
 
     def _evaluate(self, noise: tf.Tensor) -> dict[str, float]:
@@ -248,10 +262,40 @@ class NoiseGAN:
             seed: Seed of the latent vectors, or a generator that draws them and goes on from where it stands.
             batch_size: Windows a call of the network.
         """
-        latent = np.random.default_rng(seed).standard_normal((num_windows, self.generator.input_shape[1]), np.float32)
-        noise = predict_windows(self.generator, self.latent_span * latent, batch_size)[:, :, 0]
+        latent = self.latent.sample(num_windows, np.random.default_rng(seed))
+        noise = predict_windows(self.generator, latent, batch_size)[:, :, 0]
         return noise * np.float32(self.scale)
+
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+        """Generates one series of noise of any length, without seams, float32 of shape `(num_samples,)`.
+
+        A generator that convolves makes it in one piece. Windows of any other are independent of each other: those that
+        overlap by half are faded into each other with weights whose squares add up to one, so that the variance stays.
+
+        Args:
+            num_samples: Length of the series.
+            seed: Seed of the latent vectors, or a generator that draws them.
+        """
+        rng = np.random.default_rng(seed)
+        if self.latent.is_series:
+            stretches = self.latent.stretches(num_samples, rng)
+            return np.concatenate([np.asarray(self.generator.predict_on_batch(each))[0, :, 0] for each in stretches]) * np.float32(
+                self.scale
+            )
+        window = self.discriminator.input_shape[1]
+        hop, num_windows = window // 2, num_overlapping(num_samples, window)
+        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # fade^2 of two windows half a window apart adds up to 1
+        series, total = np.zeros((2, window + (num_windows - 1) * hop))
+        for begin, rough in zip(hop * np.arange(num_windows), self.generate(num_windows, rng), strict=True):
+            series[begin : begin + window] += fade * rough
+            total[begin : begin + window] += fade**2
+        return (series / np.sqrt(total))[:num_samples].astype(np.float32)
 
     def get_config(self) -> dict:
         """The settings that `generate` needs, as plain JSON types."""
-        return {"latent_span": self.latent_span, "scale": self.scale}
+        return {"latent_span": self.latent.span, "slow_samples": list(self.latent.slow_samples), "scale": self.scale}
+
+
+def num_overlapping(num_samples: int, window: int) -> int:
+    """How many windows, each half a window after the one before, cover a series."""
+    return 1 + max(0, -(-(num_samples - window) // (window // 2)))
