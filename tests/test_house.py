@@ -28,12 +28,15 @@ FLOORS = {
     "fused_adam": 1,
     "noise": 1,
     "detectors": 1,
+    "autoencoders": 1,
+    "injections": 1,
     "simulator": 1,
     "periodicity": 1,
     "store": 1,
     "telemetry": 0,
     "signals": 0,
     "fidelity": 0,
+    "detection": 0,
     "files": 0,
     "errors": 0,
     "terminal": 0,
@@ -51,6 +54,9 @@ WITHOUT_TENSORFLOW = [
     "simulator",
     "noise",
     "detectors",
+    "autoencoders",
+    "injections",
+    "detection",
     "terminal",
 ]
 
@@ -252,7 +258,7 @@ def test_no_exception_is_caught_blindly(module):
 
 
 def test_every_room_has_its_tests():
-    with_others = {"periodicity": "simulator", "terminal": "house", "fused_adam": "fast_paths"}
+    with_others = {"periodicity": "simulator", "terminal": "house", "fused_adam": "fast_paths", "autoencoders": "detectors"}
     rooms = {module for module in TREES if "." not in module} - {"__init__", "__main__", "errors"}
     assert {f"test_{with_others.get(room, room)}.py" for room in rooms} <= {path.name for path in (ROOT / "tests").iterdir()}
 
