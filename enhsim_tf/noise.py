@@ -60,8 +60,14 @@ class GaussianNoise:
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws noise, float32 of shape `(num_windows, samples)`; the same seed draws the same."""
-        rng = np.random.default_rng(seed)
-        return (self.standard_deviation * rng.standard_normal((num_windows, self.window))).astype(np.float32)
+        return self._draw((num_windows, self.window), seed)
+
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+        """Draws one series of any length, float32 of shape `(num_samples,)`."""
+        return self._draw((1, num_samples), seed)[0]
+
+    def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
+        return (self.standard_deviation * np.random.default_rng(seed).standard_normal(shape)).astype(np.float32)
 
 
 class GaussianAutoregression:
@@ -114,11 +120,18 @@ class GaussianAutoregression:
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws noise, float32 of shape `(num_windows, samples)`, stationary from its first sample on; the same seed draws the same."""
+        return self._draw((num_windows, self.window), seed)
+
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+        """Draws one series of any length, float32 of shape `(num_samples,)`."""
+        return self._draw((1, num_samples), seed)[0]
+
+    def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
         from scipy.signal import lfilter
 
-        draws = np.random.default_rng(seed).standard_normal((num_windows, self.window))
+        draws = np.random.default_rng(seed).standard_normal(shape)
         innovations, whitening = self.innovation_sd * draws, np.concatenate([[1.0], -self.coefficients])
-        start = np.zeros((num_windows, min(len(self.coefficients), self.window)))
+        start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
         for place in range(start.shape[1]):  # each of the first samples is predicted from as many as there are before it
             past, sd = self._start[place]
             start[:, place] = start[:, :place][:, ::-1] @ past + sd * draws[:, place]
@@ -168,10 +181,17 @@ class BlockBootstrap:
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws noise, float32 of shape `(num_windows, samples)`; the same seed draws the same."""
-        rng, samples = np.random.default_rng(seed), self.windows.shape[1]
-        shape = (num_windows, -(-samples // self.block) + 1)
-        sources = rng.integers(0, len(self.windows), shape)
-        begins = rng.integers(0, samples - self.block + 1, shape)
-        places = np.arange(samples) + rng.integers(0, self.block, (num_windows, 1))  # where in its chain of blocks a window begins
-        rows, blocks = np.arange(num_windows)[:, None], places // self.block
+        return self._draw((num_windows, self.windows.shape[1]), seed)
+
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+        """Draws one series of any length, float32 of shape `(num_samples,)`; it has a seam after each block."""
+        return self._draw((1, num_samples), seed)[0]
+
+    def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
+        rng, (num_rows, samples) = np.random.default_rng(seed), shape
+        chain = (num_rows, -(-samples // self.block) + 1)
+        sources = rng.integers(0, len(self.windows), chain)
+        begins = rng.integers(0, self.windows.shape[1] - self.block + 1, chain)
+        places = np.arange(samples) + rng.integers(0, self.block, (num_rows, 1))  # where in its chain of blocks a window begins
+        rows, blocks = np.arange(num_rows)[:, None], places // self.block
         return self.windows[sources[rows, blocks], begins[rows, blocks] + places % self.block]
