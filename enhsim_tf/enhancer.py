@@ -159,7 +159,7 @@ def predict_windows(model: keras.Model, inputs: np.ndarray, batch_size: int) -> 
     """
     if len(inputs) <= batch_size:
         return np.asarray(model.predict_on_batch(inputs)) if len(inputs) else np.empty((0, *model.output_shape[1:]), np.float32)
-    outputs = np.empty((len(inputs), *model.output_shape[1:]), np.float32)
+    outputs = np.empty(model.compute_output_shape(inputs.shape), np.float32)
     for first in range(0, len(inputs), batch_size):
         outputs[first : first + batch_size] = model.predict_on_batch(inputs[first : first + batch_size])
     return outputs

@@ -177,9 +177,9 @@ def test_noise_of_a_series_fades_at_neither_end(num_samples):
 def test_noise_has_draws_of_its_own():
     # with the seed of the coarse windows its draws would be made of the same random bits
     class Drawing(GaussianNoise):
-        def generate(self, num_windows, seed):
+        def _draw(self, shape, seed):
             drawn.append(np.random.default_rng(copy.deepcopy(seed)).integers(1_000_000))
-            return super().generate(num_windows, seed)
+            return super()._draw(shape, seed)
 
     drawn, simulator = [], EnhancedSimulator(COARSE, identity(60), Drawing(0.1, 60))
     for seed in (0, 1, 2, 1):

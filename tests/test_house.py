@@ -25,6 +25,8 @@ FLOORS = {
     "enhancer": 1,
     "noise_gan": 1,
     "convolution_maximum": 1,
+    "convolutional_noise": 1,
+    "latent": 1,
     "fused_adam": 1,
     "noise": 1,
     "detectors": 1,
