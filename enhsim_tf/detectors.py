@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from enhsim_tf.fidelity import window_features
+from enhsim_tf.two_sample import window_features
 
 
 class Detector(Protocol):
