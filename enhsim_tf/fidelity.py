@@ -80,10 +80,17 @@ def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) ->
 
 
 def marginal_distance(generated: np.ndarray, real: np.ndarray) -> float:
-    """First Wasserstein distance of the values, in units of the real standard deviation."""
-    quantiles = (np.arange(2000) + 0.5) / 2000
-    difference = np.quantile(generated, quantiles) - np.quantile(real, quantiles)
+    """First Wasserstein distance of the values, from 2,000 of their quantiles, in units of the real standard deviation."""
+    difference = _quantiles(generated) - _quantiles(real)
     return float(np.mean(np.abs(difference)) / np.std(real, dtype=np.float64))
+
+
+def _quantiles(values: np.ndarray, number: int = 2000) -> np.ndarray:
+    """`np.quantile` in the middles of equal shares, several times as fast: one sort for all."""
+    ordered = np.sort(values, axis=None)
+    place = (np.arange(number) + 0.5) / number * (ordered.size - 1)
+    below = place.astype(int)
+    return ordered[below] + (place - below) * (ordered[np.minimum(below + 1, ordered.size - 1)] - ordered[below])
 
 
 def excess_kurtosis(windows: np.ndarray) -> float:

@@ -213,19 +213,19 @@ class HeteroscedasticNoise:
     def estimate(windows: np.ndarray) -> dict[str, float]:
         """From the covariance of the logarithm of absolute values: that of the scale, since the Gaussian factor has none.
 
-        The covariance at short and at half a window's lags gives level and decay. A correlation much longer than the
-        window is told but roughly: `inf` where it does not fall.
+        An exponential through its lags up to half a window; a correlation much longer than the window is told but roughly.
         """
+        from scipy.optimize import curve_fit
+
         from enhsim_tf.fidelity import lagged_products
 
         logs = np.log(np.abs(np.asarray(windows, np.float64)) + 1e-12)
-        samples = logs.shape[1]
-        width, half = max(1, samples // 50), samples // 2
-        covariance = lagged_products(logs, half + width).mean(axis=0)
-        early, late = covariance[1 : width + 1].mean(), covariance[half + 1 :].mean()
-        decay = np.log(early / max(late, 1e-6 * early)) if early > 0 else np.inf
-        found = {"log_scale_sd": float(np.sqrt(max(early, 0))), "correlation_samples": float(half / decay) if decay > 0 else np.inf}
-        return found | WhiteNoise.estimate(windows)
+        lag = np.arange(1.0, logs.shape[1] // 2 + 1)
+        covariance = lagged_products(logs, len(lag)).mean(axis=0)[1:]
+        bounds = ([0.0, 0.5], [np.inf, 1000.0 * len(lag)])
+        start = (max(covariance[: 1 + len(lag) // 10].mean(), 1e-6), float(len(lag)))
+        (level, decay), _ = curve_fit(lambda k, level, decay: level * np.exp(-k / decay), lag, covariance, start, bounds=bounds)
+        return {"log_scale_sd": float(np.sqrt(level)), "correlation_samples": float(decay)} | WhiteNoise.estimate(windows)
 
 
 def _first_order(num_samples: int, coefficient: float, rng: np.random.Generator) -> np.ndarray:

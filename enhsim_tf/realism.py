@@ -87,8 +87,8 @@ MEASURES = (
         "A5", "classifier AUC, convolutions", two_sample.convolution_features, _convolution_auc, 0.5, False, 50,
         lambda generated, real: two_sample.linear_classifier(generated, real).p_value(),
     ),
-    Measure("A6", "density", two_sample.window_features, two_sample.density, perfect=1.0, most_resplits=100),
-    Measure("A6", "coverage", two_sample.window_features, two_sample.coverage, perfect=1 - 2.0**-5, most_resplits=100),
+    Measure("A6", "density", two_sample.window_features, two_sample.density, perfect=1.0, most_resplits=50),
+    Measure("A6", "coverage", two_sample.window_features, two_sample.coverage, perfect=1 - 2.0**-5, most_resplits=50),
     Measure("A7", "MMD squared", two_sample.window_features, two_sample.mmd_squared, 0.0, False, 50, two_sample.mmd_p_value),
     Measure("rank", "effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, most_resplits=20),
 )  # fmt: skip
