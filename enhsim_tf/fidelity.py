@@ -30,7 +30,8 @@ def effective_rank(windows: np.ndarray) -> float:
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, axis=0, dtype=np.float64)
     energy = np.linalg.svd(centred, compute_uv=False) ** 2
-    share = energy[energy > 0] / energy.sum()
+    share = energy / energy.sum()
+    share = share[share > 0]
     return float(np.exp(-np.sum(share * np.log(share))))
 
 
@@ -73,7 +74,7 @@ def log_scales(windows: np.ndarray) -> np.ndarray:
 
 
 def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) -> float:
-    """First Wasserstein distance of two sets of `log_scales`: does the scale vary from window to window as it should?"""
+    """First Wasserstein distance of two sets of `log_scales`: how wrongly the scale varies from window to window."""
     from scipy.stats import wasserstein_distance
 
     return float(wasserstein_distance(generated_scales, real_scales))
