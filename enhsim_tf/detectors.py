@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.autoencoders import ConvolutionalAutoencoder, DenseAutoencoder
-from enhsim_tf.fidelity import window_features
+from enhsim_tf.two_sample import window_features
 
 
 class Detector(Protocol):

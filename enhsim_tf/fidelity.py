@@ -1,8 +1,14 @@
-"""Measures of how close generated telemetry is to real: pure functions of arrays of shape `(windows, samples)`."""
+"""Measures of how close generated telemetry is to real: pure functions of arrays of shape `(windows, samples)`.
+
+Those that compare spectra or correlations take what `window_spectra` and `lagged_products` make of each window, so that a
+floor over many re-splits of the same windows transforms each window once. `realism` holds each against its floor.
+"""
+
+import functools
 
 import numpy as np
 
-from enhsim_tf.errors import InputError
+_TINY = 1e-30  # keeps the logarithm of what stands still finite
 
 
 def nrmse(estimate: np.ndarray, truth: np.ndarray) -> float:
@@ -24,16 +30,37 @@ def effective_rank(windows: np.ndarray) -> float:
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, axis=0, dtype=np.float64)
     energy = np.linalg.svd(centred, compute_uv=False) ** 2
-    share = energy[energy > 0] / energy.sum()
+    share = energy / energy.sum()
+    share = share[share > 0]
     return float(np.exp(-np.sum(share * np.log(share))))
+
+
+def lagged_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
+    """Mean product of each window's values with those 0 to `max_lag` samples later, about the mean of all windows.
+
+    Averaged over windows they are the autocovariance; shape `(windows, max_lag + 1)`.
+    """
+    centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
+    samples = centred.shape[1]
+    products = [np.einsum("ws,ws->w", centred[:, : samples - lag], centred[:, lag:]) / (samples - lag) for lag in range(max_lag + 1)]
+    return np.stack(products, axis=1)
+
+
+def lagged_square_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
+    """`lagged_products` of the squares of the values about their mean: how scale follows scale (volatility clustering)."""
+    return lagged_products((np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2, max_lag)
 
 
 def autocorrelation(windows: np.ndarray, max_lag: int) -> np.ndarray:
     """Autocorrelation at lags 0 to `max_lag`, pooled over the windows; shape `(max_lag + 1,)`."""
-    centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
-    samples = centred.shape[1]
-    products = [np.mean(centred[:, : samples - lag] * centred[:, lag:]) for lag in range(max_lag + 1)]
-    return np.array(products) / products[0]
+    products = np.mean(lagged_products(windows, max_lag), axis=0)
+    return products / products[0]
+
+
+def autocorrelation_distance(generated_products: np.ndarray, real_products: np.ndarray) -> float:
+    """Largest difference of the autocorrelations that two sets of `lagged_products` make up."""
+    generated, real = (np.mean(products, axis=0) for products in (generated_products, real_products))
+    return float(np.max(np.abs(generated / (generated[0] + _TINY) - real / (real[0] + _TINY))))
 
 
 def scale_difference(generated: np.ndarray, real: np.ndarray) -> float:
@@ -41,11 +68,47 @@ def scale_difference(generated: np.ndarray, real: np.ndarray) -> float:
     return float(abs(np.log(np.std(generated, dtype=np.float64) / np.std(real, dtype=np.float64))))
 
 
+def log_scales(windows: np.ndarray) -> np.ndarray:
+    """Logarithm of each window's standard deviation, shape `(windows,)`."""
+    return np.log(np.std(windows, axis=1, dtype=np.float64) + _TINY)
+
+
+def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) -> float:
+    """First Wasserstein distance of two sets of `log_scales`: how wrongly the scale varies from window to window."""
+    from scipy.stats import wasserstein_distance
+
+    return float(wasserstein_distance(generated_scales, real_scales))
+
+
 def marginal_distance(generated: np.ndarray, real: np.ndarray) -> float:
-    """First Wasserstein distance of the values, in units of the real standard deviation."""
-    quantiles = (np.arange(2000) + 0.5) / 2000
-    difference = np.quantile(generated, quantiles) - np.quantile(real, quantiles)
+    """First Wasserstein distance of the values, from 2,000 of their quantiles, in units of the real standard deviation."""
+    difference = _quantiles(generated) - _quantiles(real)
     return float(np.mean(np.abs(difference)) / np.std(real, dtype=np.float64))
+
+
+def _quantiles(values: np.ndarray, number: int = 2000) -> np.ndarray:
+    """`np.quantile` in the middles of equal shares, several times as fast: one sort for all."""
+    ordered = np.sort(values, axis=None)
+    place = (np.arange(number) + 0.5) / number * (ordered.size - 1)
+    below = place.astype(int)
+    return ordered[below] + (place - below) * (ordered[np.minimum(below + 1, ordered.size - 1)] - ordered[below])
+
+
+def excess_kurtosis(windows: np.ndarray) -> float:
+    """Fourth moment of the values in units of the squared variance, less the 3 of a Gaussian."""
+    centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
+    squares = centred**2
+    return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY) - 3)
+
+
+def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
+    """Excess kurtosis of the generated values less that of the real ones: above 0, their tails are too heavy."""
+    return excess_kurtosis(generated) - excess_kurtosis(real)
+
+
+def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
+    """Quantile 0.999 of the generated absolute values, in units of that of the real ones."""
+    return float(np.quantile(np.abs(generated), 0.999) / (np.quantile(np.abs(real), 0.999) + _TINY))
 
 
 def power_spectrum(windows: np.ndarray) -> np.ndarray:
@@ -56,58 +119,43 @@ def power_spectrum(windows: np.ndarray) -> np.ndarray:
     return np.mean(np.abs(transformed[:, 1:]) ** 2, axis=0) / np.sum(taper**2)
 
 
-def window_features(windows: np.ndarray) -> np.ndarray:
-    """Fourteen features of each window, float64 of shape `(windows, 14)`.
-
-    Mean, log sd, excess kurtosis, largest value, log sd of first differences, lag-1 correlation, and the log power in
-    eight bands that double in width.
-    """
-    values = np.asarray(windows, np.float64)
-    tiny = 1e-12  # keeps the logarithm of a window that stands still finite
-    mean = values.mean(axis=1)
-    centred = values - mean[:, None]
-    variance = np.mean(centred**2, axis=1) + tiny
-    kurtosis = np.mean(centred**4, axis=1) / variance**2 - 3
-    steps = np.std(np.diff(values, axis=1), axis=1)
-    correlation = np.mean(centred[:, 1:] * centred[:, :-1], axis=1) / variance
-    power = np.abs(np.fft.rfft(centred, axis=1)) ** 2
-    edges = np.unique(np.rint(np.geomspace(1, power.shape[1], 9)).astype(int))
-    bands = [np.log(power[:, a:b].mean(axis=1) + tiny) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    columns = [mean, np.log(variance) / 2, kurtosis, values.max(axis=1), np.log(steps + tiny), correlation, *bands]
-    return np.stack(columns, axis=1)
-
-
-def two_sample_auc(generated: np.ndarray, real: np.ndarray, seed: int, num_folds: int = 5) -> float:
-    """How well a classifier tells generated from real windows by `window_features`: 0.5 cannot, 1 always can.
-
-    A two-sample test (Lopez-Paz and Oquab 2017): gradient-boosted trees, area under the ROC curve over held-out folds of
-    consecutive windows, so that neighbours in time are never on both sides.
+def window_spectra(windows: np.ndarray, time_half_bandwidth: float = 4, num_tapers: int = 7) -> np.ndarray:
+    """Multitaper power spectrum of each window (Thomson 1982), without zero and Nyquist frequency.
 
     Args:
-        generated: Generated windows, shape `(windows, samples)`.
-        real: Real windows in the order of time; the smaller of both numbers is used.
-        seed: Seed of the trees.
-        num_folds: Number of folds.
+        windows: Windows of shape `(windows, samples)`.
+        time_half_bandwidth: Samples of a window times half the bandwidth of a bin, in cycles a sample.
+        num_tapers: Number of Slepian tapers, whose squared transforms are averaged.
 
     Returns:
-        The area, from 0 to 1.
-
-    Raises:
-        InputError: If there are fewer than two windows a fold.
+        float64 array of shape `(windows, (samples - 1) // 2)`, in value^2 a bin: white noise has its variance everywhere.
     """
-    from sklearn.ensemble import HistGradientBoostingClassifier
-    from sklearn.metrics import roc_auc_score
-    from sklearn.model_selection import cross_val_predict
-    from threadpoolctl import threadpool_limits
+    values = np.asarray(windows, np.float64)
+    samples, power = values.shape[1], 0.0
+    for taper in _slepian_tapers(samples, time_half_bandwidth, num_tapers):
+        power = power + np.abs(np.fft.rfft(values * taper, axis=1)[:, 1 : (samples + 1) // 2]) ** 2
+    return power / num_tapers
 
-    number = min(len(generated), len(real))
-    if number < 2 * num_folds:
-        raise InputError(f"Expected at least {2 * num_folds} windows of each kind. Received: {number}.")
-    features = window_features(np.concatenate([generated[:number], real[:number]]))
-    labels = np.repeat([1, 0], number)
-    folds = np.tile(np.arange(number) * num_folds // number, 2)
-    splits = [(np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)) for fold in range(num_folds)]
-    classifier = HistGradientBoostingClassifier(random_state=seed)
-    with threadpool_limits(1, user_api="openmp"):  # threads that wait for each other on a busy machine take ten times as long
-        scores = cross_val_predict(classifier, features, labels, cv=splits, method="predict_proba")[:, 1]
-    return float(roc_auc_score(labels, scores))
+
+@functools.cache
+def _slepian_tapers(samples: int, time_half_bandwidth: float, num_tapers: int) -> np.ndarray:
+    from scipy.signal.windows import dpss
+
+    return dpss(samples, time_half_bandwidth, num_tapers)
+
+
+def geodesic_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
+    """Standard deviation over the bins of the log ratio of the median `window_spectra`: their shape, blind to scale.
+
+    The geodesic distance of power spectra (Georgiou 2007), as Wunderlich and Sklar (2023) judge generated noise by.
+    """
+    return float(np.std(_log_ratio(generated_spectra, real_spectra)))
+
+
+def log_spectral_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
+    """Root mean square over the bins of the log ratio of the median `window_spectra`: their shape and scale."""
+    return float(np.sqrt(np.mean(_log_ratio(generated_spectra, real_spectra) ** 2)))
+
+
+def _log_ratio(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> np.ndarray:
+    return np.log(np.median(generated_spectra, axis=0) + _TINY) - np.log(np.median(real_spectra, axis=0) + _TINY)

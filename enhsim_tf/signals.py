@@ -1,4 +1,4 @@
-"""Closed-form signals and known noise: the ground truth that a measurement can be held against."""
+"""Closed-form signals: the ground truth that a measurement can be held against. Noise: `noise_processes`."""
 
 from collections.abc import Sequence
 
@@ -18,17 +18,3 @@ def sines(time_s: np.ndarray, periods_s: Sequence[float], amplitudes: Sequence[f
     """
     pairs = zip(periods_s, amplitudes, strict=True)
     return sum(amplitude * np.sin(2 * np.pi * np.asarray(time_s) / period) for period, amplitude in pairs)
-
-
-def white_noise(num_samples: int, standard_deviation: float, rng: np.random.Generator) -> np.ndarray:
-    """Independent Gaussian noise.
-
-    Args:
-        num_samples: Number of samples.
-        standard_deviation: In the unit of the signal.
-        rng: Draws the noise.
-
-    Returns:
-        float64 array of shape `(num_samples,)`.
-    """
-    return rng.normal(0.0, standard_deviation, num_samples)

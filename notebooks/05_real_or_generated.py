@@ -78,7 +78,7 @@ assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[experiment.settings.budget]
 # %% [markdown]
 # ## Exercises
 #
-# 1. A classifier beats your eye, so what does it look at? Rank the features of `fidelity.window_features` by how well each one alone
+# 1. A classifier beats your eye, so what does it look at? Rank the features of `two_sample.window_features` by how well each one alone
 #    tells generated from real noise.
 # 2. How many windows would you have to judge, and how many of them rightly, before you may claim to see a difference?
 
@@ -88,7 +88,7 @@ assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[experiment.settings.budget]
 # %%
 from sklearn.metrics import roc_auc_score
 
-from enhsim_tf.fidelity import window_features
+from enhsim_tf.two_sample import window_features
 
 real = experiment.data.noise_windows("test", None)
 generated = experiment.simulator.noise.generate(len(real), seed=1)

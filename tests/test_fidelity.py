@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
+import scipy.stats
 
 from enhsim_tf import fidelity
 
@@ -17,6 +19,10 @@ def autoregressive(num_windows, samples, coefficient, seed=0):
     for sample in range(1, samples):
         values[:, sample] = coefficient * values[:, sample - 1] + np.sqrt(1 - coefficient**2) * innovations[:, sample]
     return values
+
+
+def windows_of_t(num_windows, seed=5):
+    return np.random.default_rng(seed).standard_t(5, (num_windows, 500))
 
 
 def test_nrmse_by_hand():
@@ -89,6 +95,8 @@ def test_marginal_distance_of_a_shift_and_of_a_stretch():
     assert fidelity.marginal_distance(real[::-1, ::-1], real) == 0  # only the values count, not their order
     assert fidelity.marginal_distance(real + 0.6, real) == pytest.approx(0.6 / np.std(real))
     assert fidelity.marginal_distance(0.6 + 2 * normal(400, 500, seed=1), real) == pytest.approx(0.3, abs=0.01)
+    by_definition = scipy.stats.wasserstein_distance(windows_of_t(60).ravel(), real[:60].ravel()) / np.std(real[:60])
+    assert fidelity.marginal_distance(windows_of_t(60), real[:60]) == pytest.approx(by_definition, rel=0.005)
     # a Gaussian stretched by s is |s - 1| E|z| = |s - 1| sqrt(2 / pi) away
     assert fidelity.marginal_distance(1.5 * real, real) == pytest.approx(0.5 * np.sqrt(2 / np.pi), rel=0.01)
 
@@ -108,56 +116,94 @@ def test_power_spectrum_of_a_sine_peaks_at_its_frequency():
     assert spectrum[14:19].sum() == pytest.approx(spectrum.sum(), rel=1e-3)
 
 
-def test_features_of_a_window_worked_by_hand():
-    window = np.array([[1.0, -1, 1, -1, 1, -1, 1, -1]])
-    mean, log_sd, kurtosis, highest, log_steps, correlation = fidelity.window_features(3 + 2 * window)[0, :6]
-    assert (mean, highest) == (3, 5)
-    assert log_sd == pytest.approx(np.log(2))
-    assert kurtosis == pytest.approx(1 - 3)
-    assert log_steps == pytest.approx(np.log(np.std([-4, 4, -4, 4, -4, 4, -4])))
-    assert correlation == pytest.approx(-1)
+def test_lagged_products_by_hand():
+    windows = np.array([[1.0, 2, 4], [-1, -2, -4]])  # their mean is 0
+    assert fidelity.lagged_products(windows, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
+    assert fidelity.lagged_products(windows + 9, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
+    squares = np.array([[1.0, 4, 16]] * 2) - 7
+    assert fidelity.lagged_square_products(windows + 9, 1)[0] == pytest.approx([np.mean(squares[0] ** 2), (6 * 3 - 3 * 9) / 2])
 
 
-def test_features_of_white_noise_are_those_of_its_closed_form():
-    features = fidelity.window_features(0.5 * normal(400, 500))
-    expected = [0, np.log(0.5), 0, None, np.log(0.5 * np.sqrt(2)), 0]
-    for column, value in enumerate(expected):
-        if value is not None:
-            assert np.mean(features[:, column]) == pytest.approx(value, abs=0.02)
+def test_autocorrelation_distance_is_the_largest_difference():
+    one, other = np.array([[2.0, 1, 0], [2, 0, 0]]), np.array([[1.0, 0.5, 0.5]])  # correlations 1, 1/4, 0 and 1, 1/2, 1/2
+    assert fidelity.autocorrelation_distance(one, other) == pytest.approx(0.5)
+    assert fidelity.autocorrelation_distance(9 * one, one) == pytest.approx(0)
 
 
-def test_eight_bands_that_double_in_width():
-    # a sine in the middle of each octave of 1 ... 250 cycles a window is strongest in the band of its octave
-    cycles = np.array([1, 3, 6, 11, 23, 45, 90, 180])
-    windows = np.sin(2 * np.pi * cycles[:, None] / 500 * np.arange(500))
-    features = fidelity.window_features(windows)
-    assert features.shape == (8, 14)
-    assert np.argmax(features[:, 6:], axis=1).tolist() == list(range(8))
+def test_autocorrelation_distance_of_processes_in_closed_form():
+    # a Gaussian process of correlation r has squares of correlation r^2
+    white, coloured = normal(400, 500, seed=1), autoregressive(400, 500, 0.7)
+    for describe, expected in ((fidelity.lagged_products, 0.7), (fidelity.lagged_square_products, 0.49)):
+        assert fidelity.autocorrelation_distance(describe(white, 50), describe(coloured, 50)) == pytest.approx(expected, abs=0.02)
 
 
-def test_features_of_a_window_that_stands_still_are_finite():
-    assert np.isfinite(fidelity.window_features(np.full((2, 500), 7.0, np.float32))).all()
+def test_log_scales_and_their_distance():
+    windows = np.array([[1.0, -1], [3, 1], [5, -5]])  # standard deviations 1, 1, 5
+    assert fidelity.log_scales(windows) == pytest.approx([0, 0, np.log(5)])
+    scales = fidelity.log_scales(normal(50, 100))
+    assert fidelity.log_scale_distance(scales[::-1] + 0.25, scales) == pytest.approx(0.25)
+    # equal in the mean, spread by one: half of each lies half a unit away on either side
+    assert fidelity.log_scale_distance(np.array([-1.0, 1]), np.array([0.0, 0])) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_two_samples_of_one_process_cannot_be_told_apart(seed):
-    auc = fidelity.two_sample_auc(normal(200, 100, seed=seed), normal(200, 100, seed=seed + 1), seed=0)
-    assert auc == pytest.approx(0.5, abs=5 * np.sqrt(401 / (12 * 200**2)))  # standard error of the rank sum
+def test_kurtosis_of_known_distributions():
+    owner, shape = np.random.default_rng(0), (400, 500)
+    assert fidelity.excess_kurtosis(np.array([[1.0, -1], [1, -1]]) + 4) == pytest.approx(-2)
+    assert fidelity.excess_kurtosis(owner.uniform(size=shape)) == pytest.approx(-1.2, abs=0.01)
+    assert fidelity.excess_kurtosis(owner.laplace(size=shape)) == pytest.approx(3, abs=0.3)
+    assert fidelity.kurtosis_difference(owner.laplace(size=shape), owner.uniform(size=shape)) == pytest.approx(4.2, abs=0.3)
 
 
-def test_two_samples_of_two_processes_can_and_the_same_seed_says_the_same():
-    first, again = (fidelity.two_sample_auc(autoregressive(100, 100, 0.7), normal(120, 100, seed=3), seed=0) for _ in range(2))
-    assert first > 0.98 and first == again
+def test_tail_ratio_of_known_quantiles():
+    gaussian = normal(400, 500)
+    assert fidelity.tail_ratio(1.5 * gaussian, gaussian) == pytest.approx(1.5)
+    laplace = np.random.default_rng(1).laplace(size=(400, 500))  # 0.999 of its absolute values lie below log(1000)
+    assert fidelity.tail_ratio(laplace, gaussian) == pytest.approx(np.log(1000) / scipy.stats.norm.ppf(0.9995), rel=0.05)
 
 
-def test_two_sample_folds_hold_out_neighbours():
-    # stretches of ten windows at a level of their own, of either kind by chance: whoever met a neighbour in training
-    # knows its level and so its kind
-    levels = np.random.default_rng(0).permutation(40).reshape(2, 20)
-    generated, real = (np.repeat(kind, 10)[:, None] + 0.01 * normal(200, 50) for kind in levels)
-    assert fidelity.two_sample_auc(generated, real, seed=0) < 0.75
+@pytest.mark.parametrize("samples", [64, 65])
+def test_multitaper_spectrum_from_its_definition(samples):
+    # Slepian tapers are the eigenvectors of the sinc matrix of bandwidth 4 / samples; transforms by their sum
+    time = np.arange(samples)
+    apart = time[:, None] - time
+    tapers = scipy.linalg.eigh(np.where(apart == 0, 8 / samples, np.sinc(8 / samples * apart) * 8 / samples))[1][:, -7:]
+    windows, bins = 3 * normal(5, samples), np.arange(1, (samples - 1) // 2 + 1)
+    transform = np.exp(-2j * np.pi / samples * np.outer(time, bins))
+    expected = np.mean([np.abs((windows * taper) @ transform) ** 2 for taper in tapers.T], axis=0)
+    assert fidelity.window_spectra(windows) == pytest.approx(expected, rel=1e-6)
 
 
-def test_two_sample_auc_refuses_too_few_windows(refused):
-    with refused("10 windows"):
-        fidelity.two_sample_auc(normal(9, 100), normal(40, 100), seed=0)
+def test_multitaper_spectrum_of_white_noise_is_its_variance():
+    spectra = fidelity.window_spectra(0.5 * normal(1_000, 100))
+    assert spectra.shape == (1_000, 49)
+    assert spectra.mean(axis=0) == pytest.approx(np.full(49, 0.25), rel=5 / np.sqrt(7 * 1_000))
+
+
+def test_spectral_distances_by_hand():
+    real = np.ones((3, 4)) * [1, 10, 100, 1]
+    shape = np.exp([0.3, -0.3, 0.3, -0.3])
+    outlier = np.array([[1.0], [1.0], [1e6]])  # one window in three does not move a median
+    assert fidelity.geodesic_distance(outlier * real * shape, real) == pytest.approx(0.3)
+    assert fidelity.geodesic_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.3)
+    assert fidelity.log_spectral_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.5)
+
+
+def test_spectral_distances_of_an_autoregressive_process_in_closed_form():
+    white, coloured = (fidelity.window_spectra(windows) for windows in (normal(400, 500, seed=1), autoregressive(400, 500, 0.7)))
+    frequency = np.arange(1, 250) / 500
+    log_ratio = np.log(0.51 / np.abs(1 - 0.7 * np.exp(-2j * np.pi * frequency)) ** 2)
+    assert fidelity.geodesic_distance(coloured, white) == pytest.approx(np.std(log_ratio), rel=0.02)
+    assert fidelity.log_spectral_distance(coloured, white) == pytest.approx(np.sqrt(np.mean(log_ratio**2)), rel=0.02)
+
+
+def test_a_generator_that_stands_still_is_infinitely_far_and_finite():
+    still, real = np.zeros((30, 100)), normal(30, 100)
+    for describe, compare in (
+        (fidelity.window_spectra, fidelity.geodesic_distance),
+        (fidelity.window_spectra, fidelity.log_spectral_distance),
+        (fidelity.log_scales, fidelity.log_scale_distance),
+        (lambda windows: fidelity.lagged_products(windows, 20), fidelity.autocorrelation_distance),
+        (lambda windows: windows, fidelity.kurtosis_difference),
+        (lambda windows: windows, fidelity.tail_ratio),
+    ):
+        assert np.isfinite(compare(describe(still), describe(real)))

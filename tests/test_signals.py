@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.signals import sines, white_noise
+from enhsim_tf.signals import sines
 
 
 def test_sine_at_the_quarters_of_its_period():
@@ -31,19 +31,3 @@ def test_shape_of_the_times_is_kept():
 def test_every_period_needs_its_amplitude():
     with pytest.raises(ValueError, match="shorter"):
         sines(np.arange(3.0), [480, 120], [0.5])
-
-
-def test_white_noise_has_its_standard_deviation_and_no_memory():
-    number, sd = 100_000, 0.3
-    noise = white_noise(number, sd, np.random.default_rng(0))
-    assert noise.shape == (number,) and noise.dtype == np.float64
-    assert np.std(noise) == pytest.approx(sd, rel=5 / np.sqrt(2 * number))
-    assert np.mean(noise) == pytest.approx(0, abs=5 * sd / np.sqrt(number))
-    assert np.mean(noise[1:] * noise[:-1]) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(number))
-
-
-def test_white_noise_is_drawn_from_its_owner():
-    first, again, other = (white_noise(50, 1.0, np.random.default_rng(seed)) for seed in (7, 7, 8))
-    assert (first == again).all() and (first != other).all()
-    rng = np.random.default_rng(7)
-    assert (white_noise(50, 1.0, rng) != white_noise(50, 1.0, rng)).all()  # the owner's state moves on

@@ -13,8 +13,9 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.noise import extract_noise, noise_unit
+from enhsim_tf.noise_processes import WhiteNoise
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.signals import sines, white_noise
+from enhsim_tf.signals import sines
 from enhsim_tf.simulator import Degraded, SquareWave, SquareWaveSimulator, degrade, paired_windows, units_of
 from enhsim_tf.store import ParquetStore
 from enhsim_tf.telemetry import Telemetry, check_values, cut_windows, even_offsets, random_offsets, read_telemetry, split_by_time
@@ -101,7 +102,7 @@ def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -
     rng = draw(settings, "telemetry")
     for name, (periods, amplitudes) in waves_of(settings).items():
         clean = sines(chosen.interval_s * np.arange(chosen.num_samples), periods, amplitudes)
-        values = (clean + white_noise(chosen.num_samples, chosen.noise_sd, rng)).astype(np.float32)
+        values = (clean + WhiteNoise(chosen.noise_sd).draw(chosen.num_samples, rng)).astype(np.float32)
         store.write(Telemetry(values, chosen.interval_s, start="2020-01-01T00:00:00+00:00", name=name))
 
 
@@ -220,5 +221,5 @@ class Data:
         channel, rng = self.channels[0], self.draw(f"degraded {scenario}")
         size = sum(channel.amplitudes)
         clean = degrade(channel.truth, self.degraded_times(), scenario, (-size, size), min(channel.periods_s), rng)
-        noise = white_noise(clean.size, self.settings.telemetry.noise_sd, self.draw(f"degraded noise {scenario}"))
+        noise = WhiteNoise(self.settings.telemetry.noise_sd).draw(clean.size, self.draw(f"degraded noise {scenario}"))
         return (clean + noise.reshape(clean.shape) if noisy else clean).astype(np.float32)

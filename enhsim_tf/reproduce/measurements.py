@@ -10,6 +10,7 @@ from enhsim_tf import fidelity
 from enhsim_tf.detectors import DenseAutoencoder, IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.reproduce.settings import DetectorSettings
 from enhsim_tf.simulator import Degraded
+from enhsim_tf.two_sample import two_sample_auc
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
@@ -60,7 +61,7 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
             f"{name}marginal_distance": fidelity.marginal_distance(other, real),
             f"{name}rank_ratio": fidelity.effective_rank(other) / fidelity.effective_rank(real),
             f"{name}roughness_ratio": fidelity.roughness(other) / fidelity.roughness(real),
-            f"{name}classifier_auc": fidelity.two_sample_auc(other, real, seed),
+            f"{name}classifier_auc": two_sample_auc(other, real, seed),
         }
     ranks = {"rank": fidelity.effective_rank(generated), "real_rank": fidelity.effective_rank(real)}
     return measures | ranks | {"num_windows": float(len(real))}
