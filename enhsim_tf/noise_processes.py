@@ -35,7 +35,7 @@ class WhiteNoise:
 
     @staticmethod
     def estimate(windows: np.ndarray) -> dict[str, float]:
-        """Its standard deviation."""
+        """The standard deviation."""
         return {"standard_deviation": float(np.std(windows, dtype=np.float64))}
 
 

@@ -66,8 +66,16 @@ def _boosted_auc(generated: np.ndarray, real: np.ndarray) -> float:
     return two_sample.boosted_trees(generated, real).auc
 
 
-def _convolution_auc(generated: np.ndarray, real: np.ndarray) -> float:
+def _boosted_p(generated: np.ndarray, real: np.ndarray) -> float:
+    return two_sample.boosted_trees(generated, real).p_value()
+
+
+def _linear_auc(generated: np.ndarray, real: np.ndarray) -> float:
     return two_sample.linear_classifier(generated, real).auc
+
+
+def _linear_p(generated: np.ndarray, real: np.ndarray) -> float:
+    return two_sample.linear_classifier(generated, real).p_value()
 
 
 MEASURES = (
@@ -80,19 +88,13 @@ MEASURES = (
     Measure("A3", "tail ratio", _values, fidelity.tail_ratio, perfect=1.0, is_ratio=True),
     Measure("A4", "autocorrelation distance", _products, fidelity.autocorrelation_distance),
     Measure("A4", "autocorrelation distance of squares", _square_products, fidelity.autocorrelation_distance),
-    Measure(
-        "A5", "classifier AUC, boosted trees", two_sample.window_features, _boosted_auc, 0.5, False, 20,
-        lambda generated, real: two_sample.boosted_trees(generated, real).p_value(),
-    ),
-    Measure(
-        "A5", "classifier AUC, convolutions", two_sample.convolution_features, _convolution_auc, 0.5, False, 50,
-        lambda generated, real: two_sample.linear_classifier(generated, real).p_value(),
-    ),
+    Measure("A5", "classifier AUC, boosted trees", two_sample.window_features, _boosted_auc, 0.5, False, 20, _boosted_p),
+    Measure("A5", "classifier AUC, convolutions", two_sample.convolution_features, _linear_auc, 0.5, False, 50, _linear_p),
     Measure("A6", "density", two_sample.window_features, two_sample.density, perfect=1.0, most_resplits=50),
     Measure("A6", "coverage", two_sample.window_features, two_sample.coverage, perfect=1 - 2.0**-5, most_resplits=50),
     Measure("A7", "MMD squared", two_sample.window_features, two_sample.mmd_squared, 0.0, False, 50, two_sample.mmd_p_value),
     Measure("rank", "effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, most_resplits=40),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

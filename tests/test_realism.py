@@ -5,6 +5,7 @@ with 5 degrees of freedom) and a scale that differs from window to window.
 """
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -247,6 +248,11 @@ def test_dear_measures_say_that_they_took_fewer_resplits(judged):
 def test_judging_in_one_call_is_the_same():
     real, again, generated = (process(seed, 25, 60) for seed in (1, 2, 3))
     assert repr(judge(generated, real, again, 3, seed=5)) == repr(RealFloor(real, again, 3, seed=5).judge(generated))
+
+
+def test_a_floor_can_be_kept_for_other_processes():
+    floor, generated = RealFloor(process(1, 25, 60), process(2, 25, 60), 2), process(3, 25, 60)
+    assert repr(pickle.loads(pickle.dumps(floor)).judge(generated)) == repr(floor.judge(generated))
 
 
 def test_windows_that_cannot_be_judged_are_refused(refused):
