@@ -14,6 +14,7 @@ import keras
 import numpy as np
 
 from enhsim_tf import enhancer as enhancer_room
+from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.noise import extract_noise, noise_unit
@@ -78,6 +79,8 @@ class EnhancedSimulator:
         moving_average: int = 25,
         normalise: bool = True,
         window: int = 500,
+        noise: str = "paper",
+        extraction: str = "moving average",
         verbose: int | str = "auto",
     ) -> "EnhancedSimulator":
         """Trains both networks on nominal telemetry.
@@ -93,6 +96,10 @@ class EnhancedSimulator:
             normalise: Whether the networks see the telemetry in units of the coarse simulator's levels, and its noise at
                 the scale of the paper's; False leaves values as they are, as the paper does.
             window: Samples of a window.
+            noise: The networks that learn the noise: `paper`, or `convolutional`, which fill the space.
+            extraction: What the noise is: what the `moving average` leaves of the telemetry, as in the paper, or what the
+                `enhancer` leaves of the last quarter of it, which it then does not learn from. A moving average takes
+                slow noise away with the signal.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
 
         Returns:
@@ -101,20 +108,36 @@ class EnhancedSimulator:
         Raises:
             InputError: If the telemetry is not finite, constant or shorter than two windows.
         """
-        check_values(telemetry.values, telemetry.name, 2 * window)
+        if noise not in ("paper", "convolutional") or extraction not in ("moving average", "enhancer"):
+            raise InputError(
+                "Expected noise to be paper or convolutional, extraction to be moving average or enhancer. "
+                f"Received: noise={noise!r}, extraction={extraction!r}."
+            )
+        by_enhancer = extraction == "enhancer"
+        check_values(telemetry.values, telemetry.name, (8 if by_enhancer else 2) * window)
         coarse = SquareWaveSimulator.fit(telemetry) if coarse is None else coarse
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
 
-        offsets = random_offsets(len(telemetry), window, num_windows, rng)
-        source, target = ((pair - offset) / scale for pair in paired_windows(telemetry, coarse, offsets, window))
+        end = 3 * len(telemetry) // 4 if by_enhancer else len(telemetry)
+        learnt, rest = telemetry.part(0, end), telemetry.part(end, len(telemetry))
+        offsets = random_offsets(len(learnt), window, num_windows, rng)
+        source, target = ((pair - offset) / scale for pair in paired_windows(learnt, coarse, offsets, window))
         network = enhancer_room.build_enhancer(window, seed=seed)
         enhancer_room.fit_windows(network, source, target, epochs, batch_size=15, seed=seed, verbose=verbose)
 
-        noise, _ = extract_noise(telemetry.values, moving_average)
-        noise_windows = cut_windows(noise, random_offsets(len(noise), window, num_windows, rng), window)
-        noise_scale = noise_unit(noise) if normalise else 1.0
-        gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_scale, seed=seed)
+        if by_enhancer:
+            pairs = paired_windows(rest, coarse, random_offsets(len(rest), window, num_windows, rng), window)
+            source, target = ((pair - offset) / scale for pair in pairs)
+            noise_windows = scale * (target - enhancer_room.enhance(network, source))
+        else:
+            extracted, _ = extract_noise(telemetry.values, moving_average)
+            noise_windows = cut_windows(extracted, random_offsets(len(extracted), window, num_windows, rng), window)
+        if noise == "convolutional":
+            gan = convolutional_noise_gan(window, scale=float(np.std(noise_windows, dtype=np.float64)), seed=seed)
+        else:
+            noise_scale = noise_unit(noise_windows) if normalise else 1.0
+            gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_scale, seed=seed)
         gan.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
         trained = {
             "telemetry": telemetry.name,
@@ -124,6 +147,8 @@ class EnhancedSimulator:
             "epochs": epochs,
             "num_iterations": num_iterations,
             "moving_average": moving_average,
+            "noise": noise,
+            "extraction": extraction,
         }
         return cls(coarse, network, gan, telemetry.interval_s, offset, scale, trained)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.noise import extract_noise, noise_unit
-from enhsim_tf.noise_processes import WhiteNoise
+from enhsim_tf.noise_processes import NOISES
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.signals import sines
 from enhsim_tf.simulator import Degraded, SquareWave, SquareWaveSimulator, degrade, paired_windows, units_of
@@ -87,6 +87,24 @@ def draw(settings: Settings, purpose: str) -> np.random.Generator:
     return np.random.default_rng([settings.seed, zlib.crc32(purpose.encode())])
 
 
+def draw_noise(settings: Settings, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    """The noise of the example telemetry, float64 of shape `(num_samples,)`.
+
+    Args:
+        settings: Every number; `telemetry.noise` names the process.
+        num_samples: Length of the series.
+        rng: Owner of the draws.
+
+    Raises:
+        InputError: If nobody knows a process of that name.
+    """
+    chosen = settings.telemetry
+    if chosen.noise not in NOISES:
+        raise InputError(f"Expected telemetry.noise to be one of {', '.join(NOISES)}. Received: {chosen.noise!r}.")
+    process = NOISES[chosen.noise]
+    return chosen.noise_sd / process.standard_deviation * process.draw(num_samples, rng)
+
+
 def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -> None:
     """Places the telemetry in the store: the paper's example, or a real channel.
 
@@ -102,7 +120,7 @@ def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -
     rng = draw(settings, "telemetry")
     for name, (periods, amplitudes) in waves_of(settings).items():
         clean = sines(chosen.interval_s * np.arange(chosen.num_samples), periods, amplitudes)
-        values = (clean + WhiteNoise(chosen.noise_sd).draw(chosen.num_samples, rng)).astype(np.float32)
+        values = (clean + draw_noise(settings, chosen.num_samples, rng)).astype(np.float32)
         store.write(Telemetry(values, chosen.interval_s, start="2020-01-01T00:00:00+00:00", name=name))
 
 
@@ -221,5 +239,5 @@ class Data:
         channel, rng = self.channels[0], self.draw(f"degraded {scenario}")
         size = sum(channel.amplitudes)
         clean = degrade(channel.truth, self.degraded_times(), scenario, (-size, size), min(channel.periods_s), rng)
-        noise = WhiteNoise(self.settings.telemetry.noise_sd).draw(clean.size, self.draw(f"degraded noise {scenario}"))
+        noise = draw_noise(self.settings, clean.size, self.draw(f"degraded noise {scenario}"))
         return (clean + noise.reshape(clean.shape) if noisy else clean).astype(np.float32)

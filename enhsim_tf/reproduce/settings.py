@@ -61,6 +61,7 @@ class TelemetrySettings:
         "one function a row",
     )
     interval_s: float = setting(1.0, "s", f"{OURS}: 500 samples are then one orbit and a little", "-")
+    noise: str = setting("white", "process", f"{OURS}: the plainest; others in noise_processes", '"noise"')
     noise_sd: float = setting(0.1, "1", f"{OURS}: Gaussian, small against the waves, plain to the eye", "-", "noise added to every value")
     num_samples: int = setting(
         2_073_600, "samples", f"{OURS}: 24 days, so that a test has 1,000 windows that share no sample", smoke=120_000
@@ -147,6 +148,22 @@ class DetectorSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class RobustnessSettings:
+    """The experiment on robustness: `python -m enhsim_tf.reproduce --experiment robustness`."""
+
+    num_seeds: int = setting(10, "seeds", f"{OURS}: a signed-rank test over 10 can reach p = 0.002", smoke=2)
+    first_seed: int = setting(1_000, "seed", f"{OURS}: reporting seeds; designs were chosen on seeds 100 to 199")
+    num_windows: int = setting(1_000, "windows", f"{OURS}: training windows of each arm; as many more set its threshold", smoke=200)
+    num_anomalous: int = setting(150, "windows", f"{OURS}: of each kind and severity, paired over kinds, severities and arms", smoke=12)
+    num_trace_samples: int = setting(20_000, "samples", f"{OURS}: the continuous trace, two ranges of each kind", smoke=8_000)
+    false_alarm_rate: float = setting(0.01, "share", f"{OURS}: the rate each threshold is set for, on held-out windows of the arm")
+    enhancer_windows: int = setting(30_000, "windows", f"{OURS}: of the second pipeline: more windows", smoke=60)
+    enhancer_epochs: int = setting(2, "epochs", f"{OURS}: of the second pipeline: fewer epochs, as many steps")
+    max_order: int = setting(200, "samples", f"{OURS}: largest order of the fitted autoregression; AIC chooses", smoke=40)
+    block: int = setting(250, "samples", f"{OURS}: of the block bootstrap; short blocks break what is correlated")
+
+
+@dataclasses.dataclass(frozen=True)
 class Settings:
     """All of them, the budget and the seed."""
 
@@ -156,6 +173,7 @@ class Settings:
     noise: NoiseSettings = NoiseSettings()
     adversarial: AdversarialSettings = AdversarialSettings()
     detectors: DetectorSettings = DetectorSettings()
+    robustness: RobustnessSettings = RobustnessSettings()
     budget: str = "full"
     seed: int = 0
 
