@@ -81,6 +81,7 @@ class EnhancedSimulator:
         window: int = 500,
         noise: str = "paper",
         extraction: str = "moving average",
+        decay: bool = False,
         verbose: int | str = "auto",
     ) -> "EnhancedSimulator":
         """Trains both networks on nominal telemetry.
@@ -100,6 +101,8 @@ class EnhancedSimulator:
             extraction: What the noise is: what the `moving average` leaves of the telemetry, as in the paper, or what the
                 `enhancer` leaves of the last quarter of it, which it then does not learn from. A moving average takes
                 slow noise away with the signal.
+            decay: Whether the enhancer's learning rate falls to zero along a cosine, instead of staying as in the paper:
+                at a constant rate, the noise of the last batches stays in the weights.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
 
         Returns:
@@ -124,7 +127,8 @@ class EnhancedSimulator:
         offsets = random_offsets(len(learnt), window, num_windows, rng)
         source, target = ((pair - offset) / scale for pair in paired_windows(learnt, coarse, offsets, window))
         network = enhancer_room.build_enhancer(window, seed=seed)
-        enhancer_room.fit_windows(network, source, target, epochs, batch_size=15, seed=seed, verbose=verbose)
+        rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-num_windows // 15)) if decay else 0.001
+        enhancer_room.fit_windows(network, source, target, epochs, 15, seed, rate, verbose=verbose)
 
         if by_enhancer:
             pairs = paired_windows(rest, coarse, random_offsets(len(rest), window, num_windows, rng), window)
@@ -149,6 +153,7 @@ class EnhancedSimulator:
             "moving_average": moving_average,
             "noise": noise,
             "extraction": extraction,
+            "decay": decay,
         }
         return cls(coarse, network, gan, telemetry.interval_s, offset, scale, trained)
 

@@ -66,7 +66,7 @@ def fit_windows(
     epochs: int,
     batch_size: int,
     seed: int,
-    learning_rate: float = 0.001,
+    learning_rate: float | keras.optimizers.schedules.LearningRateSchedule = 0.001,
     validation: tuple[np.ndarray, np.ndarray] | None = None,
     callbacks: Sequence[keras.callbacks.Callback] = (),
     verbose: int | str = "auto",
@@ -84,7 +84,7 @@ def fit_windows(
         epochs: Passes over the windows.
         batch_size: Windows a step.
         seed: Seed of the order.
-        learning_rate: Adam's learning rate.
+        learning_rate: Adam's learning rate, or a schedule of it.
         validation: Held-out `(inputs, targets)`, or None.
         callbacks: Keras callbacks.
         verbose: Keras' progress bar: 0 none, 1 a bar.

@@ -16,13 +16,13 @@ import numpy as np
 import tensorflow as tf
 
 
-def fused_adam(learning_rate: float, **settings: object) -> keras.optimizers.Adam:
+def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSchedule, **settings: object) -> keras.optimizers.Adam:
     """Keras' Adam, whose update of a variable is one operation.
 
     The update is replaced on this one object: for Keras, and in a saved model, it stays a plain Adam.
 
     Args:
-        learning_rate: The learning rate.
+        learning_rate: The learning rate, or a schedule of it.
         **settings: Other settings of Keras' Adam, where they are not its defaults.
     """
     adam = keras.optimizers.Adam(learning_rate, **settings)

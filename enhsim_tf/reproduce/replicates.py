@@ -84,6 +84,7 @@ class Replicate:
             window=self.settings.telemetry.window,
             noise="convolutional",
             extraction="enhancer",
+            decay=True,
             verbose=self.verbose,
         ).save(folder / "simulator")
 

@@ -157,8 +157,8 @@ class RobustnessSettings:
     num_anomalous: int = setting(150, "windows", f"{OURS}: of each kind and severity, paired over kinds, severities and arms", smoke=12)
     num_trace_samples: int = setting(20_000, "samples", f"{OURS}: the continuous trace, two ranges of each kind", smoke=8_000)
     false_alarm_rate: float = setting(0.01, "share", f"{OURS}: the rate each threshold is set for, on held-out windows of the arm")
-    enhancer_windows: int = setting(30_000, "windows", f"{OURS}: of the second pipeline: more windows", smoke=60)
-    enhancer_epochs: int = setting(2, "epochs", f"{OURS}: of the second pipeline: fewer epochs, as many steps")
+    enhancer_windows: int = setting(15_000, "windows", f"{OURS}: of the second pipeline: more windows", smoke=60)
+    enhancer_epochs: int = setting(2, "epochs", f"{OURS}: of the second pipeline: fewer epochs, half the steps, a rate that decays")
     max_order: int = setting(200, "samples", f"{OURS}: largest order of the fitted autoregression; AIC chooses", smoke=40)
     block: int = setting(250, "samples", f"{OURS}: of the block bootstrap; short blocks break what is correlated")
 
