@@ -133,14 +133,14 @@ class EnhancedSimulator:
         if by_enhancer:
             pairs = paired_windows(rest, coarse, random_offsets(len(rest), window, num_windows, rng), window)
             source, target = ((pair - offset) / scale for pair in pairs)
-            noise_windows = scale * (target - enhancer_room.enhance(network, source))
+            extracted = noise_windows = scale * (target - enhancer_room.enhance(network, source))
         else:
             extracted, _ = extract_noise(telemetry.values, moving_average)
             noise_windows = cut_windows(extracted, random_offsets(len(extracted), window, num_windows, rng), window)
         if noise == "convolutional":
-            gan = convolutional_noise_gan(window, scale=float(np.std(noise_windows, dtype=np.float64)), seed=seed)
+            gan = convolutional_noise_gan(window, scale=float(np.std(extracted, dtype=np.float64)), seed=seed)
         else:
-            noise_scale = noise_unit(noise_windows) if normalise else 1.0
+            noise_scale = noise_unit(extracted) if normalise else 1.0
             gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_scale, seed=seed)
         gan.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
         trained = {

@@ -367,6 +367,40 @@ def test_fit_with_another_seed_and_without_normalisation(small_batches):
         assert (np.asarray(weight) == np.asarray(begun)).all()
 
 
+def test_fit_of_the_convolutional_noise_to_what_the_enhancer_leaves(tmp_path):
+    simulator = fitted(noise="convolutional", extraction="enhancer", num_windows=300, epochs=8, decay=True)
+    # white noise of 4 and what error the enhancer has: at least 4, and far below the 35 that the sine's own deviation is
+    assert 3.9 < simulator.noise.scale < 10
+    series = simulator.generate_series(1_000, seed=3)
+    assert series.shape == (1_000,) and abs(np.mean(series) - 1_000) < 10
+    simulator.save(tmp_path / "model")
+    loaded = EnhancedSimulator.load(tmp_path / "model")
+    assert loaded.trained["noise"] == "convolutional" and loaded.trained["decay"] is True
+    assert (loaded.generate_series(1_000, seed=3) == series).all()
+    assert (loaded.generate(7, seed=4) == simulator.generate(7, seed=4)).all()
+
+
+def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batches):
+    # noise that is constant over 50 samples: a moving average over 5 takes most of it away with the signal
+    steps = np.repeat(np.random.default_rng(1).normal(0, 4, 60), 50)
+    clean = 1_000 + 50 * np.sin(2 * np.pi * 2.0 * np.arange(3_000) / 100)
+    telemetry = Telemetry((clean + steps).astype(np.float32), interval_s=2.0)
+    settings = {"num_windows": 300, "epochs": 8, "num_iterations": 0, "window": 60, "verbose": 0, "decay": True, "moving_average": 5}
+    scales = {
+        extraction: EnhancedSimulator.fit(telemetry, seed=0, extraction=extraction, **settings).noise.scale * 0.1
+        for extraction in ("moving average", "enhancer")
+    }
+    true = np.std(steps[2_250:])  # of the quarter that the noise is taken from
+    assert scales["moving average"] < 0.6 * true and scales["enhancer"] == pytest.approx(true, rel=0.2)
+
+
+def test_fit_refuses_what_it_does_not_know(refused):
+    with refused("noise='pink'"):
+        fitted(noise="pink")
+    with refused("extraction='sieve'"):
+        fitted(extraction="sieve")
+
+
 def test_fit_refuses_less_than_two_windows(refused):
     with refused("119", "120 samples", "two windows"):
         EnhancedSimulator.fit(measured(119), window=60, verbose=0)
