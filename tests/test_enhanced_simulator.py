@@ -391,7 +391,8 @@ def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batch
         for extraction in ("moving average", "enhancer")
     }
     true = np.std(steps[2_250:])  # of the quarter that the noise is taken from
-    assert scales["moving average"] < 0.6 * true and scales["enhancer"] == pytest.approx(true, rel=0.2)
+    assert scales["moving average"] < 0.3 * true
+    assert 0.9 * true < scales["enhancer"] < 1.5 * true  # the error of a little trained enhancer comes on top
 
 
 def test_fit_refuses_what_it_does_not_know(refused):
