@@ -32,6 +32,7 @@ FLOORS = {
     "detectors": 1,
     "autoencoders": 1,
     "injections": 1,
+    "out_of_range": 1,
     "simulator": 1,
     "periodicity": 1,
     "store": 1,
@@ -40,6 +41,7 @@ FLOORS = {
     "noise_processes": 0,
     "fidelity": 0,
     "detection": 0,
+    "inference": 0,
     "two_sample": 0,
     "realism": 0,
     "files": 0,
@@ -65,6 +67,8 @@ WITHOUT_TENSORFLOW = [
     "autoencoders",
     "injections",
     "detection",
+    "inference",
+    "out_of_range",
     "terminal",
 ]
 

@@ -3,6 +3,7 @@
 A replicate is kept once it is done: a killed run goes on behind the last one.
 """
 
+import dataclasses
 import functools
 from collections.abc import Mapping
 from pathlib import Path
@@ -168,8 +169,15 @@ class Replicate:
 
 
 def replicate(settings: Settings, stages: Stages, environment: str, number: int, verbose: int = 0) -> Replicate:
-    """The replicate of an environment and of one of the reporting seeds, counted from 0."""
-    import dataclasses
+    """The replicate of an environment and of one of the reporting seeds.
+
+    Args:
+        settings: Every other number.
+        stages: Keeps what is done.
+        environment: One of `ENVIRONMENTS`.
+        number: Which of the reporting seeds, counted from 0.
+        verbose: Progress bars: 0 none, 1 one for each training.
+    """
 
     seed = settings.robustness.first_seed + number
     telemetry = dataclasses.replace(settings.telemetry, noise=environment)
