@@ -178,7 +178,6 @@ def replicate(settings: Settings, stages: Stages, environment: str, number: int,
         number: Which of the reporting seeds, counted from 0.
         verbose: Progress bars: 0 none, 1 one for each training.
     """
-
     seed = settings.robustness.first_seed + number
     telemetry = dataclasses.replace(settings.telemetry, noise=environment)
     return Replicate(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages, verbose)
