@@ -81,6 +81,7 @@ class EnhancedSimulator:
         window: int = 500,
         noise: str = "paper",
         extraction: str = "moving average",
+        held_out: float = 0.25,
         decay: bool = False,
         verbose: int | str = "auto",
     ) -> "EnhancedSimulator":
@@ -99,8 +100,10 @@ class EnhancedSimulator:
             window: Samples of a window.
             noise: The networks that learn the noise: `paper`, or `convolutional`, which fill the space.
             extraction: What the noise is: what the `moving average` leaves of the telemetry, as in the paper, or what the
-                `enhancer` leaves of the last quarter of it, which it then does not learn from. A moving average takes
-                slow noise away with the signal.
+                `enhancer` leaves of it. A moving average takes slow noise away with the signal.
+            held_out: With extraction by the enhancer: share of the telemetry, its end, that the enhancer does not learn
+                from and that the noise comes from. 0 takes both from all of it, which is right only where coarse windows
+                repeat so often that the enhancer cannot remember the noise of any.
             decay: Whether the enhancer's learning rate falls to zero along a cosine, instead of staying as in the paper:
                 at a constant rate, the noise of the last batches stays in the weights.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
@@ -111,10 +114,10 @@ class EnhancedSimulator:
         Raises:
             InputError: If the telemetry is not finite, constant or shorter than two windows.
         """
-        if noise not in ("paper", "convolutional") or extraction not in ("moving average", "enhancer"):
+        if noise not in ("paper", "convolutional") or extraction not in ("moving average", "enhancer") or not 0 <= held_out < 1:
             raise InputError(
-                "Expected noise to be paper or convolutional, extraction to be moving average or enhancer. "
-                f"Received: noise={noise!r}, extraction={extraction!r}."
+                "Expected noise to be paper or convolutional, extraction to be moving average or enhancer, 0 <= held_out < 1. "
+                f"Received: noise={noise!r}, extraction={extraction!r}, held_out={held_out}."
             )
         by_enhancer = extraction == "enhancer"
         check_values(telemetry.values, telemetry.name, (8 if by_enhancer else 2) * window)
@@ -122,27 +125,15 @@ class EnhancedSimulator:
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
 
-        end = 3 * len(telemetry) // 4 if by_enhancer else len(telemetry)
-        learnt, rest = telemetry.part(0, end), telemetry.part(end, len(telemetry))
+        end = len(telemetry) - (round(held_out * len(telemetry)) if by_enhancer else 0)
+        learnt = telemetry.part(0, end)
+        rest = telemetry.part(end, len(telemetry)) if end < len(telemetry) else telemetry
         offsets = random_offsets(len(learnt), window, num_windows, rng)
         source, target = ((pair - offset) / scale for pair in paired_windows(learnt, coarse, offsets, window))
         network = enhancer_room.build_enhancer(window, seed=seed)
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-num_windows // 15)) if decay else 0.001
         enhancer_room.fit_windows(network, source, target, epochs, 15, seed, rate, verbose=verbose)
 
-        if by_enhancer:
-            pairs = paired_windows(rest, coarse, random_offsets(len(rest), window, num_windows, rng), window)
-            source, target = ((pair - offset) / scale for pair in pairs)
-            extracted = noise_windows = scale * (target - enhancer_room.enhance(network, source))
-        else:
-            extracted, _ = extract_noise(telemetry.values, moving_average)
-            noise_windows = cut_windows(extracted, random_offsets(len(extracted), window, num_windows, rng), window)
-        if noise == "convolutional":
-            gan = convolutional_noise_gan(window, scale=float(np.std(extracted, dtype=np.float64)), seed=seed)
-        else:
-            noise_scale = noise_unit(extracted) if normalise else 1.0
-            gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_scale, seed=seed)
-        gan.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
         trained = {
             "telemetry": telemetry.name,
             "num_samples": len(telemetry),
@@ -153,9 +144,39 @@ class EnhancedSimulator:
             "moving_average": moving_average,
             "noise": noise,
             "extraction": extraction,
+            "held_out": held_out,
             "decay": decay,
         }
-        return cls(coarse, network, gan, telemetry.interval_s, offset, scale, trained)
+        simulator = cls(coarse, network, None, telemetry.interval_s, offset, scale, trained)
+        draw = np.random.default_rng([seed, 1])
+        if by_enhancer:
+            noise_windows = simulator.residual_windows(rest, num_windows, draw)
+        else:
+            extracted, _ = extract_noise(telemetry.values, moving_average)
+            noise_windows = cut_windows(extracted, random_offsets(len(extracted), window, num_windows, draw), window)
+        if noise == "convolutional":
+            simulator.noise = convolutional_noise_gan(noise_windows, num_iterations, seed)
+        else:
+            noise_scale = noise_unit(noise_windows) if normalise else 1.0
+            pair = build_generator(window, seed=seed), build_discriminator(window, seed=seed)
+            simulator.noise = NoiseGAN(*pair, scale=noise_scale, seed=seed)
+        simulator.noise.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
+        return simulator
+
+    def residual_windows(self, telemetry: Telemetry, num_windows: int, rng: np.random.Generator) -> np.ndarray:
+        """What the enhanced signal leaves of telemetry: its noise, and what the simulator does not know.
+
+        Args:
+            telemetry: Telemetry that the coarse simulator is in step with.
+            num_windows: Number of windows, cut at random offsets.
+            rng: Owner of the offsets.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
+        """
+        offsets = random_offsets(len(telemetry), self.window, num_windows, rng)
+        coarse, target = paired_windows(telemetry, self.coarse, offsets, self.window)
+        return target - self.enhance(coarse)
 
     def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Generates coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`.

@@ -34,9 +34,10 @@ class Latent:
             probe = 2 * window
             self._margin = probe - generator.compute_output_shape((1, probe, self._shape[1]))[1]
             self._shape = (window + self._margin, self._shape[1])
-            lags = np.abs(np.subtract.outer(*[np.arange(self._shape[0])] * 2))
-            factors = [np.linalg.cholesky(np.exp(-lags / each)).T for each in self.slow_samples]
-            self._factors = [tf.constant(factor, tf.float32) for factor in factors]
+            rate, place = 1 / np.array(self.slow_samples), np.arange(self._shape[0])[:, None]
+            steps = np.where(place > 0, np.sqrt(1 - np.exp(-2 * rate)), 1.0)
+            # x_t = d^t sum of s_k d^-k e_k: a sum in place of a recursion; d^-k stays below exp(samples / correlation)
+            self._rise, self._fall = (tf.constant(each, tf.float32) for each in (steps * np.exp(place * rate), np.exp(-place * rate)))
 
     def draw(self, num_rows: int, seeds: keras.random.SeedGenerator) -> tf.Tensor:
         """Draws for a training step, of shape `(num_rows, *input shape)`."""
@@ -44,8 +45,8 @@ class Latent:
         if not self.slow_samples:
             return self.span * draws
         num_white = self._shape[1] - len(self.slow_samples)
-        slow = [draws[:, :, num_white + number] @ factor for number, factor in enumerate(self._factors)]
-        return tf.concat([self.span * draws[:, :, :num_white], tf.stack(slow, 2)], 2)
+        slow = self._fall * tf.cumsum(self._rise * draws[:, :, num_white:], axis=1)
+        return tf.concat([self.span * draws[:, :, :num_white], slow], 2)
 
     def sample(self, num_rows: int, rng: np.random.Generator) -> np.ndarray:
         """Draws for generating windows, float32 of shape `(num_rows, *input shape)`, row after row."""

@@ -15,6 +15,7 @@ from enhsim_tf.enhancer import predict_windows, seeded_initialiser
 from enhsim_tf.fused_adam import fused_adam
 from enhsim_tf.latent import Latent
 
+Schedule = keras.optimizers.schedules.LearningRateSchedule
 REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
 
 
@@ -102,7 +103,7 @@ class NoiseGAN:
         generator: From `(rows, latent)` to `(rows, window, 1)`, as `build_generator` makes it; None builds the paper's.
         discriminator: From `(rows, window, 1)` to `(rows, 1)`, as `build_discriminator` makes it; None builds the paper's.
         batch_size: Rows of real and rows of generated noise a step.
-        learning_rate: Adam's learning rate, for both networks.
+        learning_rate: Adam's learning rate or a schedule of it, for both networks.
         latent_span: The latent vector is standard normal times this.
         mixed_batch: One discriminator update on real and generated rows together, instead of two in turn.
         generated_in_training_mode: Whether the rows shown to the discriminator come from batch normalisation in training
@@ -111,7 +112,8 @@ class NoiseGAN:
         seed: Seed of every draw in training, and of the networks built here.
         slow_samples: For a generator that convolves: correlation time, in samples, of each slow channel of its latent
             series; they come after the white channels.
-        discriminator_learning_rate: Adam's learning rate for the discriminator, or None for the same.
+        discriminator_learning_rate: Adam's learning rate for the discriminator, which takes two steps an iteration; None
+            for the same.
         beta_1: Adam's decay of the first moment, for both networks.
         averaging: Decay of a moving average over the generator's weights, which takes their place when training ends;
             0 for none.
@@ -122,14 +124,14 @@ class NoiseGAN:
         generator: keras.Model | None = None,
         discriminator: keras.Model | None = None,
         batch_size: int = 200,
-        learning_rate: float = 0.001,
+        learning_rate: float | Schedule = 0.001,
         latent_span: float = 1.0,
         mixed_batch: bool = False,
         generated_in_training_mode: bool = False,
         scale: float = 1.0,
         seed: int = 0,
         slow_samples: Sequence[float] = (),
-        discriminator_learning_rate: float | None = None,
+        discriminator_learning_rate: float | Schedule | None = None,
         beta_1: float = 0.9,
         averaging: float = 0.0,
     ):

@@ -352,7 +352,7 @@ def test_fit_to_short_telemetry_end_to_end(small_batches):
     # the noise, hardly trained, is at the scale of the telemetry's noise: ten standard deviations at most
     noise, _ = extract_noise(measured().values, 25)
     added = simulator.generate(40, seed=1) - clean
-    assert simulator.noise.scale == pytest.approx(noise_unit(noise))
+    assert simulator.noise.scale == pytest.approx(noise_unit(noise), rel=0.03)  # of the windows that were drawn
     assert added.any() and np.abs(added).max() <= simulator.noise.scale * 1.001
 
     again = fitted()

@@ -62,7 +62,8 @@ class Replicate:
         """The second pipeline: more windows in fewer epochs, noise by the enhancer, the convolutional GAN."""
         _ = self.experiment.data
         chosen = self.settings.robustness
-        depends = (self.settings.telemetry, self.settings.split, self.settings.adversarial, chosen.enhancer_windows, chosen.enhancer_epochs)
+        depends = (self.settings.telemetry, self.settings.split, self.settings.adversarial, chosen.enhancer_windows)
+        depends += (chosen.enhancer_epochs, chosen.held_out)
         rooms = ("reproduce.data", "enhanced_simulator")
         folder = self.stages.run("second", self._make_second, rooms, (depends, self.settings.seed), after=("telemetry",))
         start_tensorflow()
@@ -85,6 +86,7 @@ class Replicate:
             window=self.settings.telemetry.window,
             noise="convolutional",
             extraction="enhancer",
+            held_out=chosen.held_out,
             decay=True,
             verbose=self.verbose,
         ).save(folder / "simulator")
@@ -140,8 +142,8 @@ class Replicate:
         """The noises of both pipelines by name, fitted to the noise that their GAN learnt from."""
         data, chosen, number = self.experiment.data, self.settings.robustness, self.settings.telemetry.num_windows
         by_average = data.noise_windows("train", number, "noise windows")
-        rest = data.windows("calibration", number, "noise of the enhancer")
-        by_enhancer = rest["target"] - self.second_simulator.enhance(rest["coarse"])
+        learnt = np.random.default_rng([self.settings.seed, 1])  # the very windows that the second GAN learnt from
+        by_enhancer = self.second_simulator.residual_windows(data.channels[0].train, number, learnt)
         return {
             PAPER: {"GAN": self.experiment.simulator.noise, "Gaussian": GaussianNoise.fit(by_average)} | self._fitted(by_average, chosen),
             OURS: {"GAN": self.second_simulator.noise} | self._fitted(by_enhancer, chosen),

@@ -159,6 +159,7 @@ class RobustnessSettings:
     false_alarm_rate: float = setting(0.01, "share", f"{OURS}: the rate each threshold is set for, on held-out windows of the arm")
     enhancer_windows: int = setting(15_000, "windows", f"{OURS}: of the second pipeline: more windows", smoke=60)
     enhancer_epochs: int = setting(2, "epochs", f"{OURS}: of the second pipeline: fewer epochs, half the steps, a rate that decays")
+    held_out: float = setting(0.0, "share", f"{OURS}: of the second pipeline: coarse windows repeat, its enhancer remembers no noise")
     max_order: int = setting(200, "samples", f"{OURS}: largest order of the fitted autoregression; AIC chooses", smoke=40)
     block: int = setting(250, "samples", f"{OURS}: of the block bootstrap; short blocks break what is correlated")
 
