@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf import robustness
+from enhsim_tf import realism, robustness
 from enhsim_tf.detectors import CONTROLS, DETECTORS
-from enhsim_tf.noise import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise import BlockBootstrap, GaussianAutoregression, GaussianNoise, noise_unit
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 ENVIRONMENTS = ("white", "autoregressive", "heteroscedastic", "shot")
-TABLES = ("alarms", "recall", "traces")
+TABLES = {"arms": ("alarms", "recall", "traces"), "variations": ("variations",), "realism": ("realism", "iterations")}  # by stage
 PAPER, OURS = "paper", "ours"  # the two pipelines: moving average and the paper's GAN; residual and the convolutional one
 ARMS = {
     "coarse": "the coarse simulator",
@@ -37,11 +37,15 @@ ARMS = {
     "enhanced + bootstrap": "plus blocks of the extracted noise itself",
     "ours": "the second pipeline's enhanced signal, clean",
     "ours + GAN": "plus noise of the convolutional GAN",
+    "ours + Gaussian": "plus Gaussian noise of the same standard deviation",
     "ours + AR": "plus an autoregression fitted to the same noise",
     "ours + bootstrap": "plus blocks of the same noise",
     "real": "real nominal telemetry",
 }
 """What detectors are trained on, in the order of the figures."""
+SCALES, SCALED = (0.5, 0.75, 1.5, 2.0), ("enhanced + GAN", "enhanced + AR", "ours + GAN")
+SHARES, MIXED = (0.01, 0.05, 0.25), ("enhanced", "enhanced + GAN", "ours + GAN")
+QUICK_DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest", "one-class SVM")
 
 
 class Replicate:
@@ -93,36 +97,119 @@ class Replicate:
 
     @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
-        """Alarms, recall and traces by arm and detector."""
+        """Every table of `TABLES` by name, a stage for each of the three parts of the replicate."""
         import pandas as pd
 
         _ = self.experiment.enhancer_folder, self.experiment.noise_folder, self.second_simulator
-        rooms = ("reproduce.replicates", "robustness")
-        after = ("telemetry", "enhancer", "noise GAN", "second")
-        folder = self.stages.run("replicate", self._make_tables, rooms, self.settings, after)
-        return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
+        rooms, after = ("reproduce.replicates",), ("telemetry", "enhancer", "noise GAN", "second")
+        chosen = self.settings
+        which = dataclasses.replace(chosen.robustness, num_seeds=0, first_seed=0)  # how many there are changes none
+        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.noise, chosen.adversarial, which, chosen.seed)
+        folders = {
+            name: self.stages.run(name, make, rooms, depends, after)
+            for name, make in (("arms", self._make_arms), ("variations", self._make_variations), ("realism", self._make_realism))
+        }
+        return {name: pd.read_parquet(folders[stage] / f"{name}.parquet") for stage, names in TABLES.items() for name in names}
 
-    def _make_tables(self, folder: Path) -> None:
-        import pandas as pd
-
+    def _make_arms(self, folder: Path) -> None:
         trial, seed = self.trial(), self.settings.seed
         training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
-        rows: dict[str, list[dict]] = {name: [] for name in TABLES}
-        for arm in training:
-            judged = robustness.judge_arm(training[arm], held_out[arm], trial, DETECTORS | (CONTROLS if arm == "real" else {}), seed)
-            for name in TABLES:
-                rows[name] += [{"arm": arm, **row} for row in judged[name]]
-            self.stages.tell(
-                f"  {arm:22} false alarms " + ", ".join(f"{rate:.1%}" for rate in robustness.summary(judged["alarms"]).values())
-            )
+        rows: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
+        for arm in ARMS:
+            detectors = DETECTORS | (CONTROLS if arm == "real" else {})
+            judged = robustness.judge_arm(training[arm], held_out[arm], trial, detectors, seed)
+            for name, found in judged.items():
+                rows[name] += [{"arm": arm, **row} for row in found]
+            rates = robustness.summary(judged["alarms"]).values()
+            self.stages.tell(f"  {arm:22} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
         oracle = robustness.detection.vus_pr(trial.labels, trial.labels.astype(float), trial.max_buffer)
         rows["traces"].append({"arm": "real", "detector": "oracle", "vus_pr": oracle})
-        for name in TABLES:
-            table = pd.DataFrame(rows[name]).assign(environment=self.settings.telemetry.noise, seed=seed)
+        self._save(folder, rows)
+
+    def _make_variations(self, folder: Path) -> None:
+        """Noise at other scales, and real windows mixed in: detectors that train in a second, alarms and mean recall."""
+        chosen, seed = self.settings.robustness, self.settings.seed
+        trial = self.trial(chosen.num_anomalous_varied)
+        quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
+        training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
+        draws = self.experiment.data.draw("mixed windows")
+        rows = []
+        for arm, scale, share in (
+            *((arm, scale, 0.0) for arm in SCALED for scale in SCALES),
+            *((a, 1.0, s) for a in MIXED for s in SHARES),
+        ):
+
+            def vary(arms: Mapping[str, np.ndarray], arm: str = arm, scale: float = scale, share: float = share) -> np.ndarray:
+                clean = arms[arm.split(" + ")[0]]
+                return robustness.mixed(clean + np.float32(scale) * (arms[arm] - clean), arms["real"], share, draws)
+
+            judged = robustness.judge_arm(vary(training), vary(held_out), trial, quick, seed)
+            recall, alarms = ({name: [] for name in quick} for _ in range(2))
+            for row in judged["recall"]:
+                recall[row["detector"]].append(row["recall"])
+            for row in judged["alarms"]:
+                alarms[row["detector"]].append((row["alarms"], row["windows"]))
+            for name in quick:
+                raised, windows = np.sum(alarms[name], axis=0).tolist()
+                about = {"arm": arm, "scale": scale, "real_share": share, "detector": name}
+                rows.append({**about, "alarms": raised, "windows": windows, "recall": float(np.mean(recall[name]))})
+        self._save(folder, {"variations": rows})
+
+    def _make_realism(self, folder: Path) -> None:
+        """Measures A1 to A7 of every noise against the true noise, and what an iteration of either GAN takes."""
+        data, number = self.experiment.data, self.settings.robustness.num_windows
+
+        def true_noise(part: str) -> np.ndarray:
+            windows = data.windows(part, None)
+            return windows["target"] - windows["truth"]
+
+        real, again, third = (true_noise(part) for part in ("test", "train", "calibration"))
+        number = min(number, len(real), len(again), len(third))
+        floor = realism.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
+        seed = int(data.draw("realism").integers(2**31))
+        judged = {"real": third[:number]}
+        for pipeline, name in ((PAPER, "enhanced"), (OURS, "ours")):
+            extracted = self.extracted[pipeline]
+            judged[f"{name}: extracted"] = extracted[np.arange(number) % len(extracted)]
+            judged |= {f"{name} + {noise}": model.generate(number, seed) for noise, model in self.surrogates[pipeline].items()}
+        rows = [{"noise": noise, **dataclasses.asdict(row)} for noise, windows in judged.items() for row in floor.judge(windows).rows]
+        self._save(folder, {"realism": rows, "iterations": self._iterations()})
+
+    def _iterations(self, rounds: int = 7, steps: int = 5) -> list[dict]:
+        """Seconds an iteration of both GANs, untrained and in turns."""
+        import time
+
+        import tensorflow as tf
+
+        from enhsim_tf.convolutional_noise import convolutional_noise_gan
+        from enhsim_tf.noise_gan import NoiseGAN
+
+        noise = self.extracted[OURS]
+        gans = {"paper": NoiseGAN(scale=noise_unit(noise)), "convolutional": convolutional_noise_gan(noise)}
+        windows = {name: tf.constant(noise[:, :, None] / np.float32(gan.scale)) for name, gan in gans.items()}
+        rows = []
+        for round_ in range(rounds + 1):
+            for name, gan in gans.items():
+                began = time.perf_counter()
+                for _ in range(steps):
+                    gan._step(windows[name])
+                if round_:  # the first builds the graph
+                    rows.append({"noise": name, "round": round_, "seconds": (time.perf_counter() - began) / steps})
+        return rows
+
+    def _save(self, folder: Path, tables: Mapping[str, list[dict]]) -> None:
+        import pandas as pd
+
+        for name, rows in tables.items():
+            table = pd.DataFrame(rows).assign(environment=self.settings.telemetry.noise, seed=self.settings.seed)
             table.to_parquet(folder / f"{name}.parquet")
 
-    def trial(self) -> robustness.Trial:
-        """The real side: held-out nominal windows, anomalies put into them, and a trace."""
+    def trial(self, num_anomalous: int | None = None) -> robustness.Trial:
+        """The real side: held-out nominal windows, anomalies put into them, and a trace.
+
+        Args:
+            num_anomalous: Anomalous windows of each kind and severity; None for the number in the settings.
+        """
         chosen, data = self.settings.robustness, self.experiment.data
         channel = data.channels[0]
         nominal, reference = (data.windows(part, None)["target"] for part in ("test", "calibration"))
@@ -132,21 +219,29 @@ class Replicate:
             channel.test.values[: chosen.num_trace_samples],
             self.settings.telemetry.noise_sd,
             self.settings.seed,
-            chosen.num_anomalous,
+            chosen.num_anomalous if num_anomalous is None else num_anomalous,
             rate=chosen.false_alarm_rate,
             max_buffer=round(min(channel.periods_s) / channel.telemetry.interval_s),
         )
 
     @functools.cached_property
-    def surrogates(self) -> Mapping[str, Mapping[str, object]]:
-        """The noises of both pipelines by name, fitted to the noise that their GAN learnt from."""
-        data, chosen, number = self.experiment.data, self.settings.robustness, self.settings.telemetry.num_windows
-        by_average = data.noise_windows("train", number, "noise windows")
-        learnt = np.random.default_rng([self.settings.seed, 1])  # the very windows that the second GAN learnt from
-        by_enhancer = self.second_simulator.residual_windows(data.channels[0].train, number, learnt)
+    def extracted(self) -> dict[str, np.ndarray]:
+        """The noise of each pipeline: the very windows that its GAN learnt from, and that its surrogates are fitted to."""
+        data, number = self.experiment.data, self.settings.telemetry.num_windows
+        draws = np.random.default_rng([self.settings.seed, 1])
         return {
-            PAPER: {"GAN": self.experiment.simulator.noise, "Gaussian": GaussianNoise.fit(by_average)} | self._fitted(by_average, chosen),
-            OURS: {"GAN": self.second_simulator.noise} | self._fitted(by_enhancer, chosen),
+            PAPER: data.noise_windows("train", number, "noise windows"),
+            OURS: self.second_simulator.residual_windows(data.channels[0].train, number, draws),
+        }
+
+    @functools.cached_property
+    def surrogates(self) -> Mapping[str, Mapping[str, object]]:
+        """The noises of both pipelines by name."""
+        chosen, noise = self.settings.robustness, self.extracted
+        return {
+            PAPER: {"GAN": self.experiment.simulator.noise, "Gaussian": GaussianNoise.fit(noise[PAPER])}
+            | self._fitted(noise[PAPER], chosen),
+            OURS: {"GAN": self.second_simulator.noise, "Gaussian": GaussianNoise.fit(noise[OURS])} | self._fitted(noise[OURS], chosen),
         }
 
     @staticmethod
