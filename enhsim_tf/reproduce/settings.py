@@ -167,6 +167,14 @@ class RobustnessSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class ModesSettings:
+    """The degraded modes in full, a part of the experiment on robustness."""
+
+    num_windows: int = setting(300, "windows", f"{OURS}: tested in each mode at each severity", smoke=40)
+    windows_per_configuration: int = setting(50, "windows", f"{OURS}: so 300 configurations are drawn", smoke=5)
+
+
+@dataclasses.dataclass(frozen=True)
 class Settings:
     """All of them, the budget and the seed."""
 
@@ -177,6 +185,7 @@ class Settings:
     adversarial: AdversarialSettings = AdversarialSettings()
     detectors: DetectorSettings = DetectorSettings()
     robustness: RobustnessSettings = RobustnessSettings()
+    modes: ModesSettings = ModesSettings()
     budget: str = "full"
     seed: int = 0
 
