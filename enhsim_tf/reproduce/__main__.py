@@ -11,9 +11,14 @@ examples:
   python -m enhsim_tf.reproduce --budget smoke       the same path with small counts, below a minute, into smoke/
   python -m enhsim_tf.reproduce --only fig04         one figure and what it needs
   python -m enhsim_tf.reproduce --telemetry my.csv --column volts --time utc --out my_figures
+  python -m enhsim_tf.reproduce --experiment robustness
+                                                     what the noise is worth to detectors: hours; stop it and go on at will
 
 exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
 """
+
+
+NOISES = ("white", "autoregressive", "heteroscedastic", "shot")
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -34,6 +39,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where figures and results.json go (default: figures; smoke: smoke)")
     parser.add_argument("--spread", type=int, default=0, metavar="N", help="judge the claims for N further seeds, ranges in spread.json")
+    parser.add_argument("--experiment", choices=("robustness",), help="instead of the paper: train detectors on every kind of noise")
+    parser.add_argument("--environment", choices=NOISES, help="only this noise in the experiment (default: all four)")
+    parser.add_argument("--seeds", type=int, metavar="N", help="seeds of the experiment (default: 10; smoke: 2)")
     parser.add_argument("--arrays", action="store_true", help="save the arrays behind each figure beside it, as .npz")
     parser.add_argument("--fresh", action="store_true", help="do every stage anew, whatever the cache holds")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="where finished stages are kept (default: .cache in a checkout)")
@@ -43,6 +51,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 def run(options: argparse.Namespace) -> int:
     """Runs what the options ask for and returns the exit code."""
     check(options)
+    if options.experiment:
+        return run_experiment(options)
     from enhsim_tf.files import make_folder, write_json
     from enhsim_tf.reproduce.claims import CLAIMS, changed, judge, ranges
     from enhsim_tf.reproduce.data import Source
@@ -101,6 +111,29 @@ def run(options: argparse.Namespace) -> int:
     return 1 if different else 0
 
 
+def run_experiment(options: argparse.Namespace) -> int:
+    """Runs the experiment on robustness and returns the exit code."""
+    from enhsim_tf.files import make_folder
+    from enhsim_tf.reproduce.robustness_report import report, verdict_lines
+    from enhsim_tf.reproduce.robustness_run import FOLDER, run
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    def tell(line: str) -> None:
+        print(line, flush=True)
+
+    turned = {} if options.seeds is None else {"robustness__num_seeds": options.seeds}
+    settings = make_settings(options.budget, **turned)
+    environments = NOISES if options.environment is None else (options.environment,)
+    out = make_folder(out_folder(options) / FOLDER)
+    found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
+    tell("\n" + "\n".join(verdict_lines(found)))
+    if options.budget == "full" and out == Path("figures") / FOLDER:
+        report(found, Path())
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
 def check(options: argparse.Namespace) -> None:
     """Refuses what cannot be used before anything is made; needs no TensorFlow."""
     from enhsim_tf.errors import InputError
@@ -110,6 +143,15 @@ def check(options: argparse.Namespace) -> None:
     if options.spread < 0:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)
+    for name in ("environment", "seeds"):
+        if getattr(options, name) is not None and options.experiment is None:
+            raise InputError(f"Expected --{name} together with --experiment robustness. Received: --{name} alone.")
+    if options.experiment and (options.only or options.telemetry or options.spread or options.seed or options.arrays):
+        raise InputError(
+            "Expected --experiment without --only, --telemetry, --spread, --seed and --arrays: its seeds are its own. Received: one of them."
+        )
+    if options.seeds is not None and options.seeds < 1:
+        raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
     for name in ("column", "time"):
         if getattr(options, name) is not None and options.telemetry is None:
             raise InputError(f"Expected --{name} together with --telemetry. Received: --{name} alone.")

@@ -156,23 +156,25 @@ def save(
     caption: str,
     is_smoke: bool,
     saved_as: Sequence[str] = ("png", "svg"),
+    figures: Mapping[str, Figure] | None = None,
 ) -> list[Path]:
     """Draws a figure and writes it, with its caption line and, where it is due, the mark of a smoke run.
 
     The same data give the same bytes.
 
     Args:
-        name: One of `FIGURES`.
+        name: One of `figures`.
         data: Its arrays.
         folder: An existing folder.
         caption: What ran, in small print at the bottom.
         is_smoke: Whether the arrays come from a smoke run.
         saved_as: File types.
+        figures: The figures by name; None for those of the paper.
 
     Returns:
         The paths of the files.
     """
-    about = FIGURES[name]
+    about = (FIGURES if figures is None else figures)[name]
     figure = about.draw(data)
     width, height = figure.get_size_inches()
     lines = textwrap.wrap(caption, int((width - 2 * EDGE) * 20.5))

@@ -1,0 +1,129 @@
+"""What the experiment on robustness found, in words: the report in `docs/`, the README's table, the lines of the command.
+
+No number is written here: each comes from the findings, and a test renders the report again from the tables.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.files import make_folder, replace_file
+
+Findings = Mapping[str, Any]
+PATH = Path("docs") / "REPORT.md"
+
+
+def per_cent(value: float, digits: int = 1) -> str:
+    """A share as per cent."""
+    return f"{100 * value:.{digits}f} %"
+
+
+def interval(about: Mapping[str, float], digits: int = 1) -> str:
+    """A mean of shares with its interval, in per cent."""
+    return f"{100 * about['mean']:.{digits}f} % ({100 * about['low']:.{digits}f} to {100 * about['high']:.{digits}f})"
+
+
+def p_value(value: float) -> str:
+    """A p-value with one significant digit."""
+    return f"{value:.1g}" if value >= 0.0001 else "below 0.0001"
+
+
+def reached(is_reached: bool) -> str:
+    """Whether a bar was reached."""
+    return "reached" if is_reached else "**not reached**"
+
+
+def verdict_c8(found: Findings) -> str:
+    """Verdict on claim C8, that detectors trained on the paper's output are robust: by the rule fixed for the ledger.
+
+    It holds if, for every environment and detector, false alarms are at most twice the real-trained rate plus a point.
+    """
+    arms = found["arms"]
+    cells = [
+        arms["enhanced + GAN"]["by_environment"][name]["detectors"][detector]
+        <= 2 * arms["real"]["by_environment"][name]["detectors"][detector] + 0.01
+        for name in found["environments"]
+        for detector in arms["real"]["by_environment"][name]["detectors"]
+    ]
+    return "holds" if all(cells) else "holds in part" if any(cells) else "does not hold"
+
+
+def share_c8(found: Findings) -> tuple[int, int]:
+    """In how many pairs of environment and detector the rule of claim C8 is kept, and of how many."""
+    arms, kept, total = found["arms"], 0, 0
+    for name in found["environments"]:
+        for detector, real in arms["real"]["by_environment"][name]["detectors"].items():
+            kept += arms["enhanced + GAN"]["by_environment"][name]["detectors"][detector] <= 2 * real + 0.01
+            total += 1
+    return kept, total
+
+
+def render(found: Findings, template: str = "robustness_report.md.jinja") -> str:
+    """The report as Markdown.
+
+    Args:
+        found: The findings.
+        template: Its template, beside this module.
+    """
+    import jinja2
+
+    from enhsim_tf.reproduce import degraded_modes, findings, replicates
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"per_cent": per_cent, "interval": interval, "p_value": p_value, "reached": reached}
+    words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
+    return environment.get_template(template).render(found=found, words=words, c8=share_c8(found))
+
+
+def report(found: Findings, root: Path) -> None:
+    """Writes the report and the README's part on the experiment; each only where it exists or may be made.
+
+    Args:
+        found: The findings of a full run.
+        root: Folder of the project.
+    """
+    from enhsim_tf.reproduce.report import fill_parts
+
+    make_folder(root / PATH.parent)
+    with replace_file(root / PATH) as temporary:
+        temporary.write_text(render(found), encoding="utf-8")
+    readme = root / "README.md"
+    if readme.is_file() and "<!-- robustness: generated -->" in (text := readme.read_text(encoding="utf-8")):
+        with replace_file(readme) as temporary:
+            temporary.write_text(fill_parts(text, {"robustness": table(found)}, readme.name), encoding="utf-8")
+
+
+def table(found: Findings) -> str:
+    """The README's table: false alarms by arm and environment, and recall."""
+    names = found["environments"]
+    lines = [
+        f"| trained on | {' | '.join(names)} | recall | gap closed |",
+        f"|---|{'---|' * len(names)}---|---|",
+    ]
+    for arm, about in found["arms"].items():
+        cells = [interval(about["by_environment"][name]["false_alarms"]) for name in names]
+        closed = "" if about["gap_closed"] is None else f"{100 * about['gap_closed']:.0f} %"
+        lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {closed} |")
+    seeds = found["seeds"]
+    return "\n".join(lines) + (
+        f"\n\nFalse alarms on real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over {len(seeds)} seeds "
+        f"({seeds[0]} to {seeds[-1]}, {found['num_windows']:,} windows each); recall at the arm's own threshold, mean over eight kinds of anomaly "
+        "and five severities. From `figures/robustness/findings.json`."
+    )
+
+
+def verdict_lines(found: Findings) -> list[str]:
+    """What the command says at its end."""
+    kept, total = share_c8(found)
+    lines = [
+        f"C8  {verdict_c8(found)}: with the paper's generated noise, false alarms are near the real-trained ones "
+        f"in {kept} of {total} pairs of environment and detector"
+    ]
+    for name, bar in found["bars"].items():
+        words = {True: "reached", False: "not reached"}[bar["excess_reached"] and bar["recall_reached"]]
+        lines.append(
+            f"    {name:15} second generator: excess of false alarms {interval(bar['excess'])}, recall lost {interval(bar['recall_lost'])}: {words}"
+        )
+    return lines

@@ -1,0 +1,99 @@
+"""`python -m enhsim_tf.reproduce --experiment robustness`: every replicate, its tables, findings, figures and report."""
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enhsim_tf.files import make_folder, write_json
+from enhsim_tf.reproduce.settings import Settings
+from enhsim_tf.reproduce.stages import VERSIONS, Stages
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDER = "robustness"  # below the folder of the figures
+
+
+def run(
+    settings: Settings, cache: Path, out: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """Runs the experiment and writes what it found; finished replicates are taken from the cache.
+
+    Args:
+        settings: Every number; `robustness.num_seeds` says how many seeds.
+        cache: Where stages are kept.
+        out: Where tables, findings and figures go.
+        environments: Which environments.
+        fresh: Whether to do every stage anew.
+        tell: Called with a line about each stage.
+
+    Returns:
+        The findings.
+    """
+    from enhsim_tf.reproduce.findings import read_tables, summarise, write_tables
+
+    folder = make_folder(out)
+    tables = collect(settings, cache, environments, fresh, tell)
+    write_tables(tables, folder)
+    found = summarise(read_tables(folder))
+    found |= {"budget": settings.budget, "first_seed": settings.robustness.first_seed, "versions": VERSIONS}
+    write_json(folder / "findings.json", found)
+    draw(found, folder)
+    return found
+
+
+def collect(
+    settings: Settings, cache: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
+) -> "dict[str, pd.DataFrame]":
+    """The tables of all replicates, seed by seed: whoever stops early has all environments of the first seeds.
+
+    Args:
+        settings: Every number.
+        cache: Where stages are kept.
+        environments: Which environments; degraded modes are looked at in the first.
+        fresh: Whether to do every stage anew.
+        tell: Called with a line about each stage.
+    """
+    import pandas as pd
+
+    from enhsim_tf.reproduce.degraded_modes import DegradedModes
+    from enhsim_tf.reproduce.replicates import replicate
+    from enhsim_tf.terminal import start_tensorflow
+
+    parts: dict[str, list[pd.DataFrame]] = {}
+    total, began = settings.robustness.num_seeds * len(environments), time.perf_counter()
+    for number in range(settings.robustness.num_seeds):
+        for environment in environments:
+            done = number * len(environments) + environments.index(environment)
+            tell(f"replicate {done + 1} of {total}: {environment}, seed {settings.robustness.first_seed + number}")
+            one = replicate(settings, Stages(cache, fresh, tell), environment, number, int(sys.stdout.isatty()))
+            tables = one.tables | (DegradedModes(one).tables if environment == environments[0] else {})
+            for name, table in tables.items():
+                parts.setdefault(name, []).append(table)
+            spent = time.perf_counter() - began
+            tell(f"{done + 1} of {total} replicates in {spent:.0f} s; about {spent / (done + 1) * (total - done - 1) / 60:.0f} min left")
+            start_tensorflow()
+            import keras
+
+            keras.backend.clear_session()  # hundreds of networks would fill the memory
+    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}
+
+
+def draw(found: dict[str, Any], folder: Path) -> list[Path]:
+    """Draws every figure of the experiment from its findings.
+
+    Args:
+        found: The findings.
+        folder: Where to.
+    """
+    from enhsim_tf.reproduce.figures import save
+    from enhsim_tf.reproduce.robustness_figures import FIGURES
+
+    seeds = found["seeds"]
+    caption = f"seeds {seeds[0]} to {seeds[-1]} · {found['budget']} budget · python -m enhsim_tf.reproduce --experiment robustness"
+    paths = []
+    for name in FIGURES:
+        paths += save(name, found, folder, caption, found["budget"] == "smoke", figures=FIGURES)
+    return paths

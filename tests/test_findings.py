@@ -1,0 +1,166 @@
+"""What the experiment states: recomputed from tables made by hand, and the report's numbers from the tables that are kept."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.detectors import CONTROLS, DETECTORS
+from enhsim_tf.errors import InputError
+from enhsim_tf.reproduce import findings, robustness_report
+from enhsim_tf.reproduce.degraded_modes import METHODS, SCORED
+from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, QUICK_DETECTORS
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "figures" / "robustness"
+SEEDS = (1000, 1001, 1002)
+# false alarms of 100 windows in each of two blocks, by arm: what every number below is worked out from
+ALARMS = dict.fromkeys(ARMS, 50) | {"enhanced": 90, "enhanced + GAN": 60, "ours + GAN": 3, "ours + AR": 10, "real": 2}
+
+
+def tables():
+    """Tables of three seeds in four environments, in which every detector of an arm does the same."""
+    rows = {name: [] for name in findings.TABLES}
+    for environment in ENVIRONMENTS:
+        for seed in SEEDS:
+            where = {"environment": environment, "seed": seed}
+            for arm in ARMS:
+                for detector in DETECTORS | (CONTROLS if arm == "real" else {}):
+                    about = {**where, "arm": arm, "detector": detector}
+                    rows["alarms"] += [{**about, "block": block, "alarms": ALARMS[arm], "windows": 100} for block in range(2)]
+                    for kind in ("spike", "ramp"):
+                        for severity, recall in ((1.0, 0.2), (2.0, 0.6)):
+                            found = {"recall": recall, "recall_at_real_rate": recall / 2, "auc_roc": 0.7, "auc_pr": 0.3}
+                            rows["recall"].append({**about, "kind": kind, "severity": severity, **found})
+                    rows["traces"].append({**about, "vus_pr": 0.4})
+                if " + " in arm:
+                    for number, measure in enumerate(("follows", "does not")):
+                        departure = [ALARMS[arm], -ALARMS[arm]][number] + 100.0
+                        row = {"section": "A1", "measure": measure, "departure": departure, "floor_mean": 60.0, "ratio": departure / 60}
+                        rows["realism"].append({**where, "noise": arm, **row})
+            rows["traces"].append({**where, "arm": "real", "detector": "oracle", "vus_pr": 1.0})
+            for detector in QUICK_DETECTORS:
+                for scale, share, alarms in ((2.0, 0.0, 1), (1.0, 0.25, 5)):
+                    about = {"arm": "ours + GAN", "scale": scale, "real_share": share, "detector": detector}
+                    rows["variations"].append({**where, **about, "alarms": alarms, "windows": 100, "recall": 0.1})
+            for round_, seconds in enumerate((1.0, 2.0, 4.0)):
+                rows["iterations"] += [
+                    {**where, "noise": "paper", "round": round_, "seconds": seconds},
+                    {**where, "noise": "convolutional", "round": round_, "seconds": 1.5 * seconds},
+                ]
+    for seed in SEEDS:
+        for method in METHODS:
+            for mode, severity, error in (("nominal", 0.0, 0.1), ("stuck", 0.5, 0.3), ("drift", 0.25, 0.5), ("stuck", 1.0, 0.8)):
+                rows["degraded"].append({"seed": seed, "method": method, "mode": mode, "severity": severity, "nrmse": error})
+        for method in SCORED:
+            rows["trust"] += [
+                {"seed": seed, "method": method, "tenth": tenth, "score": tenth, "low": 0.1, "median": 0.2, "high": 0.3}
+                for tenth in range(10)
+            ]
+            trusted = {"trusted": 0.5, "error_trusted": 0.1, "error_flagged": 0.4}
+            rows["trust_correlation"].append({"seed": seed, "method": method, "rank_correlation": 0.8, "low": 0.7, "high": 0.9, **trusted})
+    return {name: pd.DataFrame(each) for name, each in rows.items()}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return findings.summarise(tables())
+
+
+def test_tables_come_back_as_they_were_written(tmp_path):
+    written = tables()
+    findings.write_tables(written, tmp_path)
+    for name, table in findings.read_tables(tmp_path).items():
+        pd.testing.assert_frame_equal(table, written[name], check_dtype=False, rtol=1e-4, check_column_type=False)
+
+
+def test_a_missing_table_is_named(tmp_path):
+    with pytest.raises(InputError, match="alarms.parquet"):
+        findings.read_tables(tmp_path)
+
+
+def test_rates_gaps_and_recall(found):
+    arms = found["arms"]
+    assert list(arms) == list(ARMS) and found["num_replicates"] == 12 and found["num_windows"] == 200
+    assert arms["enhanced + GAN"]["false_alarms"] == pytest.approx({"mean": 0.6, "low": 0.6, "high": 0.6})
+    assert arms["ours + GAN"]["gap_closed"] == pytest.approx((0.90 - 0.03) / (0.90 - 0.02))
+    assert arms["enhanced"]["gap_closed"] == 0 and arms["real"]["gap_closed"] == 1
+    assert arms["real"]["recall"] == pytest.approx(0.4) and arms["real"]["recall_at_real_rate"] == pytest.approx(0.2)
+    assert arms["real"]["by_environment"]["shot"]["detectors"] == pytest.approx(dict.fromkeys(DETECTORS, 0.02))
+    assert found["controls"]["oracle"]["vus_pr"] == 1 and set(found["controls"]) == {*CONTROLS, "oracle"}
+    assert found["recall_curves"]["ramp"]["real"] == {"severity": [1, 2], "recall": [0.2, 0.6], "recall_at_real_rate": [0.1, 0.3]}
+
+
+def test_contrasts_are_differences_of_log_odds(found):
+    contrast = found["contrasts"]["second"][0]
+    odds = np.log(6.5 / 194.5) - np.log(20.5 / 180.5)  # 6 and 20 alarms of 200, half a count added to both sides
+    assert (contrast["first"], contrast["second"], contrast["num_replicates"]) == ("ours + GAN", "ours + AR", 12)
+    assert contrast["mean"]["estimate"] == pytest.approx(odds)
+    assert contrast["p_value"] == pytest.approx(2 / 2**12)  # all twelve signs agree
+    assert [len(found["contrasts"][name]) for name in ("paper", "second", "second, Gaussian", "second, not Gaussian")] == [3, 3, 1, 1]
+    assert found["contrasts"]["second, Gaussian"][0]["num_replicates"] == 6
+
+
+def test_bars_hold_the_excess_against_what_was_asked_for(found):
+    bar = found["bars"]["white"]
+    assert bar["excess"]["mean"] == pytest.approx(0.01) and bar["recall_lost"]["mean"] == pytest.approx(0)
+    assert bar["ratios"] == pytest.approx({"follows": 103 / 60, "does not": 97 / 60}) and bar["measures_within"] == 2
+    assert found["bars"]["shot"]["largest_bound"] is None and found["bars"]["shot"]["excess_reached"]
+    louder = tables()
+    arm, few = louder["alarms"]["arm"] == "ours + GAN", louder["alarms"]["seed"] == SEEDS[0]
+    louder["alarms"].loc[arm & few, "alarms"] = 20  # one seed of three beyond the bound
+    bar = findings.summarise(louder)["bars"]["white"]
+    assert not bar["excess_reached"] and bar["excess"]["mean"] == pytest.approx((0.18 + 2 * 0.01) / 3)
+
+
+def test_a_measure_that_follows_the_alarms_predicts_them(found):
+    predicts = found["measures"]["predicts"]
+    assert predicts["follows"]["rho"] == pytest.approx(-1) and predicts["does not"]["rho"] == pytest.approx(1)
+    assert found["measures"]["num_rows"] == 12 * sum(" + " in arm for arm in ARMS)
+
+
+def test_variations_join_the_arms_they_come_from(found):
+    rows = {(row["scale"], row["real_share"]): row for row in found["variations"]}
+    assert rows[2.0, 0.0]["false_alarms"] == pytest.approx(0.01) and rows[1.0, 0.25]["false_alarms"] == pytest.approx(0.05)
+    assert rows[1.0, 0.0]["false_alarms"] == pytest.approx(0.03) and rows[1.0, 1.0]["false_alarms"] == pytest.approx(0.02)
+    assert rows[1.0, 0.0]["recall"] == pytest.approx(0.4)
+
+
+def test_modes_and_iterations(found):
+    assert found["modes"]["nrmse"]["paper"] == pytest.approx({"inside": 0.4, "nominal": 0.1, "outside": 0.8})
+    assert found["iterations"]["median"] == pytest.approx(1.5) and found["iterations"]["reached"]
+
+
+def test_c8_by_the_rule_of_the_ledger(found):
+    assert robustness_report.verdict_c8(found) == "does not hold" and robustness_report.share_c8(found) == (0, 28)
+    quiet = tables()
+    quiet["alarms"].loc[quiet["alarms"]["arm"] == "enhanced + GAN", "alarms"] = 4  # below twice two, plus one
+    assert robustness_report.verdict_c8(findings.summarise(quiet)) == "holds"
+
+
+def test_findings_are_plain_json(found):
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+
+
+def test_the_templates_words_hold_no_number():
+    text = (ROOT / "enhsim_tf" / "reproduce" / "robustness_report.md.jinja").read_text(encoding="utf-8")
+    prose = re.sub(r"\{\{.*?\}\}|\{%.*?%\}", "", text)
+    allowed = ("Feldman 2020", "arXiv 2008.12082", "(C8 of", "on C8", "95 % interval")
+    for words in allowed:
+        prose = prose.replace(words, "")
+    assert not re.findall(r".*\d.*", prose), "a number that no table filled in"
+
+
+def test_the_report_is_what_the_tables_say():
+    if not KEPT.is_dir():
+        pytest.skip("the experiment has not been run: no figures/robustness")
+    kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
+    again = findings.summarise(findings.read_tables(KEPT))
+    assert json.loads(json.dumps(again)) == {key: kept[key] for key in again}
+    assert robustness_report.render(kept) == (ROOT / robustness_report.PATH).read_text(encoding="utf-8")
+    assert robustness_report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000
+    assert min(kept["seeds"]) >= 1_000, "development seeds are 100 to 199"
