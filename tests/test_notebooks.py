@@ -20,7 +20,8 @@ from notebooks import build
 ROOT = Path(__file__).parents[1]
 SOURCES = build.sources()
 NAMES = """00_tour 01_pipeline 02_source_target 03_enhancer 04_enhanced_simulation 05_real_or_generated 08_source_noise 09_generator
-    10_discriminator 11_gan_training 12_accuracy_loss 13_combined 20_the_frozen_discriminator 21_is_it_real_enough""".split()
+    10_discriminator 11_gan_training 12_accuracy_loss 13_combined 20_the_frozen_discriminator 21_is_it_real_enough
+    22_false_alarms 23_degraded_modes""".split()
 each_notebook = pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 
 

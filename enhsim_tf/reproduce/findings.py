@@ -156,6 +156,15 @@ def gap_closed(mean_rate: "pd.DataFrame", arm: str, worst: str = "enhanced", bes
     """Share of the gap in false alarms between the clean enhanced arm and the real-trained one that an arm closes.
 
     The coarse arm is no zero point here: its detectors are often too blind to alarm at all.
+
+    Args:
+        mean_rate: False-alarm rate of each replicate (rows) and arm (columns).
+        arm: The arm.
+        worst: The arm that closes none of the gap.
+        best: The arm that closes all of it.
+
+    Returns:
+        A share for each replicate, or None if one of the ends is not there.
     """
     if worst not in mean_rate or best not in mean_rate:
         return None

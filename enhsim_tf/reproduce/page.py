@@ -7,6 +7,7 @@ Owns how a run is shown as a page; the words and numbers come from `results.json
 import base64
 import dataclasses
 import itertools
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,9 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
+from enhsim_tf.reproduce import robustness_figures, robustness_report, robustness_run
 from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed
-from enhsim_tf.reproduce.figures import FIGURES
+from enhsim_tf.reproduce.figures import FIGURES, Figure
 from enhsim_tf.reproduce.report import PAPER, read_spread, short
 from enhsim_tf.reproduce.settings import deviations
 
@@ -81,7 +83,12 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"short": short, "kind": lambda verdict: _KINDS.get(verdict, "none")}
+    environment.filters |= {
+        "short": short,
+        "interval": robustness_report.interval,
+        "per_cent": robustness_report.per_cent,
+        "kind": lambda verdict: _KINDS.get(verdict, "none"),
+    }
     rows = deviations()
     text = environment.get_template("page.html.jinja").render(
         found=found,
@@ -89,6 +96,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
         is_smoke=found["budget"] == "smoke",
         is_paper=found["source"] == PAPER,
         pipeline=next((picture for picture in pictures if picture.name == PIPELINE), None),
+        experiment=_experiment(folder),
         pictures=[picture for picture in pictures if picture.name != PIPELINE],
         numbers={picture.name: picture.number for picture in pictures},
         widest=max((picture.width for picture in pictures), default=1),
@@ -105,9 +113,25 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     return folder / NAME
 
 
-def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]]) -> Picture:
+def _experiment(folder: Path) -> dict[str, Any] | None:
+    """What the experiment on robustness found, if its findings lie below the folder of the figures: they hold for themselves."""
+    path = folder / robustness_run.FOLDER / "findings.json"
+    if not path.is_file():
+        return None
+    found = json.loads(path.read_text(encoding="utf-8"))
+    figures = robustness_figures.FIGURES
+    pictures = [_picture(path.parent, name, [], figures) for name in ("false_alarms", "recall", "degraded_modes")]
+    return {
+        "found": found,
+        "pictures": pictures,
+        "verdict": robustness_report.verdict_c8(found),
+        "share": robustness_report.share_c8(found),
+    }
+
+
+def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]], figures: Mapping[str, Figure] = FIGURES) -> Picture:
     """Reads the two files of a figure."""
-    if name not in FIGURES:
+    if name not in figures:
         raise InputError(f"Expected the name of a figure, such as {PIPELINE}. Received: {name!r}.")
     content = {}
     for kind in ("png", "svg"):
@@ -117,7 +141,7 @@ def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]]) -> Pi
         content[kind] = path.read_bytes()
     if not content["png"].startswith(b"\x89PNG\r\n\x1a\n"):
         raise InputError(f"Expected a PNG in {folder / name}.png. Received: other content. Draw the figure again.")
-    about = FIGURES[name]
+    about = figures[name]
     width, height = (int.from_bytes(content["png"][at : at + 4], "big") for at in (16, 20))  # where a PNG keeps them
     uris = {kind: f"data:{words};base64," + base64.b64encode(content[kind]).decode() for kind, words in _TYPES.items()}
     shown = [claim for claim in claims if claim["figure"] == name]

@@ -81,12 +81,16 @@ def collect(
     return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}
 
 
-def draw(found: dict[str, Any], folder: Path) -> list[Path]:
-    """Draws every figure of the experiment from its findings.
+def draw(found: dict[str, Any], folder: Path, names: Sequence[str] = ()) -> list[Path]:
+    """Draws figures of the experiment from its findings.
 
     Args:
         found: The findings.
         folder: Where to.
+        names: Which; none for all.
+
+    Returns:
+        The paths of the files.
     """
     from enhsim_tf.reproduce.figures import save
     from enhsim_tf.reproduce.robustness_figures import FIGURES
@@ -94,6 +98,6 @@ def draw(found: dict[str, Any], folder: Path) -> list[Path]:
     seeds = found["seeds"]
     caption = f"seeds {seeds[0]} to {seeds[-1]} · {found['budget']} budget · python -m enhsim_tf.reproduce --experiment robustness"
     paths = []
-    for name in FIGURES:
+    for name in names or FIGURES:
         paths += save(name, found, folder, caption, found["budget"] == "smoke", figures=FIGURES)
     return paths

@@ -13,6 +13,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib.figure
 import matplotlib.style
@@ -21,12 +22,17 @@ from IPython.display import Markdown, display
 from PIL import Image
 
 from enhsim_tf.errors import InputError
-from enhsim_tf.reproduce import claims, figures
+from enhsim_tf.reproduce import claims, figures, robustness_figures
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.figure_data import FIGURE_DATA
+from enhsim_tf.reproduce.findings import read_tables
+from enhsim_tf.reproduce.robustness_run import FOLDER, draw
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages, default_cache
 from enhsim_tf.terminal import start_tensorflow
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _TAKES = {"full": "minutes", "smoke": "seconds"}
 # stages that take time, in their order, and what of the experiment asks for each
@@ -34,6 +40,7 @@ _STAGES = {"telemetry": "store", "enhancer": "enhancer_folder", "noise GAN": "no
 _STAGES |= {"speed": "speed", "false alarms": "false_alarms", "resemblance": "resemblance", "degraded": "degraded"}
 _LEDGER = {known.id: known for known in claims.CLAIMS}
 _ROOT = Path(__file__).parents[2]
+_KEPT = _ROOT / "figures" / FOLDER
 _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 
 
@@ -102,6 +109,22 @@ def show(experiment: Experiment, name: str) -> Arrays:
         (path,) = figures.save(name, arrays, folder, caption, chosen.budget == "smoke", saved_as=("png",))
         _show_picture(path.read_bytes(), figures.FIGURES[name].alt)
     return Arrays(arrays)
+
+
+def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
+    """The experiment on robustness as it was run and kept: its findings, and the tables they come from."""
+    found = json.loads((_KEPT / "findings.json").read_text(encoding="utf-8"))
+    print(
+        f"{found['num_replicates']} replicates: {len(found['seeds'])} seeds in {len(found['environments'])} environments, kept in figures/."
+    )
+    return found, read_tables(_KEPT)
+
+
+def show_finding(found: dict, name: str) -> None:
+    """Shows a figure of the experiment (one of `robustness_figures.FIGURES`) from its findings."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = next(path for path in draw(found, Path(folder), (name,)) if path.suffix == ".png")
+        _show_picture(path.read_bytes(), robustness_figures.FIGURES[name].alt)
 
 
 @contextlib.contextmanager
