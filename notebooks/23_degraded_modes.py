@@ -138,3 +138,11 @@ print(worst.sort_values(1.0).round(3).to_string())
 # %%
 for method, about in found["modes"]["trust"].items():
     print(f"{method:14} below the limit {about['error_trusted']:.3f}, above {about['error_flagged']:.3f}")
+
+# %% [markdown]
+# <details><summary>What to say about it</summary>
+#
+# 1. The table is sorted by it. A mode is hard where the coarse signal leaves what training ever showed: compare both columns.
+# 2. The score cannot know whether the coarse simulator itself is right. Below the limit, the enhancer is asked what it was taught.
+#
+# </details>
