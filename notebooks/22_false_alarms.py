@@ -109,13 +109,14 @@ assert abs(at_real_rate["ours + GAN"] - at_real_rate["real"]) < 0.05
 show_finding(found, "scale_and_share")
 
 # %% [markdown]
-# *What to see:* turn the noise up (left) and false alarms vanish, with the recall. Mix a few real windows in (right) and they vanish too,
-# and the recall stays: if there is any real telemetry at all, use it.
+# *What to see:* on the left, the scale has to be right. Noise that is too quiet leaves every real window loud; noise that is too loud
+# leaves it *too quiet*, which to detectors that look at features is as strange. On the right, a few real windows mixed in repair most of
+# what the paper's noise spoils: if there is any real telemetry at all, use it.
 
 # %%
 rows = [row for row in found["variations"] if row["arm"] == "ours + GAN" and row["real_share"] == 0]
-recall = {row["scale"]: row["recall"] for row in rows}
-assert recall[2.0] < recall[1.0]
+at_scale = {row["scale"]: row["false_alarms"] for row in rows}
+assert at_scale[1.0] < min(at_scale[0.75], at_scale[1.5])
 
 # %% [markdown]
 # ## Exercises

@@ -108,8 +108,8 @@ def table(found: Findings) -> str:
         lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {closed} |")
     seeds = found["seeds"]
     return "\n".join(lines) + (
-        f"\n\nFalse alarms on real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over {len(seeds)} seeds "
-        f"({seeds[0]} to {seeds[-1]}, {found['num_windows']:,} windows each); recall at the arm's own threshold, mean over eight kinds of anomaly "
+        f"\n\nFalse alarms on real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over {len(seeds)} "
+        f"{'seed' if len(seeds) == 1 else 'seeds'} ({seeds[0]} to {seeds[-1]}, {found['num_windows']:,} windows each); recall at the arm's own threshold, mean over eight kinds of anomaly "
         "and five severities. From `figures/robustness/findings.json`."
     )
 
