@@ -10,9 +10,11 @@ import pytest
 
 from enhsim_tf.detectors import CONTROLS, DETECTORS
 from enhsim_tf.errors import InputError
-from enhsim_tf.reproduce import findings, robustness_report
+from enhsim_tf.injections import INJECTIONS
+from enhsim_tf.reproduce import findings, robustness_figures, robustness_report
 from enhsim_tf.reproduce.degraded_modes import METHODS, SCORED
 from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, QUICK_DETECTORS
+from enhsim_tf.simulator import MODES
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "figures" / "robustness"
@@ -31,7 +33,7 @@ def tables():
                 for detector in DETECTORS | (CONTROLS if arm == "real" else {}):
                     about = {**where, "arm": arm, "detector": detector}
                     rows["alarms"] += [{**about, "block": block, "alarms": ALARMS[arm], "windows": 100} for block in range(2)]
-                    for kind in ("spike", "ramp"):
+                    for kind in INJECTIONS:
                         for severity, recall in ((1.0, 0.2), (2.0, 0.6)):
                             found = {"recall": recall, "recall_at_real_rate": recall / 2, "auc_roc": 0.7, "auc_pr": 0.3}
                             rows["recall"].append({**about, "kind": kind, "severity": severity, **found})
@@ -43,7 +45,7 @@ def tables():
                         rows["realism"].append({**where, "noise": arm, **row})
             rows["traces"].append({**where, "arm": "real", "detector": "oracle", "vus_pr": 1.0})
             for detector in QUICK_DETECTORS:
-                for scale, share, alarms in ((2.0, 0.0, 1), (1.0, 0.25, 5)):
+                for scale, share, alarms in ((2.0, 0.0, 1), (0.75, 0.0, 9), (1.5, 0.0, 2), (1.0, 0.25, 5)):
                     about = {"arm": "ours + GAN", "scale": scale, "real_share": share, "detector": detector}
                     rows["variations"].append({**where, **about, "alarms": alarms, "windows": 100, "recall": 0.1})
             for round_, seconds in enumerate((1.0, 2.0, 4.0)):
@@ -53,7 +55,11 @@ def tables():
                 ]
     for seed in SEEDS:
         for method in METHODS:
-            for mode, severity, error in (("nominal", 0.0, 0.1), ("stuck", 0.5, 0.3), ("drift", 0.25, 0.5), ("stuck", 1.0, 0.8)):
+            for mode, severity, error in (
+                ("nominal", 0.0, 0.1),
+                *((mode, 0.5, 0.4) for mode in MODES),
+                *((mode, 1.0, 0.8) for mode in MODES),
+            ):
                 rows["degraded"].append({"seed": seed, "method": method, "mode": mode, "severity": severity, "nrmse": error})
         for method in SCORED:
             rows["trust"] += [
@@ -139,6 +145,23 @@ def test_c8_by_the_rule_of_the_ledger(found):
     quiet = tables()
     quiet["alarms"].loc[quiet["alarms"]["arm"] == "enhanced + GAN", "alarms"] = 4  # below twice two, plus one
     assert robustness_report.verdict_c8(findings.summarise(quiet)) == "holds"
+
+
+def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):
+    from enhsim_tf.reproduce import page, robustness_run
+
+    whole = {**found, "budget": "full"}
+    assert page._experiment(tmp_path) is None
+    folder = tmp_path / robustness_run.FOLDER
+    folder.mkdir()
+    (folder / "findings.json").write_text(json.dumps(whole), encoding="utf-8")
+    assert len(robustness_run.draw(whole, folder)) == 2 * len(robustness_figures.FIGURES)
+    shown = page._experiment(tmp_path)
+    assert shown["share"] == (0, 28) and [picture.name for picture in shown["pictures"]] == ["false_alarms", "recall", "degraded_modes"]
+    kept = json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))
+    text = page.write_page(tmp_path, kept, []).read_text(encoding="utf-8")
+    rows = re.findall(r"<tr role=\"row\"><th scope=\"row\" role=\"rowheader\">([^<]+)</th>", text)
+    assert rows == list(ARMS) and text.count("60.0 % (60.0 to 60.0)") == len(ENVIRONMENTS)
 
 
 def test_findings_are_plain_json(found):

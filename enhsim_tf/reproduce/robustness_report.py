@@ -107,10 +107,11 @@ def table(found: Findings) -> str:
         closed = "" if about["gap_closed"] is None else f"{100 * about['gap_closed']:.0f} %"
         lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {closed} |")
     seeds = found["seeds"]
+    number = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
     return "\n".join(lines) + (
-        f"\n\nFalse alarms on real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over {len(seeds)} "
-        f"{'seed' if len(seeds) == 1 else 'seeds'} ({seeds[0]} to {seeds[-1]}, {found['num_windows']:,} windows each); recall at the arm's own threshold, mean over eight kinds of anomaly "
-        "and five severities. From `figures/robustness/findings.json`."
+        f"\n\nFalse alarms on {found['num_windows']:,} real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over "
+        f"{number} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five severities. "
+        "From `figures/robustness/findings.json`."
     )
 
 
