@@ -138,6 +138,12 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
         (["--only", ""], "fig01"),
         (["--column", "0"], "--telemetry"),
         (["--time", "t"], "--telemetry"),
+        (["--seed", "abc"], "'abc'"),
+        (["--budget", "tiny"], "'tiny'"),
+        (["--seed"], "--seed"),
+        (["--sed", "3"], "--sed 3"),
+        (["--experiment", "fame"], "'fame'"),
+        (["--telemetry"], "--telemetry"),
     ],
 )
 def test_a_bad_option_is_refused_in_one_line(refused_line, arguments, word):
@@ -165,7 +171,15 @@ def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch,
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--telemetry", "no/such/file.npy"], ["--seed", "-1"], ["--only", "fig99"], ["--out", "README.md/below"]]
+    "arguments",
+    [
+        ["--telemetry", "no/such/file.npy"],
+        ["--seed", "-1"],
+        ["--seed", "abc"],
+        ["--budget", "tiny"],
+        ["--only", "fig99"],
+        ["--out", "README.md/below"],
+    ],
 )
 def test_a_refusal_as_the_shell_sees_it(tmp_path, arguments):
     defaults = [] if "--out" in arguments else ["--out", tmp_path / "out"]
