@@ -46,6 +46,12 @@ BAD_FILES = {
     "nan": ("x.npy", _array(np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
     "infinite": ("x.npy", _array(np.where(np.arange(2_000) == 7, -np.inf, _wave())), []),
     "infinite as float32": ("x.npy", _array(1e39 * _wave()), []),
+    "true and false": ("x.npy", _array(_wave() > 0), []),
+    "one name for two columns": (
+        "x.csv",
+        lambda path: path.write_text("a,a\n" + "".join(f"{value},{-value}\n" for value in _wave())),
+        ["--column", "a"],
+    ),
     "gap in a table": ("x.csv", lambda path: _table(path, value=np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
     "below two windows": ("x.npy", _array(_wave(999)), []),
     "three axes": ("x.npy", _array(np.zeros((2_000, 2, 2))), []),
@@ -83,6 +89,11 @@ BAD_FILES = {
     "missing time": (
         "x.csv",
         lambda path: _table(path, a=_wave(), t=np.where(np.arange(2_000) == 9, np.nan, np.arange(2_000))),
+        ["--column", "a", "--time", "t"],
+    ),
+    "a word among the times": (
+        "x.csv",
+        lambda path: _table(path, a=_wave(), t=[*range(1_999), "soon"]),
         ["--column", "a", "--time", "t"],
     ),
     "words for times": ("x.csv", lambda path: _table(path, a=_wave(), t=["now"] * 2_000), ["--column", "a", "--time", "t"]),
