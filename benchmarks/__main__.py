@@ -18,6 +18,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
     parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
     parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
+    parser.add_argument("--redraw", action="store_true", help="measure nothing: figures and table anew from the results that are there")
     parser.add_argument("--repetitions", type=int, help="of each comparison, instead of the budget's 7")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results.json", help="the results (default: %(default)s)")
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder of the figures (default: %(default)s)")
@@ -26,6 +27,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         parser.error("--quick needs another --out: results.json holds measurements")
     if options.repetitions is not None and options.repetitions < 1:
         parser.error(f"--repetitions must be 1 or more, not {options.repetitions}")
+    if options.redraw and (options.quick or options.only or options.repetitions):
+        parser.error("--redraw measures nothing: leave out --quick, --only and --repetitions")
+    if options.redraw and not options.out.is_file():
+        parser.error(f"--redraw needs the results of a run, and {options.out} is none")
     return options
 
 
@@ -48,10 +53,28 @@ def machine() -> dict:
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command."""
     options = parse(arguments)
-    from benchmarks import rows as room
     from benchmarks.figures import draw
-    from benchmarks.report import fill_readme, line_of
+    from benchmarks.report import fill_readme, with_words
     from enhsim_tf.files import write_json
+
+    if options.redraw:
+        kept = json.loads(options.out.read_text())
+        made = kept | {"rows": with_words(kept["rows"])}
+    else:
+        made = measure(options)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    write_json(options.out, made)
+    for file in [options.out, *draw(made, options.figures)]:
+        print(file)
+    if options.out == Path(__file__).parent / "results.json":
+        fill_readme(Path(__file__).parents[1] / "README.md", made)
+    return 0
+
+
+def measure(options: argparse.Namespace) -> dict:
+    """Measures the rows that the options ask for, and prints each; what `results.json` is to hold."""
+    from benchmarks import rows as room
+    from benchmarks.report import line_of
 
     budget, began = room.QUICK if options.quick else room.Budget(), time.time()
     if options.repetitions:
@@ -68,14 +91,7 @@ def main(arguments: list[str] | None = None) -> int:
     for row in room.reproduction(found):
         found.append({"of": "reproduction", **row})
         print(line_of(row), flush=True)
-    made = {"quick": options.quick, "minutes": round((time.time() - began) / 60, 1), "machine": machine(), "rows": found}
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    write_json(options.out, made)
-    for file in [options.out, *draw(made, options.figures)]:
-        print(file)
-    if options.out == Path(__file__).parent / "results.json":
-        fill_readme(Path(__file__).parents[1] / "README.md", made)
-    return 0
+    return {"quick": options.quick, "minutes": round((time.time() - began) / 60, 1), "machine": machine(), "rows": found}
 
 
 if __name__ == "__main__":

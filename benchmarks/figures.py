@@ -1,84 +1,146 @@
-"""The two figures of speed, drawn from the content of `results.json` alone."""
+"""The two figures of speed, drawn from the content of `results.json` alone, on the sheet of all figures."""
 
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
+
+import matplotlib.figure
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+
+from enhsim_tf.reproduce.figures import Figure, save
+from enhsim_tf.reproduce.sheet import DOUBLE, ENHANCED, FOOT, GENERATED, LINE, QUIET, REAL, beside, new_sheet, panels
 
 
 def draw(results: dict, folder: Path) -> list[Path]:
     """Draws what the results hold; the files written."""
-    import matplotlib
-
-    matplotlib.use("agg")
-    rows = results["rows"]
-    compared = [row for row in rows if "ratio" in row and row.get("bar")]
-    grown = {row["x"]: row["growth"] for row in rows if "growth" in row}
-    written = _save(_ratios(compared), folder / "speed_ratios") if compared else []
-    return written + (_save(_growth(grown), folder / "speed_growth") if len(grown) == 2 else [])
-
-
-def _save(figure, path: Path) -> list[Path]:
-    import matplotlib.pyplot as plt
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    files = [path.with_suffix(suffix) for suffix in (".png", ".svg")]
-    for file in files:
-        metadata = {"Date": None} if file.suffix == ".svg" else {}
-        figure.savefig(file, dpi=160, bbox_inches="tight", metadata=metadata)
-    plt.close(figure)
-    return files
+    rows, machine = results["rows"], results.get("machine", {})
+    data = {
+        "rows": [row for row in rows if "ratio" in row and row.get("bar")],
+        "growth": {row["x"]: row["growth"] for row in rows if "growth" in row},
+    }
+    where = f"{machine['cores']} cores, TensorFlow {machine['tensorflow']} · " if machine else ""
+    names = (["speed_ratios"] if data["rows"] else []) + (["speed_growth"] if len(data["growth"]) == 2 else [])
+    folder.mkdir(parents=True, exist_ok=True)
+    return [
+        file
+        for name in names
+        for file in save(name, data, folder, f"{where}python -m benchmarks", bool(results.get("quick")), figures=FIGURES)
+    ]
 
 
-def _ratios(rows: list[dict]):
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(9, 0.55 * len(rows) + 1.3))
-    for place, row in enumerate(reversed(rows)):
-        ratio, reached = row["ratio"], row["reached"]
-        colour = "#0072b2" if reached else "#d55e00"
-        axes.plot([ratio["low"], ratio["high"]], [place, place], color=colour, linewidth=2, solid_capstyle="butt")
-        axes.plot(ratio["median"], place, "o", color=colour, markersize=6)
-        axes.plot([row["bar"]] * 2, [place - 0.3, place + 0.3], color="black", linewidth=1.5)
-        text = f"{ratio['median']:.2f}"
-        axes.annotate(text, (ratio["median"], place), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=8, color=colour)
-    axes.axvline(1, color="0.6", linewidth=0.8, zorder=0)
-    axes.set_yticks(range(len(rows)), [f"{row['work']}\nagainst {row['comparison']}" for row in reversed(rows)], fontsize=8)
-    axes.set_ylim(-0.6, len(rows) - 0.2)
+def ratios(data: dict) -> matplotlib.figure.Figure:
+    """Each comparison with its range and the bar it has to reach."""
+    rows = data["rows"]
+    missed = [f"{row['work']} against {row['comparison']}" for row in rows if not row["reached"]]
+    reached = f"{len(rows) - len(missed)} of these {len(rows)} bars are reached" if missed else f"All of these {len(rows)} bars are reached"
+    figure, down = new_sheet(
+        DOUBLE,
+        1.35 + 0.36 * len(rows),
+        f"{reached}{'; not reached: ' if missed else ''}{'; '.join(missed)}",
+        "Time, ours / theirs, less is faster. Dot and line: median and range over repetitions. Black tick: the bar, which the "
+        "median is to stay below (blue: it does, orange: not; both in numbers at the right). Grey line: the same time.",
+    )
+    ((axes,),) = panels(figure, down + 0.02, 1, 1, right=0.85)
+    place, left = axes.get_position(), 2.35 / DOUBLE
+    axes.set_position([left, place.y0, place.x1 - left, place.height])
+    axes.axvline(1, color=LINE, linewidth=0.8, zorder=0)
+    for height, row in enumerate(reversed(rows)):
+        ratio, colour = row["ratio"], ENHANCED if row["reached"] else GENERATED
+        axes.plot([ratio["low"], ratio["high"]], [height, height], color=colour, linewidth=1.6, solid_capstyle="butt")
+        axes.plot(ratio["median"], height, "o", color=colour, markersize=4.5)
+        axes.plot([row["bar"]] * 2, [height - 0.3, height + 0.3], color=REAL, linewidth=1.4)
+        sign = "≤" if row["reached"] else ">"
+        beside(axes, (height + 0.6) / (len(rows) + 0.3), f"{ratio['median']:.2f} {sign} {row['bar']:.2f}", colour)
+    words = [f"{row['work']}\nagainst {row['comparison']}" for row in reversed(rows)]
+    axes.set_yticks(range(len(rows)), ["\n".join(line for part in each.split("\n") for line in textwrap.wrap(part, 42)) for each in words])
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(-0.6, len(rows) - 0.3)  # as the numbers at the right are placed
+    low, high = min(row["ratio"]["low"] for row in rows), max(max(row["ratio"]["high"], row["bar"]) for row in rows)
     axes.set_xscale("log")
     ticks = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3]
-    low, high = min(row["ratio"]["low"] for row in rows), max(row["ratio"]["high"] for row in rows)
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(min(0.18, 0.9 * low), max(2.0, 1.1 * high))
-    axes.set_xlabel("time, ours / theirs: median (dot) and range over repetitions (line); bar to reach (black tick)")
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    figure.text(left + (place.x1 - left) / 2, (FOOT + 0.04) / figure.get_size_inches()[1], "time, ours / theirs", ha="center")
     return figure
 
 
-def _growth(grown: dict[str, list[dict]]):
-    import matplotlib.pyplot as plt
-
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
-    windows, lengths = grown["num_windows"], grown["window"]
-    numbers = [each["num_windows"] for each in windows]
-    _curve(left, numbers, [each["seconds"] for each in windows], "#0072b2", "measured")
-    left.set(xlabel="windows generated to Parquet", ylabel="time in s", title="generation")
-    left.plot(numbers, [windows[-1]["seconds"] * number / numbers[-1] for number in numbers], ":", color="0.5", label="in proportion")
-    _curve(middle, numbers, [each["peak_mb"] for each in windows], "#0072b2", "measured")
-    middle.set(xlabel="windows generated to Parquet", ylabel="peak memory in MB", title="memory of generation")
-    middle.set_ylim(100, 10_000)
-    length = [each["window"] for each in lengths]
-    _curve(right, length, [each["enhancer_ms"] for each in lengths], "#0072b2", "enhancer, one step")
-    _curve(right, length, [each["gan_ms"] for each in lengths], "#d55e00", "noise GAN, one iteration")
-    right.set(xlabel="samples of a window", ylabel="time in ms", title="training")
-    right.set_ylim(10, 1_000)
-    right.set_xticks(length, [str(each) for each in length])
-    right.minorticks_off()
-    for axes in (left, right):
-        axes.legend(frameon=False, fontsize=8)
+def growth(data: dict) -> matplotlib.figure.Figure:
+    """Time and memory of generation against the number of windows; time of training against a window's length."""
+    windows, lengths = data["growth"]["num_windows"], data["growth"]["window"]
+    numbers, length = [each["num_windows"] for each in windows], [each["window"] for each in lengths]
+    memory, first, last = [each["peak_mb"] for each in windows], windows[0], windows[-1]
+    times, longer_s = last["num_windows"] / first["num_windows"], last["seconds"] / first["seconds"]
+    longer = {key: lengths[-1][f"{key}_ms"] / lengths[0][f"{key}_ms"] for key in ("enhancer", "gan")}
+    figure, down = new_sheet(
+        DOUBLE,
+        2.9,
+        f"{times:,.0f} times as many windows take {float(f'{longer_s:.2g}'):,.0f} times as long and {memory[-1] / memory[0]:.2f} times the memory",
+        f"Windows are generated and written to Parquet. Windows {length[-1] / length[0]:.0f} times as long take {longer['enhancer']:.1f} times "
+        f"the time for a step of the enhancer, {longer['gan']:.1f} times for an iteration of the noise GAN.",
+    )
+    generation, peak, training = panels(figure, down + 0.22, 1, 3, right=0.8, gap=(0, 0.5))[0]
+    proportion = [last["seconds"] * number / numbers[-1] for number in numbers]
+    _curve(generation, numbers, [each["seconds"] for each in windows], ENHANCED, "o")
+    generation.plot(numbers, proportion, ":", color=QUIET, linewidth=1.0, zorder=1)
+    generation.set(xlabel="windows", ylabel="s")
+    generation.set_title("Time of generation", weight="bold")
+    generation.annotate("dotted:\nin proportion", (0.06, 0.94), xycoords="axes fraction", size=7, color=QUIET, va="top")
+    _curve(peak, numbers, memory, ENHANCED, "o")
+    peak.set(xlabel="windows", ylabel="MB", ylim=(min(100, 0.5 * min(memory)), max(10_000, 2 * max(memory))))
+    peak.set_title("Peak memory of generation", weight="bold")
+    ends = []
+    for key, name, colour, marker in (
+        ("enhancer", "enhancer,\none step", ENHANCED, "o"),
+        ("gan", "noise GAN,\none iteration", GENERATED, "s"),
+    ):
+        values = [each[f"{key}_ms"] for each in lengths]
+        _curve(training, length, values, colour, marker)
+        ends.append((values, name, colour))
+    training.set(xlabel="samples of a window", ylabel="ms")
+    training.set_title("Time of training", weight="bold")
+    training.set_xticks(length, [f"{each:,}" for each in length])
+    for axes, steps in ((generation, (1,)), (peak, (1,)), (training, (1, 2, 5))):
+        _plain_ticks(axes.yaxis, axes.get_ylim(), steps)
+    for axes in (generation, peak):
+        _plain_ticks(axes.xaxis, axes.get_xlim(), (1,), 2)
+    training.minorticks_off()
+    low, high = np.log(training.get_ylim())
+    (lower, name, colour), (upper, other, of_other) = sorted(((np.log(values[-1]) - low) / (high - low), *about) for values, *about in ends)
+    upper = max(upper, lower + 0.26)  # two labels of two lines
+    beside(training, lower, name, colour)
+    beside(training, upper, other, of_other)
     return figure
 
 
-def _curve(axes, x: list[float], y: list[float], colour: str, label: str) -> None:
-    axes.loglog(x, y, "o-", color=colour, label=label, markersize=4, linewidth=1.4)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+def _curve(axes: Axes, x: list[float], y: list[float], colour: str, marker: str) -> None:
+    axes.loglog(x, y, color=colour, marker=marker, markersize=3.5, linewidth=1.2, mfc=colour if marker == "o" else "white")
+    axes.margins(x=0.05)
+
+
+def _plain_ticks(axis: Axis, limits: tuple[float, float], steps: Sequence[int], every: int = 1) -> None:
+    """Ticks at `steps` times every so many powers of ten, written out: exponents would be too small to read."""
+    places = [step * 10.0**power for power in range(-6, 10) for step in steps]
+    places = [place for place in places if limits[0] <= place <= limits[1]][::every]
+    axis.set_ticks(places, [f"{place:,.0f}" if place >= 1 else f"{place:g}" for place in places])
+    axis.set_ticks([], minor=True)
+
+
+FIGURES = {
+    "speed_ratios": Figure(
+        0,
+        "Speed beside comparisons",
+        "For each piece of work, the ratio of our time to that of the comparison: median, range over repetitions, and the bar to reach. The "
+        "title counts the bars that are reached and names those that are not.",
+        ratios,
+    ),
+    "speed_growth": Figure(
+        0,
+        "Growth of time and memory",
+        "Three panels on logarithmic axes: time and peak memory of generation against the number of windows, and time of a training step of "
+        "both networks against the length of a window. The title gives the factors.",
+        growth,
+    ),
+}

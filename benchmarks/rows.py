@@ -199,8 +199,8 @@ def reproduction(rows: list[dict]) -> Iterator[dict]:
         for key in ("low", "high"):
             ratio[key] = weight * enhancing["ratio"][key] + (1 - weight) * judging["ratio"][key]
         yield {
-            "work": "full reproduce, training stages",
-            "comparison": "plain fit and the textbook loop",
+            "work": "training of a full reproduce, composed from the steps above",
+            "comparison": "plain fit and textbook loop",
             "unit": "s",
             **seconds,
             "ratio": ratio,

@@ -4,7 +4,9 @@ It puts the rooms below together and trains none of their networks by hand.
 """
 
 import json
+import operator
 import os
+import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -21,7 +23,7 @@ from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator, num_overlapping
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, paired_windows, units_of
 from enhsim_tf.store import write_windows
-from enhsim_tf.telemetry import Telemetry, check_values, cut_windows, random_offsets
+from enhsim_tf.telemetry import Telemetry, check_telemetry, check_values, cut_windows, random_offsets
 
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
@@ -112,8 +114,10 @@ class EnhancedSimulator:
             The trained simulator.
 
         Raises:
-            InputError: If the telemetry is not finite, constant or shorter than two windows.
+            InputError: If the telemetry is none, not finite, constant or shorter than two windows, or if a count is too small.
         """
+        check_telemetry(telemetry)
+        _check_counts(window=(window, 2), num_windows=(num_windows, 1), epochs=(epochs, 1), num_iterations=(num_iterations, 0))
         if noise not in ("paper", "convolutional") or extraction not in ("moving average", "enhancer") or not 0 <= held_out < 1:
             raise InputError(
                 "Expected noise to be paper or convolutional, extraction to be moving average or enhancer, 0 <= held_out < 1. "
@@ -124,6 +128,7 @@ class EnhancedSimulator:
         coarse = SquareWaveSimulator.fit(telemetry) if coarse is None else coarse
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
+        bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
 
         end = len(telemetry) - (round(held_out * len(telemetry)) if by_enhancer else 0)
         learnt = telemetry.part(0, end)
@@ -132,7 +137,7 @@ class EnhancedSimulator:
         source, target = ((pair - offset) / scale for pair in paired_windows(learnt, coarse, offsets, window))
         network = enhancer_room.build_enhancer(window, seed=seed)
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-num_windows // 15)) if decay else 0.001
-        enhancer_room.fit_windows(network, source, target, epochs, 15, seed, rate, verbose=verbose)
+        enhancer_room.fit_windows(network, source, target, epochs, 15, seed, rate, verbose=bars)
 
         trained = {
             "telemetry": telemetry.name,
@@ -174,6 +179,8 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
+        check_telemetry(telemetry)
+        _check_counts(num_windows=(num_windows, 0))
         offsets = random_offsets(len(telemetry), self.window, num_windows, rng)
         coarse, target = paired_windows(telemetry, self.coarse, offsets, self.window)
         return target - self.enhance(coarse)
@@ -186,13 +193,23 @@ class EnhancedSimulator:
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Seed of everything drawn; the same seed gives the same.
         """
+        _check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
         begins = rng.integers(0, _START_RANGE, num_windows)
         return self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
 
     def enhance(self, coarse: np.ndarray) -> np.ndarray:
-        """Enhanced, still clean windows (step 5) from coarse ones, float32 of the same shape `(windows, samples)`."""
-        enhanced = enhancer_room.enhance(self.enhancer, (coarse - self.offset) / self.scale)
+        """Enhanced, still clean windows (step 5) from coarse ones, float32 of the same shape `(windows, samples)`.
+
+        Args:
+            coarse: Coarse windows, as `generate_coarse` makes them.
+
+        Raises:
+            InputError: If they are not windows of the enhancer's width.
+        """
+        if np.ndim(coarse) != 2 or np.shape(coarse)[1] != self.window:
+            raise InputError(f"Expected coarse windows of shape (windows, {self.window}). Received: shape {np.shape(coarse)}.")
+        enhanced = enhancer_room.enhance(self.enhancer, (np.asarray(coarse) - self.offset) / self.scale)
         enhanced *= np.float32(self.scale)
         enhanced += np.float32(self.offset)
         return enhanced
@@ -207,7 +224,11 @@ class EnhancedSimulator:
 
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
+
+        Raises:
+            InputError: If `num_windows` is negative or no whole number.
         """
+        _check_counts(num_windows=(num_windows, 0))
         windows, filled = np.empty((num_windows, self.window), np.float32), 0
         for chunk in self.generate_chunks(num_windows, scenario, seed):
             windows[filled : filled + len(chunk)] = chunk
@@ -222,6 +243,7 @@ class EnhancedSimulator:
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Seed of everything drawn; the same seed gives the same.
         """
+        _check_counts(num_windows=(num_windows, 0))
         rng, noise_rng = np.random.default_rng(seed), _noise_rng(seed)
         begins = rng.integers(0, _START_RANGE, num_windows)
         for first in range(0, num_windows, _CHUNK):
@@ -256,8 +278,7 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_samples,)`, in the telemetry's unit.
         """
-        if num_samples < 1:
-            raise InputError(f"Expected at least one sample. Received: num_samples={num_samples}.")
+        _check_counts(num_samples=(num_samples, 1))
         window, hop = self.window, self.window // 2
         num_windows = num_overlapping(num_samples, window)
         length = window + (num_windows - 1) * hop
@@ -334,6 +355,17 @@ class EnhancedSimulator:
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             reason = (str(error).splitlines() or [""])[0]
             raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None
+
+
+def _check_counts(**counts: tuple[Any, int]) -> None:
+    """Refuses a count that is no whole number or below its least; each is given with it."""
+    for name, (count, least) in counts.items():
+        try:
+            is_enough = operator.index(count) >= least
+        except TypeError:
+            is_enough = False
+        if not is_enough:
+            raise InputError(f"Expected {name} to be a whole number, at least {least}. Received: {name}={count!r}.")
 
 
 def _noise_rng(seed: int) -> np.random.Generator:

@@ -8,7 +8,10 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import shutil
+import socket
+import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,9 +19,17 @@ from typing import Any
 
 from enhsim_tf.errors import InputError
 
+_LEFT = re.compile(r"\..*?\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}\.tmp")
+_OLD_S = 24 * 3600  # no process writes nothing for so long
+
 
 def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.tmp")
+    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}.{uuid.uuid4().hex[:8]}.tmp")
+
+
+def _host() -> str:
+    """This machine's name, short and without dots: a process number means nothing on another."""
+    return re.sub(r"[^\w-]", "-", socket.gethostname())[:20] or "host"
 
 
 def make_folder(path: str | os.PathLike) -> Path:
@@ -69,6 +80,44 @@ def replace_folder(path: str | os.PathLike) -> Iterator[Path]:
                 shutil.rmtree(left, ignore_errors=True)
             else:
                 left.unlink(missing_ok=True)
+
+
+def remove_leftovers(folder: str | os.PathLike) -> None:
+    """Removes the temporary folders that killed processes left in a folder.
+
+    A process of this machine that is dead left its own for certain. Any other may belong to another machine that shares
+    the folder, and goes when nothing was written to it for a day.
+
+    Args:
+        folder: Where `replace_folder` was to make its folders.
+    """
+    for left in Path(folder).glob(".*.tmp"):
+        named = _LEFT.fullmatch(left.name)
+        if named is None or not left.is_dir() or left.is_symlink():
+            continue
+        is_dead = named["host"] == _host() and not _is_alive(int(named["process"]))
+        if is_dead or _last_written(left) < time.time() - _OLD_S:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # elsewhere asking would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # somebody else's, or no number of a process
+        return True
+    return True
+
+
+def _last_written(folder: Path) -> float:
+    """When anything in a folder was last written, in seconds since 1970; now, where it is being moved away meanwhile."""
+    try:
+        return max(path.stat().st_mtime for path in (folder, *folder.rglob("*")))
+    except OSError:
+        return time.time()
 
 
 def write_json(path: str | os.PathLike, content: Any) -> None:

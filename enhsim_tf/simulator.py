@@ -11,7 +11,7 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.periodicity import Box, fit_box
-from enhsim_tf.telemetry import Telemetry, cut_windows
+from enhsim_tf.telemetry import Telemetry, check_telemetry, cut_windows
 
 
 @dataclasses.dataclass(frozen=True)
@@ -212,8 +212,9 @@ class SquareWaveSimulator:
             The fitted simulator.
 
         Raises:
-            InputError: If nothing periodic is found.
+            InputError: If it is no telemetry, or nothing periodic is found.
         """
+        check_telemetry(telemetry)
         residual = telemetry.values.astype(np.float64)
         variance, waves = residual.var(), []
         while len(waves) < max_waves:

@@ -58,6 +58,18 @@ class Telemetry:
         return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
 
 
+def check_telemetry(telemetry: Telemetry) -> None:
+    """Says in one line that something else than a series was given.
+
+    Raises:
+        InputError: If it is no `Telemetry`.
+    """
+    if not isinstance(telemetry, Telemetry):
+        raise InputError(
+            f"Expected a Telemetry. Received: {type(telemetry).__name__}. Wrap an array as Telemetry(check_values(values, 'my channel'))."
+        )
+
+
 def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndarray:
     """Returns `values` as a float32 series, or says in one line why it cannot be one.
 
@@ -67,18 +79,25 @@ def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndar
         min_samples: Fewest samples that can be used.
 
     Raises:
-        InputError: If the values are not numeric, not one-dimensional, empty, NaN, infinite, too short or constant.
+        InputError: If the values are not numeric (true and false are no numbers), not one-dimensional, empty, NaN, infinite,
+            beyond float32, too short or constant.
     """
-    values = np.asarray(values)
+    given = values = np.asarray(values)
     if values.ndim != 1:
         raise InputError(f"Expected one series of shape (samples,). Received: shape {values.shape} from {what}. Name a --column.")
     if len(values) == 0:
         raise InputError(f"Expected samples. Received: none from {what}. Give a file that holds a series.")
-    if values.dtype.kind not in "fiub":
+    if values.dtype.kind not in "fiu":
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column.")
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is refused below
         values = values.astype(np.float32)
     bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad) and np.isfinite(given[bad]).all():
+        raise InputError(
+            f"Expected values that float32 holds, up to {np.finfo(np.float32).max:.1e}. "
+            f"Received: {len(bad)} beyond it in {what}, the first ({given[bad[0]]:g}) at sample {bad[0]}. Give another unit."
+        )
+    bad = bad[~np.isfinite(given[bad])]
     if len(bad):
         kind = "NaN" if np.isnan(values[bad[0]]) else "infinite"
         raise InputError(
@@ -158,10 +177,18 @@ def _read_table(path: Path, column: str | None, time: str | None):
     import pandas as pd  # only tables need it
 
     try:
-        table = pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path)
+        if path.suffix.lower() == ".csv":
+            header = pd.read_csv(path, header=None, nrows=1, dtype=str, keep_default_na=False)  # before pandas makes names differ
+            table, names = pd.read_csv(path), header.iloc[0].tolist()
+        else:
+            table = pd.read_parquet(path)
+            names = table.columns.tolist()
     except (ValueError, OSError) as error:  # pandas' and Arrow's parser errors are ValueErrors
         reason = (str(error).splitlines() or ["no reason given"])[0]
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
+    twice = [name for name in dict.fromkeys(names) if name != "" and names.count(name) > 1 and (column is None or name in (column, time))]
+    if twice:
+        raise InputError(f"Expected columns of different names. Received: {twice[0]!r} more than once in {path.name}. Rename them.")
     for name in (column, time):
         if name is not None and name not in table.columns:
             known = ", ".join(map(str, table.columns[:8]))
@@ -178,19 +205,32 @@ def _regular_interval(times, what: str) -> tuple[float, str]:
     import pandas as pd
 
     numeric = pd.api.types.is_numeric_dtype(times)
+    form = {"unit": "s"} if numeric else {"format": "ISO8601"}
     try:
-        stamps = pd.to_datetime(times, unit="s", utc=True) if numeric else pd.to_datetime(times, utc=True, format="ISO8601")
+        stamps = pd.to_datetime(times, utc=True, **form)
     except (ValueError, TypeError):
+        row = _first(pd.to_datetime(times, utc=True, errors="coerce", **form).isna() & times.notna())
         raise InputError(
-            f"Expected times as ISO 8601 date-times or seconds. Received: {times.iloc[0]!r} in {what}. Name another --time."
+            f"Expected times as ISO 8601 date-times or seconds. Received: {str(times.iloc[row])!r} at sample {row} in {what}. "
+            "Correct it or name another --time."
         ) from None
+    if stamps.isna().any():
+        raise InputError(f"Expected a time for every sample. Received: none at sample {_first(stamps.isna())} in {what}. Fill or cut it.")
     steps = np.diff(stamps.dt.tz_convert(None).to_numpy().astype("datetime64[ns]").astype(np.int64)) / 1e9
     interval = float(np.median(steps)) if len(steps) else 0.0
-    if stamps.isna().any() or interval <= 0 or np.abs(steps - interval).max() > 0.01 * interval:
+    uneven = np.abs(steps - interval) > 0.01 * interval
+    if interval <= 0 or uneven.any():
+        where = _first(uneven if interval > 0 else steps <= 0)
         raise InputError(
-            f"Expected regular, rising times. Received: steps from {steps.min(initial=interval):g} s to {steps.max(initial=interval):g} s in {what}. Resample it first."
+            f"Expected regular, rising times. Received: steps from {steps.min(initial=interval):g} s to {steps.max(initial=interval):g} s "
+            f"in {what}, the first bad one before sample {where + 1}. Resample it first."
         )
     return interval, stamps.iloc[0].isoformat()
+
+
+def _first(marks) -> int:
+    """Number of the first mark that is set; 0 where none is."""
+    return int(np.argmax(np.asarray(marks, bool)))
 
 
 def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) -> list[Telemetry]:

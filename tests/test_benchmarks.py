@@ -5,13 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
-from benchmarks import rows
+from benchmarks import figures, rows
 from benchmarks.__main__ import ROWS, main, parse
 from benchmarks.figures import draw
-from benchmarks.report import fill_readme, line_of, markdown
+from benchmarks.report import fill_readme, line_of, markdown, with_words
 from benchmarks.worker import Worker
 from enhsim_tf.errors import InputError
+
+ROOT = Path(__file__).parents[1]
 
 
 def test_ways_take_turns():
@@ -50,17 +54,82 @@ def test_the_traffic_and_the_work_of_the_enhancer():
     assert rows.WINDOW_FLOP == 2 * sum(inputs * outputs for inputs, outputs in layers)
 
 
+GROWTH = [
+    {"x": "num_windows", "work": "w", "growth": [{"num_windows": n, "seconds": n / 9, "peak_mb": 500 + n} for n in (10, 100)]},
+    {"x": "window", "work": "t", "growth": [{"window": n, "enhancer_ms": n / 9, "gan_ms": n**2 / 3, "peak_mb": {}} for n in (125, 250)]},
+]
+
+
+def words(figure):
+    return " ".join(text.get_text() for text in figure.findobj(Text))
+
+
 def test_figures_are_drawn_from_the_results(tmp_path):
-    growth = [
-        {"x": "num_windows", "work": "w", "growth": [{"num_windows": n, "seconds": n / 9, "peak_mb": 500.0} for n in (10, 100)]},
-        {"x": "window", "work": "t", "growth": [{"window": n, "enhancer_ms": n / 9, "gan_ms": n / 3, "peak_mb": {}} for n in (125, 250)]},
-    ]
-    found = {"rows": [measured("enhancer step", "plain fit", 20.0, 40.0), {"work": "a", "comparison": "b", "skipped": "c"}, *growth]}
+    found = {"rows": [measured("enhancer step", "plain fit", 20.0, 40.0), {"work": "a", "comparison": "b", "skipped": "c"}, *GROWTH]}
     files = draw(found, tmp_path)
     assert {file.name for file in files} == {f"speed_{name}.{kind}" for name in ("ratios", "growth") for kind in ("png", "svg")}
     assert all(file.stat().st_size > 5_000 for file in files)
     assert all(line_of(row) for row in found["rows"])
     assert draw({"rows": []}, tmp_path) == []
+    drawn = [file.read_bytes() for file in files]
+    assert [file.read_bytes() for file in draw(found, tmp_path)] == drawn
+    svg = (tmp_path / "speed_ratios.svg").read_text()
+    assert "python -m benchmarks" in svg and "SMOKE" not in svg
+    draw(found | {"quick": True, "machine": {"cores": 3, "tensorflow": "1.2"}}, tmp_path)
+    svg = (tmp_path / "speed_ratios.svg").read_text()
+    assert "SMOKE" in svg and "3 cores, TensorFlow 1.2" in svg
+
+
+def test_the_titles_say_what_the_numbers_say():
+    fast, slow = measured("step", "plain fit", 20.0, 40.0), measured("iteration", "a loop", 90.0, 100.0)
+    said = words(figures.FIGURES["speed_ratios"].draw({"rows": [fast, slow, fast]}))
+    assert "2 of these 3 bars are reached; not reached: iteration" in said and "against a loop" in said
+    assert "0.50 ≤ 0.70" in said and "0.90 > 0.70" in said
+    assert "All of these 2 bars are reached Time" in words(figures.FIGURES["speed_ratios"].draw({"rows": [fast, fast]}))
+    said = words(figures.FIGURES["speed_growth"].draw({"growth": {row["x"]: row["growth"] for row in GROWTH}}))
+    assert "10 times as many windows take 10 times as long and 1.18 times the memory" in said  # 600 / 510
+    assert "Windows 2 times as long take 2.0 times the time for a step of the enhancer, 4.0 times for" in said.replace("\n", " ")
+
+
+def test_numbers_stand_on_no_line():
+    rows_of = [measured("step", "plain fit", ratio, 1.0) for ratio in (0.69, 0.7, 1.0, 1.02)]
+    figure = figures.FIGURES["speed_ratios"].draw({"rows": rows_of})
+    (axes,) = figure.axes
+    FigureCanvasAgg(figure).draw()
+    inside, width = axes.get_window_extent(), figure.bbox.width
+    places = [text.get_window_extent() for text in axes.texts]
+    assert len(places) == 4 and all(inside.x1 < place.x0 and place.x1 < width for place in places)
+    ends = {text.get_text()[:4]: (place.y0 + place.y1) / 2 for text, place in zip(axes.texts, places, strict=True)}
+    for number, row in enumerate(reversed(rows_of)):
+        assert ends[f"{row['ratio']['median']:.2f}"] == pytest.approx(axes.transData.transform((1, number))[1], abs=3)
+
+
+def test_redraw_measures_nothing_and_changes_no_number(tmp_path, monkeypatch):
+    monkeypatch.setattr(rows, "ROWS", {})  # nothing there that could measure
+    steps = [measured("enhancer step", "plain fit", 20.0, 40.0), measured("GAN iteration", "textbook loop", 50.0, 200.0)]
+    (composed,) = rows.reproduction(steps)
+    kept = [{"of": "enhancer", **steps[0]}, {"of": "gan", **steps[1]}, {"of": "reproduction", **composed, "work": "old words"}]
+    out = tmp_path / "results.json"
+    out.write_text(json.dumps({"quick": False, "minutes": 9.6, "machine": {"cores": 2, "tensorflow": "1.0"}, "rows": kept}))
+    before = json.loads(out.read_text())
+    assert main(["--redraw", "--out", str(out), "--figures", str(tmp_path / "new")]) == 0
+    before["rows"][2]["work"] = composed["work"]
+    assert json.loads(out.read_text()) == before and "composed from the steps above" in composed["work"]
+    assert (tmp_path / "new" / "speed_ratios.png").is_file()
+    assert "composed from the steps above" in line_of(composed) and "composed from the steps above" in markdown(before)
+
+
+@pytest.mark.parametrize(("arguments", "word"), [(["--only", "gan"], "measures nothing"), ([], "needs the results")])
+def test_redraw_refuses_what_it_cannot_do(tmp_path, capsys, arguments, word):
+    with pytest.raises(SystemExit) as left:
+        parse(["--redraw", "--out", str(tmp_path / "none.json"), *arguments])
+    assert left.value.code == 2 and word in capsys.readouterr().err
+
+
+def test_the_kept_results_and_the_readme_say_the_same():
+    kept = json.loads((ROOT / "benchmarks" / "results.json").read_text())
+    assert with_words(kept["rows"]) == kept["rows"]
+    assert f"<!-- speed: generated -->\n{markdown(kept)}\n<!-- end of speed -->" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_a_worker_says_why_it_is_skipped(monkeypatch, tmp_path):

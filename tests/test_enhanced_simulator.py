@@ -3,6 +3,7 @@
 import copy
 import functools
 import json
+import sys
 
 import keras
 import numpy as np
@@ -400,6 +401,52 @@ def test_fit_refuses_what_it_does_not_know(refused):
         fitted(noise="pink")
     with refused("extraction='sieve'"):
         fitted(extraction="sieve")
+
+
+@pytest.mark.parametrize("number", [-1, 2.5, "3", None])
+def test_a_number_of_windows_that_cannot_be_is_refused(refused, tmp_path, number):
+    simulator = known(window=60)
+    words = f"num_windows={number!r}"
+    for made in (simulator.generate, simulator.generate_coarse, lambda count: list(simulator.generate_chunks(count))):
+        with refused(words):
+            made(number)
+    with refused(words):
+        simulator.generate_to_parquet(tmp_path / "windows.parquet", number)
+    assert not list(tmp_path.iterdir())
+    with refused(words):
+        simulator.residual_windows(measured(), number, np.random.default_rng(0))
+    assert simulator.generate(np.int64(0)).shape == (0, 60)
+
+
+@pytest.mark.parametrize("shape", [(3, 59), (60,), (3, 60, 1)])
+def test_windows_of_another_width_are_refused(refused, shape):
+    with refused("(windows, 60)", str(shape)):
+        known(window=60).enhance(np.zeros(shape, np.float32))
+
+
+@pytest.mark.parametrize("count", ["num_windows", "epochs", "window", "num_iterations"])
+def test_fit_refuses_counts_below_one(refused, count):
+    for number in (-1, 0) if count != "num_iterations" else (-1,):
+        with refused(f"{count}={number}"):
+            fitted(**{count: number})
+
+
+def test_what_is_no_telemetry_is_refused(refused):
+    values = measured().values
+    for made in (lambda: EnhancedSimulator.fit(values), lambda: EnhancedSimulator.fit(values, coarse=COARSE)):
+        with refused("Expected a Telemetry", "ndarray"):
+            made()
+    with refused("Expected a Telemetry", "list"):
+        SquareWaveSimulator.fit(values.tolist())
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_bars_of_the_fit_are_for_terminals(small_batches, capsys, monkeypatch, is_terminal):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: is_terminal)
+    fitted(verbose="auto", epochs=1, num_iterations=1)
+    out, error = capsys.readouterr()
+    assert ("/step" in out) == is_terminal and bool(out) == is_terminal
+    assert not error, "the other bar goes to standard error, which is a file here"
 
 
 def test_fit_refuses_less_than_two_windows(refused):

@@ -259,6 +259,18 @@ def test_accuracy_and_loss_show_chance_and_what_is_off_scale():
     assert "off scale" not in words(draw("fig12_accuracy_loss", loss_generated=tame))
 
 
+@pytest.mark.parametrize("measure", ["accuracy", "loss"])
+def test_accuracy_and_loss_are_labelled_at_the_ends_of_their_curves(measure):
+    level = {"accuracy": 0.5, "loss": np.log(2)}[measure]  # balanced: both curves end at chance
+    figure = draw("fig12_accuracy_loss", **{f"{measure}_{kind}": np.full(11, level) for kind in ("real", "generated")})
+    axes = next(axes for axes in figure.axes if axes.get_title(loc="left") == measure.capitalize())
+    assert axes.get_title(loc="right") == f"dotted: chance ({'0.5' if measure == 'accuracy' else 'ln 2'})"
+    places = {text.get_text(): text.xy[1] for text in axes.texts}
+    gaps = [places[kind] - level / axes.get_ylim()[1] for kind in ("real", "generated")]
+    one_line = 7.5 * 1.4 / 72 / (axes.get_position().height * figure.get_size_inches()[1])
+    assert np.abs(gaps).max() < 0.6 * one_line and 0.8 * one_line < abs(gaps[0] - gaps[1])
+
+
 def test_telemetry_store_with_and_without_times():
     axes = draw("fig14_telemetry_store").axes[0]
     assert "UTC, from 2020-01-01" in words(axes.figure) and "value (V)" in words(axes.figure)

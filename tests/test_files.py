@@ -135,3 +135,63 @@ def test_sha256_of_the_standard_s_examples(tmp_path):
     path.write_bytes(b"a" * 1_000_000)  # appendix B.3
     assert files.sha256(path) == "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"
     assert files.sha256(path) == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def left_by(process, folder, host=None):
+    """What a killed process leaves: a temporary folder with something in it."""
+    left = folder / f".stage-0123.{host or files._host()}.{process}.0123abcd.tmp"
+    (left / "below").mkdir(parents=True)
+    (left / "below" / "half").write_text("half")
+    return left
+
+
+def dead_process():
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    return ended.pid
+
+
+def grow_old(folder, days):
+    for path in (folder, *folder.rglob("*")):
+        os.utime(path, (path.stat().st_atime, path.stat().st_mtime - days * 86_400))
+
+
+def test_leftovers_of_a_killed_process_are_removed(tmp_path):
+    script = "import os, signal, sys\nfrom enhsim_tf.files import replace_folder\nwith replace_folder(sys.argv[1]) as temporary:\n"
+    script += "    (temporary / 'half').write_text('half')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / "stage-0123")], cwd=ROOT)
+    assert [path.name for path in tmp_path.glob(".stage-0123.*/*")] == ["half"]
+    files.remove_leftovers(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_leftovers_that_may_be_at_work_stay_for_a_day(tmp_path):
+    others = [left_by(os.getpid(), tmp_path), left_by(dead_process(), tmp_path, "another-machine")]
+    others.append(tmp_path / ".stage-4567.89abcdef.tmp")  # says nothing of its process
+    others[-1].mkdir()
+    for days in (0, 0.9):
+        for left in others:
+            grow_old(left, days)
+        files.remove_leftovers(tmp_path)
+        assert all(left.is_dir() for left in others)
+    for left in others:
+        grow_old(left, 0.2)
+    (others[0] / "below" / "new").write_text("at work")
+    files.remove_leftovers(tmp_path)
+    assert [left.is_dir() for left in others] == [True, False, False]
+
+
+def test_nothing_else_is_taken_for_a_leftover(tmp_path):
+    gone = dead_process()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "kept").write_text("x")
+    (tmp_path / "stage-0123").mkdir()
+    (tmp_path / ".mine.tmp").mkdir()
+    (tmp_path / f".file.{files._host()}.{gone}.0123abcd.tmp").write_text("x")
+    (tmp_path / f".link.{files._host()}.{gone}.0123abcd.tmp").symlink_to("elsewhere")
+    for path in tmp_path.iterdir():
+        if not path.is_symlink():
+            grow_old(path, 2)
+    before = sorted(tmp_path.rglob("*"))
+    files.remove_leftovers(tmp_path)
+    assert sorted(tmp_path.rglob("*")) == before

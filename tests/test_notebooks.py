@@ -266,7 +266,7 @@ def test_a_shown_figure_is_the_one_of_the_command(cache, tmp_path, monkeypatch):
     monkeypatch.setattr(teaching, "display", lambda data, **options: shown.append((data, options)))
     experiment, name = teaching.open_experiment("smoke"), "fig02_source_target"
     arrays = teaching.show(experiment, name)
-    caption = "seed 0 · smoke budget · python -m enhsim_tf.reproduce --only fig02"
+    caption = "seed 0 · smoke budget · python -m enhsim_tf.reproduce --budget smoke --only fig02"
     (path,) = figures.save(name, arrays, tmp_path, caption, True, saved_as=("png",))
     ((data, options),) = shown
     seen, kept = (np.asarray(Image.open(where).convert("RGB"), float) for where in (io.BytesIO(data["image/png"]), path))

@@ -46,6 +46,12 @@ BAD_FILES = {
     "nan": ("x.npy", _array(np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
     "infinite": ("x.npy", _array(np.where(np.arange(2_000) == 7, -np.inf, _wave())), []),
     "infinite as float32": ("x.npy", _array(1e39 * _wave()), []),
+    "true and false": ("x.npy", _array(_wave() > 0), []),
+    "one name for two columns": (
+        "x.csv",
+        lambda path: path.write_text("a,a\n" + "".join(f"{value},{-value}\n" for value in _wave())),
+        ["--column", "a"],
+    ),
     "gap in a table": ("x.csv", lambda path: _table(path, value=np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
     "below two windows": ("x.npy", _array(_wave(999)), []),
     "three axes": ("x.npy", _array(np.zeros((2_000, 2, 2))), []),
@@ -83,6 +89,11 @@ BAD_FILES = {
     "missing time": (
         "x.csv",
         lambda path: _table(path, a=_wave(), t=np.where(np.arange(2_000) == 9, np.nan, np.arange(2_000))),
+        ["--column", "a", "--time", "t"],
+    ),
+    "a word among the times": (
+        "x.csv",
+        lambda path: _table(path, a=_wave(), t=[*range(1_999), "soon"]),
         ["--column", "a", "--time", "t"],
     ),
     "words for times": ("x.csv", lambda path: _table(path, a=_wave(), t=["now"] * 2_000), ["--column", "a", "--time", "t"]),
@@ -138,6 +149,12 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
         (["--only", ""], "fig01"),
         (["--column", "0"], "--telemetry"),
         (["--time", "t"], "--telemetry"),
+        (["--seed", "abc"], "'abc'"),
+        (["--budget", "tiny"], "'tiny'"),
+        (["--seed"], "--seed"),
+        (["--sed", "3"], "--sed 3"),
+        (["--experiment", "fame"], "'fame'"),
+        (["--telemetry"], "--telemetry"),
     ],
 )
 def test_a_bad_option_is_refused_in_one_line(refused_line, arguments, word):
@@ -165,7 +182,15 @@ def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch,
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--telemetry", "no/such/file.npy"], ["--seed", "-1"], ["--only", "fig99"], ["--out", "README.md/below"]]
+    "arguments",
+    [
+        ["--telemetry", "no/such/file.npy"],
+        ["--seed", "-1"],
+        ["--seed", "abc"],
+        ["--budget", "tiny"],
+        ["--only", "fig99"],
+        ["--out", "README.md/below"],
+    ],
 )
 def test_a_refusal_as_the_shell_sees_it(tmp_path, arguments):
     defaults = [] if "--out" in arguments else ["--out", tmp_path / "out"]

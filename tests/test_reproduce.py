@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,8 +15,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce import claims, figure_data, figures, page
-from enhsim_tf.reproduce.__main__ import main
+from enhsim_tf.reproduce.__main__ import main, parse
 from enhsim_tf.reproduce.settings import FIGURES
 
 ROOT = Path(__file__).parents[1]
@@ -54,7 +56,18 @@ def smoke(tmp_path_factory):
 # -- help ------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["--seed", "-1"], 2), (["--only", "fig99"], 2)])
+ANSWERS = [
+    (["--help"], 0),
+    (["--seed", "-1"], 2),
+    (["--seed", "abc"], 2),
+    (["--only", "fig99"], 2),
+    (["--out", "README.md/below"], 2),
+    (["--cache", "README.md/below", "--out", "."], 2),
+    (["--experiment", "robustness", "--out", "README.md/below"], 2),
+]
+
+
+@pytest.mark.parametrize(("arguments", "code"), ANSWERS)
 def test_answers_that_need_no_network_import_none(arguments, code):
     slow = "{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}"
     program = f"""
@@ -211,6 +224,7 @@ def test_killed_in_each_stage_it_ends_with_the_same_numbers(smoke, tmp_path):
     assert done.returncode == 0, done.stderr
     found = _results(out)
     assert found["from_cache"] == STAGES
+    assert len(list(cache.iterdir())) == len(STAGES), "what the killed runs left is cleared away"
     assert _without_timing(found) == _without_timing(smoke.found), "to the last digit, in another cache"
 
 
@@ -251,6 +265,47 @@ def test_exit_code_is_0_as_expected_and_1_when_a_verdict_changed(pretended, tmp_
     assert pretended(C1="reproduced", C5="partly") == 0, "a close call may fall to either side"
     assert pretended("--budget", "smoke", C2="not reproduced") == 0, "a smoke run has no expected verdicts"
     assert (tmp_path / "smoke" / "results.json").is_file()
+
+
+def test_the_time_of_figures_is_that_of_drawing_alone(pretended, tmp_path, monkeypatch, capsys):
+    clock = SimpleNamespace(now=0.0, perf_counter=lambda: clock.now)
+
+    def takes(seconds, gives):
+        def work(*arguments):
+            clock.now += seconds
+            return gives
+
+        return work
+
+    monkeypatch.setattr(command, "time", clock)
+    monkeypatch.setattr(figure_data, "FIGURE_DATA", dict.fromkeys(FIGURES, takes(100, {})))  # stages that are still to be done
+    monkeypatch.setattr(figures, "save", takes(2, []))
+    assert pretended("--only", "fig04") == 0
+    assert capsys.readouterr().out.splitlines()[0].split() == ["figures", "2.0", "s"]
+    pretended()
+    assert _results(tmp_path / "figures")["timings"]["figures"] == 2 * len(FIGURES)
+
+
+def test_the_captions_say_commands_that_draw_the_same_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = []
+    monkeypatch.setattr(figure_data, "FIGURE_DATA", dict.fromkeys(FIGURES, lambda experiment: {}))
+    monkeypatch.setattr(figures, "save", lambda name, data, folder, caption, is_smoke: said.append(caption))
+    Path("my data").mkdir()
+    values = np.sin(np.arange(2_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(2_000)
+    pd.DataFrame({"t": np.arange(2_000), "volts, raw": values, "b": 0.0}).to_csv("my data/x.csv", index=False)
+    real = ["--telemetry", str(tmp_path / "my data" / "x.csv"), "--column", "volts, raw", "--time", "t"]
+    for given, means in {
+        "": (),
+        "--budget smoke --seed 3": ("--budget", "smoke", "--seed", "3"),
+        "--telemetry 'my data/x.csv' --column 'volts, raw' --time t": real,
+    }.items():
+        assert main(["--out", "out", "--cache", "cache", "--only", "fig02_source_target", *means]) == 0
+        line = said.pop()
+        assert line.split(" · ")[2] == " ".join(["python -m enhsim_tf.reproduce", given, "--only fig02"]).replace("  ", " ")
+        again, first = (parse(words) for words in (shlex.split(line.split(" · ")[2])[3:], ["--only", "fig02", *means]))
+        assert Path(again.telemetry or ".").resolve() == Path(first.telemetry or ".").resolve()
+        assert {**vars(again), "telemetry": None} == {**vars(first), "telemetry": None}
 
 
 def test_a_full_run_into_figures_fills_the_readme_and_no_other_run_does(pretended, tmp_path):

@@ -2,6 +2,7 @@
 
 import ast
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 import enhsim_tf
 from enhsim_tf.errors import InputError
+from enhsim_tf.files import replace_folder
 from enhsim_tf.reproduce import experiments, stages
 from enhsim_tf.reproduce.stages import Stages, default_cache, imports_of, load_arrays, save_arrays
 
@@ -136,6 +138,17 @@ def test_what_a_killed_run_left_is_not_taken_for_a_stage(work):
     assert work.run() == (folder, False) and len(work.made) == 2
     (folder / "stage.json").unlink()  # a folder of that name that is not a whole stage
     assert work.run() == (folder, False) and len(work.made) == 3
+
+
+def test_what_a_killed_run_left_is_cleared_away_by_the_next(work, monkeypatch):
+    folder, _ = work.run()
+    monkeypatch.setattr(os, "getpid", lambda: 2**22 + 1)  # above the largest number of a process
+    with replace_folder(folder.with_name("killed")) as temporary:
+        shutil.copytree(temporary, half := temporary.with_name(temporary.name.replace("killed", "work")))
+    monkeypatch.undo()
+    assert half.is_dir()
+    Stages(work.cache, tell=lambda line: None)
+    assert not half.exists() and folder.is_dir()
 
 
 def test_times_and_lines_tell_what_was_done(work, monkeypatch):

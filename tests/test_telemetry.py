@@ -6,6 +6,7 @@ import pytest
 
 from enhsim_tf.telemetry import (
     Telemetry,
+    check_telemetry,
     check_values,
     cut_windows,
     disjoint_offsets,
@@ -50,6 +51,9 @@ BAD_VALUES = {
     "NaN": (with_one(np.nan), "(NaN) at sample 4"),
     "infinite": (with_one(np.inf), "(infinite) at sample 4"),
     "minus infinite": (with_one(-np.inf), "(infinite) at sample 4"),
+    "beyond float32": (with_one(-1e300), "(-1e+300) at sample 4"),
+    "beyond float32, and a gap": (np.where(RAMP == 2, 1e300, with_one(np.nan)), "1 NaN or infinite"),
+    "true and false": (RAMP % 3 == 0, "dtype bool"),
     "too short": (RAMP[:9], "at least 10 samples"),
 }
 
@@ -74,7 +78,7 @@ def test_values_of_another_shape_are_refused(refused, shape):
         check_values(np.zeros(shape), "here")
 
 
-@pytest.mark.parametrize("dtype", [bool, np.uint8, np.int64, np.float16, np.float64])
+@pytest.mark.parametrize("dtype", [np.uint8, np.int64, np.float16, np.float64])
 def test_numbers_of_any_kind_become_float32(dtype):
     values = check_values(np.array([0, 1, 1, 0]).astype(dtype), "here")
     assert values.dtype == np.float32 and values.tolist() == [0, 1, 1, 0]
@@ -118,6 +122,41 @@ def test_bad_files_are_refused(tmp_path, refused, name):
     file, content, arguments = BAD_FILES[name]
     with refused("" if "time" in arguments or "column" in arguments else file):
         read_telemetry(write(tmp_path / file, content), **arguments)
+
+
+BAD_TIMES = {
+    "a word": (["2020-03-01T00:00:00", "2020-03-01T00:00:01", "soon", "2020-03-01T00:00:03"], "'soon' at sample 2 "),
+    "a word after a gap": (["2020-03-01T00:00:00", None, "2020-03-01T00:00:02", "late"], "'late' at sample 3 "),
+    "too far away": ([0.0, 1.0, 2.0, 1e15], "'1000000000000000.0' at sample 3 "),
+    "a gap": ([0.0, 1.0, np.nan, 3.0], "none at sample 2 "),
+    "one sample late": ([0.0, 1.0, 2.0, 3.5], "from 1 s to 1.5 s in a.csv, the first bad one before sample 3."),
+    "twice": ([0.0, 1.0, 1.0, 2.0], "from 0 s to 1 s in a.csv, the first bad one before sample 2."),
+    "falling": ([3.0, 2.0, 1.0, 0.0], "from -1 s to -1 s in a.csv, the first bad one before sample 1."),
+}
+
+
+@pytest.mark.parametrize("name", BAD_TIMES)
+def test_the_time_that_cannot_be_used_is_named(tmp_path, refused, name):
+    times, words = BAD_TIMES[name]
+    with refused(words):
+        read_telemetry(write(tmp_path / "a.csv", pd.DataFrame({"v": RAMP[:4], "t": times})), time="t")
+
+
+def test_a_column_name_that_stands_twice_is_refused_where_it_is_needed(tmp_path, refused):
+    lines = [f"{number},{number % 7},{-number}," for number in range(12)]
+    path = write(tmp_path / "a.csv", "\n".join(["a,b,a,", *lines]).encode())
+    for arguments in ({"column": "a"}, {}, {"column": "b", "time": "a"}):
+        with refused("'a' more than once in a.csv"):
+            read_telemetry(path, **arguments)
+    assert read_telemetry(path, column="b").values.tolist() == (np.arange(12) % 7).tolist()
+    path = write(tmp_path / "b.csv", b"a,,\n1,,\n2,,\n4,,\n")
+    assert read_telemetry(path, column="a").values.tolist() == [1, 2, 4], "columns without a name have no name in common"
+
+
+def test_something_else_than_telemetry_is_refused(refused):
+    check_telemetry(Telemetry(RAMP))
+    with refused("Received: ndarray", "Telemetry(check_values("):
+        check_telemetry(RAMP)
 
 
 def test_missing_file_folder_and_pickle_are_refused(tmp_path, refused):

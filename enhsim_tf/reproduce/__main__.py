@@ -4,6 +4,7 @@ import argparse
 import sys
 import time
 from pathlib import Path
+from typing import NoReturn
 
 EXAMPLES = """\
 examples:
@@ -21,9 +22,22 @@ exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the in
 NOISES = ("white", "autoregressive", "heteroscedastic", "shot")
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose refusals are those of the whole command: one line, exit code 2."""
+
+    def error(self, message: str) -> NoReturn:
+        from enhsim_tf.errors import InputError
+
+        raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
+
+
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """Reads the command line; imports nothing that is slow."""
-    parser = argparse.ArgumentParser(
+    """Reads the command line; imports nothing that is slow.
+
+    Raises:
+        InputError: If an option is unknown or its value is not of its kind.
+    """
+    parser = _Parser(
         prog="python -m enhsim_tf.reproduce",
         description="Reproduces Feldman 2020, 'Training robust anomaly detection using ML-Enhanced simulations', end to end.",
         epilog=EXAMPLES,
@@ -51,9 +65,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 def run(options: argparse.Namespace) -> int:
     """Runs what the options ask for and returns the exit code."""
     check(options)
+    folder = make_folders(options)
     if options.experiment:
-        return run_experiment(options)
-    from enhsim_tf.files import make_folder, write_json
+        return run_experiment(options, folder)
+    from enhsim_tf.files import write_json
+    from enhsim_tf.reproduce.caption import caption_of
     from enhsim_tf.reproduce.claims import CLAIMS, changed, judge, ranges
     from enhsim_tf.reproduce.data import Source
     from enhsim_tf.reproduce.experiments import Experiment
@@ -71,20 +87,19 @@ def run(options: argparse.Namespace) -> int:
         stages = Stages(options.cache or default_cache(), options.fresh, tell)
         return Experiment(make_settings(options.budget, seed), stages, source, verbose=int(sys.stdout.isatty()))
 
-    began, is_smoke, folder = time.perf_counter(), options.budget == "smoke", make_folder(out_folder(options))
+    began, is_smoke = time.perf_counter(), options.budget == "smoke"
     source = None if options.telemetry is None else Source(options.telemetry, options.column, options.time)
     experiment = experiment_of(options.seed)
     records = [] if options.only else judge(CLAIMS, experiment)
 
-    drawing, chosen = time.perf_counter(), chosen_figures(options.only)
+    chosen, drawn_s = chosen_figures(options.only), 0.0
     for name in chosen:
-        data = FIGURE_DATA[name](experiment)
-        subject = "" if source is None else f" --telemetry {source.path.name}"
-        caption = f"seed {options.seed} · {options.budget} budget · python -m enhsim_tf.reproduce{subject} --only {name.split('_')[0]}"
-        save(name, data, folder, caption, is_smoke)
+        data = FIGURE_DATA[name](experiment)  # does the stages it needs, which say their own time
+        drawing = time.perf_counter()
+        save(name, data, folder, caption_of(name, experiment), is_smoke)
+        drawn_s += time.perf_counter() - drawing
         if options.arrays:
             save_arrays(folder, data, name)
-    drawn_s = time.perf_counter() - drawing
     tell(f"{'figures':12} {drawn_s:7.1f} s")
     if options.only:
         tell(f"{folder / chosen[0]}.png and .svg")
@@ -111,9 +126,8 @@ def run(options: argparse.Namespace) -> int:
     return 1 if different else 0
 
 
-def run_experiment(options: argparse.Namespace) -> int:
-    """Runs the experiment on robustness and returns the exit code."""
-    from enhsim_tf.files import make_folder
+def run_experiment(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the experiment on robustness, below the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.robustness_report import report, verdict_lines
     from enhsim_tf.reproduce.robustness_run import FOLDER, run
     from enhsim_tf.reproduce.settings import make_settings
@@ -125,7 +139,7 @@ def run_experiment(options: argparse.Namespace) -> int:
     turned = {} if options.seeds is None else {"robustness__num_seeds": options.seeds}
     settings = make_settings(options.budget, **turned)
     environments = NOISES if options.environment is None else (options.environment,)
-    out = make_folder(out_folder(options) / FOLDER)
+    out = folder / FOLDER
     found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
     tell("\n" + "\n".join(verdict_lines(found)))
     if options.budget == "full" and out == Path("figures") / FOLDER:
@@ -182,13 +196,22 @@ def out_folder(options: argparse.Namespace) -> Path:
     return options.out or Path(default if options.telemetry is None else f"{default}_{options.telemetry.stem}")
 
 
+def make_folders(options: argparse.Namespace) -> Path:
+    """Makes the folders that the options name, before anything slow is imported; returns the one that figures go to."""
+    from enhsim_tf.files import make_folder
+
+    out = make_folder(out_folder(options))
+    if options.cache is not None:
+        make_folder(options.cache)
+    return out
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; a user's mistake is one line and exit code 2."""
-    options = parse(arguments)
     from enhsim_tf.errors import InputError
 
     try:
-        return run(options)
+        return run(parse(arguments))
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

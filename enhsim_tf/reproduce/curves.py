@@ -195,7 +195,7 @@ def _plot_judgements(axes: Axes, data: Arrays, measure: str, top: float, label: 
     axes.set(ylim=(0, top), ylabel=label, xlabel="iteration")
     axes.margins(x=0.03)
     axes.axhline(chance[0], color=LINE, linewidth=0.8, linestyle=(0, (1, 1.5)))
-    ends = {f"chance\n({chance[1]})": (chance[0], QUIET)}
+    ends = {}
     for kind, color, look in (
         ("real", REAL, {"marker": "o"}),
         ("generated", GENERATED, {"marker": "s", "mfc": "white", "linestyle": _DASHES}),
@@ -203,6 +203,8 @@ def _plot_judgements(axes: Axes, data: Arrays, measure: str, top: float, label: 
         axes.plot(data["iteration"], data[f"{measure}_{kind}"], color=color, linewidth=1.2, markersize=3.5, clip_on=top != 1, **look)
         ends[kind] = data[f"{measure}_{kind}"], color
     axes.set_title(measure.capitalize(), weight="bold", pad=8)
+    # beside the ends it would push away the two labels that have to stand there: both curves end near it where training is balanced
+    axes.set_title(f"dotted: chance ({chance[1]})", loc="right", size=7, color=QUIET, pad=8)
     axes.xaxis.set_major_formatter("{x:,.0f}")
     label_ends(axes, ends)
 

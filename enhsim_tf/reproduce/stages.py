@@ -2,7 +2,7 @@
 
 A stage is a function that fills a folder. The folder appears whole, under a name that holds the hash of the stage's
 settings, of its code with all rooms below it, of the stages before it, and of the versions it ran on. A killed run
-therefore leaves only whole stages, and the next one goes on behind the last of them.
+therefore leaves only whole stages, and the next one goes on behind the last of them and clears away what was half done.
 """
 
 import ast
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.files import make_folder, replace_folder, write_json
+from enhsim_tf.files import make_folder, remove_leftovers, replace_folder, write_json
 
 _PACKAGE = Path(__file__).parents[1]
 VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
@@ -43,6 +43,7 @@ class Stages:
 
     def __init__(self, cache: Path, fresh: bool = False, tell: Callable[[str], None] = print):
         self.cache, self.fresh, self.tell = make_folder(cache), fresh, tell
+        remove_leftovers(self.cache)
         self.seconds: dict[str, float] = {}
         self.cached: dict[str, bool] = {}
         self._keys: dict[str, str] = {}

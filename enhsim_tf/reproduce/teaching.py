@@ -23,6 +23,7 @@ from PIL import Image
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.reproduce import claims, figures, robustness_figures
+from enhsim_tf.reproduce.caption import caption_of
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.figure_data import FIGURE_DATA
 from enhsim_tf.reproduce.findings import read_tables
@@ -103,10 +104,9 @@ def prepare(experiment: Experiment) -> list[str]:
 
 def show(experiment: Experiment, name: str) -> Arrays:
     """Shows a figure (one of `settings.FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
-    arrays, chosen = FIGURE_DATA[name](experiment), experiment.settings
-    caption = f"seed {chosen.seed} · {chosen.budget} budget · python -m enhsim_tf.reproduce --only {name.split('_')[0]}"
+    arrays, is_smoke = FIGURE_DATA[name](experiment), experiment.settings.budget == "smoke"
     with tempfile.TemporaryDirectory() as folder:
-        (path,) = figures.save(name, arrays, folder, caption, chosen.budget == "smoke", saved_as=("png",))
+        (path,) = figures.save(name, arrays, folder, caption_of(name, experiment), is_smoke, saved_as=("png",))
         _show_picture(path.read_bytes(), figures.FIGURES[name].alt)
     return Arrays(arrays)
 

@@ -1,0 +1,33 @@
+"""The small print of a figure of the paper: what ran, and the command that draws the figure again."""
+
+import os
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from enhsim_tf.reproduce.experiments import Experiment
+
+
+def caption_of(name: str, experiment: "Experiment") -> str:
+    """The caption line of a figure, with every option that is not the default and that the picture depends on.
+
+    Args:
+        name: One of `settings.FIGURES`.
+        experiment: What its arrays come from.
+    """
+    settings, source, options = experiment.settings, experiment.source, []
+    if source is not None:
+        options += ["--telemetry", _as_typed(source.path)]
+        options += [] if source.column is None else ["--column", source.column]
+        options += [] if source.time is None else ["--time", source.time]
+    options += [] if settings.budget == "full" else ["--budget", settings.budget]
+    options += ["--seed", str(settings.seed)] if settings.seed else []
+    options += ["--only", name.split("_")[0]]
+    return f"seed {settings.seed} · {settings.budget} budget · {shlex.join(['python', '-m', 'enhsim_tf.reproduce', *options])}"
+
+
+def _as_typed(path: Path) -> str:
+    """A path as one types it: from the current folder where it lies below that, which keeps the machine's folders out of the figure."""
+    here = Path(os.path.abspath(path))  # without following links: the name is the user's
+    return str(here.relative_to(Path.cwd())) if here.is_relative_to(Path.cwd()) else str(path)
