@@ -130,7 +130,7 @@ assert rank["GAN"] < {True: 0.2, False: 0.6}[is_full] * rank["real"]  # few wind
 assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 
 # %% [markdown]
-# ## What a detector sees that an eye does not
+# ## What a detector sees that a glance does not
 #
 # Train the simplest detector of directions, PCA, on enhanced windows with the GAN's noise. Its twenty components hold the waveform and
 # then the sheet, nearly all of it: what is left over is tiny, and the threshold with it. A real window has noise in hundreds of

@@ -136,5 +136,10 @@ limit = tables["recall"].query("detector == 'limit check' and arm == 'real'")
 print(limit.groupby("kind", observed=True)["recall"].mean().sort_values().map("{:.0%}".format).to_string())
 
 # %% [markdown]
-# The residual of principal components looks at directions, and the GAN's noise fills few of them. The limit check sees only values beyond
-# those of training: what stays inside the range of the waves, such as a stuck value, it cannot see.
+# <details><summary>What to say about it</summary>
+#
+# 1. The residual of principal components looks at directions, and the GAN's noise fills few of them.
+# 2. The limit check sees only values beyond those of training: what stays inside the range of the waves, such as a stuck value, it
+#    cannot see.
+#
+# </details>

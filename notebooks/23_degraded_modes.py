@@ -138,3 +138,12 @@ print(worst.sort_values(1.0).round(3).to_string())
 # %%
 for method, about in found["modes"]["trust"].items():
     print(f"{method:14} below the limit {about['error_trusted']:.3f}, above {about['error_flagged']:.3f}")
+
+# %% [markdown]
+# <details><summary>What to say about it</summary>
+#
+# 1. The table is sorted by the error at full severity: the hardest mode stands last. A mode whose two columns are close hardly gets
+#    worse; look at its coarse windows before you call that robust, since they may hardly change either.
+# 2. What the limit is worth is the distance of the two numbers in a row, and what it costs is the share of windows that it throws away.
+#
+# </details>

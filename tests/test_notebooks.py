@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from enhsim_tf.reproduce import figures, teaching
+from enhsim_tf.reproduce import figures, robustness_figures, teaching
 from enhsim_tf.reproduce.claims import CLAIMS
 from enhsim_tf.reproduce.settings import FIGURES
 from notebooks import build
@@ -95,10 +95,13 @@ def test_it_defines_nothing_long_and_nothing_that_the_package_has(source):
 @each_notebook
 def test_it_shows_figures_says_what_to_see_and_asserts_it(source):
     trees, cells = trees_of(source), build.read(source).cells
-    shown = [node.args[1].value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call) and called(node) == "show"]
-    assert shown and set(shown) <= set(FIGURES)
+    calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    shown, findings = ([node.args[1].value for node in calls if called(node) == name] for name in ("show", "show_finding"))
     number = source.stem[:2]
-    assert number in ("00", "20", "21") or any(name.startswith(f"fig{number}_") for name in shown)
+    of_experiment = number in ("22", "23")  # on robustness: its figures are those of its findings
+    assert findings if of_experiment else shown
+    assert set(shown) <= set(FIGURES) and set(findings) <= set(robustness_figures.FIGURES)
+    assert number in ("00", "20", "21") or of_experiment or any(name.startswith(f"fig{number}_") for name in shown)
     asserts = [any(isinstance(node, ast.Assert) for node in ast.walk(tree)) for tree in trees]
     assert sum(asserts) >= len([cell for cell in cells if "*What to see:*" in cell.source]) >= 1
 
