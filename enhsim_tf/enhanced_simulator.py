@@ -267,7 +267,8 @@ class EnhancedSimulator:
         """Generates one continuous series of any length, without seams.
 
         Enhanced windows that overlap by half are faded into each other with weights that add up to one; the noise has a
-        way of its own (`NoiseGAN.generate_series`).
+        way of its own (`NoiseGAN.generate_series`). That of the paper's networks repeats a pattern every half window (it
+        correlates at about 0.5 with itself there); with `noise="convolutional"` it does not.
 
         Args:
             num_samples: Length of the series.

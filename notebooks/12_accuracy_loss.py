@@ -31,8 +31,8 @@ history = show(experiment, "fig12_accuracy_loss")
 
 # %% [markdown]
 # *What to see:* the discriminator learns first, then the generator catches up; from there on both losses stay near ln 2, the loss of
-# somebody who says "fifty-fifty" to everything. When one accuracy rises the other falls: the discriminator has an opinion, and it is
-# about as often wrong as right.
+# somebody who says "fifty-fifty" to everything. In that half, when one accuracy rises the other falls: the discriminator has an
+# opinion, and it is about as often wrong as right.
 
 # %%
 last = {key: float(values[-1]) for key, values in history.items()}
@@ -41,6 +41,9 @@ loss = (last["loss_real"] + last["loss_generated"]) / 2
 print(f"both kinds together at the end: accuracy {both:.2f}, loss {loss:.2f} (ln 2 = {np.log(2):.2f})")
 assert abs(both - 0.5) < 0.2
 assert abs(loss - np.log(2)) < {"full": 0.15, "smoke": 3.0}[experiment.settings.budget]
+half = slice(len(history["iteration"]) // 2, None)
+if experiment.settings.budget == "full":
+    assert np.corrcoef(history["accuracy_real"][half], history["accuracy_generated"][half])[0, 1] < -0.5
 
 # %% [markdown]
 # How much of the wiggling is chance? An accuracy from 200 rows has a standard error of a few per cent by itself:
@@ -68,13 +71,29 @@ with drawing(alt, 2, 2.0) as panels:
         panel.set(title=f"{name}, share of the real", xlabel="iteration", ylim=(0, 1.08 * max(1, *share)))
 
 # %% [markdown]
-# *What to see:* on the left the noise finds its size, as the claim says. On the right nothing happens: not one of the curves of Figure
-# 12 would ever tell.
+# *What to see:* on the left the noise finds its size, as the claim says, at this seed. On the right it never comes near 1: not one of
+# the curves of Figure 12 would ever tell.
 
 # %%
 print(f"at the end: standard deviation {size[-1]:.2f}, effective rank {rank[-1]:.2f} of the real")
 assert rank.max() < {"full": 0.5, "smoke": 0.9}[experiment.settings.budget]
 assert abs(np.log(size[-1])) < {"full": 0.1, "smoke": 3.0}[experiment.settings.budget]
+
+# %% [markdown]
+# One seed is one story. Two of the three that the ledger looks at end with noise about a quarter too small, and keep it so while the
+# game stays as even as here:
+
+# %%
+import json
+from pathlib import Path
+
+spread = json.loads(Path("../figures/spread.json").read_text())
+off = np.exp(
+    -np.sort(spread["claims"]["C4"]["values"])[::-1]
+)  # the value is the size's distance from 1, as a log
+print(f"seeds {spread['seeds']}: the noise misses its size by the factors", off.round(2))
+print("share of rows judged rightly:", np.round(spread["claims"]["C5"]["values"], 2))
+assert off[0] < 0.85 and off[1] < 0.85 and np.ptp(spread["claims"]["C5"]["values"]) < 0.05
 
 # %% [markdown]
 # ## What the ledger says

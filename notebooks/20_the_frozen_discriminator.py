@@ -160,6 +160,14 @@ moved = [bool((now != old).any()) for now, old in zip(rescued.get_weights(), bef
 print("moved after the freeze:", moved)
 assert all(moved)
 
+# %%
+before = rescued.get_weights()
+with warnings.catch_warnings(action="ignore"):  # the warning that we know
+    rescued.train_on_batch(real_noise[:32], real[:32])  # a new batch shape: the step is built anew
+moved = [bool((now != old).any()) for now, old in zip(rescued.get_weights(), before)]
+print("moved by a batch of another size:", moved)
+assert not any(moved)
+
 
 # %%
 def moves_exactly(step, learns, rests):

@@ -53,6 +53,18 @@ with drawing(alt, 2, 2.3) as (left, right):
 # one has the spike on the far left: a trace of the satellite's 2-minute rotation, which the moving average let through (notebook 08).
 
 # %%
+spectrum = {name: fidelity.power_spectrum(rows) for name, rows in noises.items()}
+spike = np.argmin(np.abs(frequency - 1 / 120))
+height = {name: float(power[spike] / np.median(power)) for name, power in spectrum.items()}
+bumps = {name: float(np.std(np.log(power[10:]))) for name, power in spectrum.items()}
+print(
+    "power at one cycle in 120 samples, over the median:", {name: round(h, 2) for name, h in height.items()}
+)
+print("sd of the log spectrum beside it:", {name: round(bump, 2) for name, bump in bumps.items()})
+assert height["real"] > 1.5 > height["Gaussian"]
+assert not is_full or (height["GAN"] < 1.5 and bumps["GAN"] > 2 * bumps["real"])
+
+# %%
 lag_one = {name: fidelity.autocorrelation(rows, 1)[1] for name, rows in noises.items()}
 for name in ("GAN", "Gaussian"):
     size = fidelity.scale_difference(noises[name], real)
@@ -78,14 +90,18 @@ with drawing(alt, height=1.8) as panel:
     panel.legend(frameon=False, ncols=2, loc="upper right")
 
 # %% [markdown]
-# *What to see:* the GAN has one fixed pattern under all of its windows. It is as rough as noise, so nobody sees it in a window, nor in
-# a histogram or a spectrum; two windows laid over each other would show it.
+# *What to see:* the GAN has one fixed pattern under all of its windows. It is as rough as noise, so nobody sees it in a single window,
+# nor in a histogram; two windows laid over each other show it. The bumps of the spectrum above are its bumps.
 
 # %%
 fixed = {name: float(np.mean(rows.mean(axis=0) ** 2) / np.mean(rows**2)) for name, rows in noises.items()}
 for name, share in fixed.items():
     print(f"{name:8} share of the power that is the same in every window: {share:.1%}")
 assert fixed["GAN"] > 5 * fixed["real"]
+pattern = fidelity.power_spectrum(noises["GAN"].mean(axis=0)[None])
+alike = np.corrcoef(pattern, spectrum["GAN"])[0, 1]
+print(f"correlation of the pattern's spectrum with that of the windows: {alike:.2f}")
+assert alike > 0.5
 
 # %% [markdown]
 # ## What is hard: how the windows differ from each other
@@ -114,7 +130,7 @@ assert rank["GAN"] < {True: 0.2, False: 0.6}[is_full] * rank["real"]  # few wind
 assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 
 # %% [markdown]
-# ## What a detector sees that an eye does not
+# ## What a detector sees that a glance does not
 #
 # Train the simplest detector of directions, PCA, on enhanced windows with the GAN's noise. Its twenty components hold the waveform and
 # then the sheet, nearly all of it: what is left over is tiny, and the threshold with it. A real window has noise in hundreds of

@@ -197,15 +197,19 @@ def test_every_setting_and_every_number_of_the_run_is_there(tree):
 
 
 def test_ranges_over_seeds_only_where_they_belong_to_the_run(folder):
-    spread = {"budget": "full", "seeds": [0, 1], "claims": {"C1": {"range": [0.0411, 0.0421], "values": [0.0421, 0.0411]}}}
+    claims = {claim["id"]: {"values": [claim["value"]] * 2, "verdicts": [claim["verdict"]] * 2} for claim in found_of()["claims"]}
+    claims["C1"]["values"][1], claims["C2"]["verdicts"][1] = 0.0411, NOT_REPRODUCED
+    spread = {"budget": "full", "seeds": [0, 1], "claims": claims}
     try:
         (folder / "spread.json").write_text(json.dumps(spread))
         shown = read(folder).text
         assert "0.0421 (0.0411 to 0.0421)" in shown and "over seeds 0, 1" in shown
+        assert shown.count("over seeds: 1 partly, 1 not reproduced") == 2, "in the row of C2 and beside its figure"
+        assert "by the verdicts of most seeds" in shown and "1 (1 to 1)" not in shown, "a speed has no range"
         older = found_of()
         older["claims"][0]["value"] = 0.0431
         for other in (found_of(seed=7), found_of(budget="smoke"), older):
-            assert "0.0411" not in read(folder, other).text
+            assert "0.0411" not in (text := read(folder, other).text) and "over seeds" not in text
     finally:
         (folder / "spread.json").unlink()
 
@@ -448,6 +452,12 @@ def test_the_page_never_scrolls_sideways(browser, width):
     ends = "['.first h2', '.first .facts', '.lead'].map(name => document.querySelector(name).getBoundingClientRect())"
     caption, facts, claims = browser.ask(f"{ends}.map(({{top, bottom}}) => [top, bottom])")
     assert caption[1] <= facts[0] and facts[1] <= claims[0], "nothing lies over another thing"
+
+
+def test_a_claims_name_beside_its_figure_is_never_broken(browser):
+    browser.view(1200)
+    heights = browser.ask("[...document.querySelectorAll('.shows a')].map(name => name.getBoundingClientRect().height)")
+    assert len(heights) == len(CLAIMS) and max(heights) < 1.5 * min(heights) < 45
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

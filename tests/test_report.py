@@ -173,10 +173,28 @@ def _spread(value, budget="smoke", seeds=(7, 8, 9)):
 
 def test_the_readme_gives_the_range_over_seeds_where_it_is_known(filled):
     text = filled(spread=_spread(0.12345))
-    assert "0.123 (0.1 to 0.2)" in text and "1,234,568 (1 to 2,000,000)" in text and "seeds 7, 8, 9" in text
+    assert "0.123 (0.1 to 0.2)" in text and "seeds 7, 8, 9" in text
+    assert "| 1,234,568 | **partly**" in text, "a speed has no range over seeds"
     assert "**partly** (over seeds: 2 partly, 1 not reproduced)" in text and text.count("over seeds:") == 1
     for other in (_spread(0.15), _spread(0.12345, budget="full"), _spread(0.12345, seeds=(0, 1))):
         assert "over seeds" not in filled(spread=other), "ranges of another run"
+    older = _spread(0.12345)
+    del older["claims"]["C9"]
+    assert "over seeds" not in filled(spread=older), "ranges of another ledger"
+
+
+def test_a_value_lies_in_its_range_and_a_verdict_is_counted_whatever_the_seed_had_before(filled, found):
+    spread = _spread(0.12345)
+    spread["claims"]["C9"] |= {"range": [1, 2], "values": [1.5, 1, 2], "verdicts": ["partly"] * 3}
+    found["claims"] = [*RECORDS[:2], RECORDS[2] | {"value": 3.5, "verdict": "reproduced"}]
+    text = filled(spread=spread)
+    assert "| 3.5 (1 to 3.5) | **reproduced** (over seeds: 1 reproduced, 2 partly)" in text
+
+
+def test_the_title_carries_the_verdict_of_most_seeds(filled):
+    spread = _spread(0.12345)
+    spread["claims"]["C2"]["verdicts"][1:] = ["not reproduced"] * 2
+    assert filled().startswith("# [Re, in part] ") and filled(spread=spread).startswith("# [¬Re] ")
 
 
 def test_the_readme_shows_what_real_channels_reached(tmp_path, filled, found):
@@ -184,11 +202,13 @@ def test_the_readme_shows_what_real_channels_reached(tmp_path, filled, found):
     errors |= {"synchronised_nrmse": 0.01, "synchronised_ridge_nrmse": 0.02, "synchronised_identity_nrmse": 0.03}
     for name in ("b", "a"):
         (tmp_path / name).mkdir()
-        write_json(tmp_path / name / "results.json", found | {"source": f"{name}.npy", "claims": [RECORDS[0] | {"details": errors}]})
-    rows = _between(filled(), "channels").splitlines()[2:]
-    assert [row.replace(" ", "") for row in rows] == [
-        f"|`{name}.npy`|0.100|0.200|0.300|0.010|0.020|0.030|reproduced|" for name in ("a", "b")
-    ]
+        claims = [RECORDS[0] | {"id": f"C{number}", "details": errors, "verdict": f"said {number}"} for number in range(1, 10)]
+        claims[2] |= {"finding": "17 disjoint test windows and no known degraded truth: too little"}
+        write_json(tmp_path / name / "results.json", found | {"source": f"{name}.npy", "claims": claims})
+    head, rule, *rows = _between(filled(), "channels").splitlines()
+    assert head.count("|") == rule.count("|") == 14
+    judged = "said 1 | said 4 | said 5 | said 6 | said 7"
+    assert rows == [f"| `{name}.npy` | 0.100 | 0.200 | 0.300 | 0.010 | 0.020 | 0.030 | 17 | {judged} |" for name in ("a", "b")]
 
 
 def test_filling_twice_is_filling_once(filled):

@@ -1,11 +1,13 @@
 """The claims ledger: what the paper says, how it is judged, and what came out.
 
-Statistics and tolerances were fixed before the first full run. Claims C8 and C9 the paper never tests: their verdict says
-so, and the finding says what our measurement shows.
+Statistics and tolerances were fixed before the first full run, but for the second condition of C9, which came after a
+trial and changed no verdict. Claims C8 and C9 the paper never tests: their verdict says so, and the finding says what our
+measurement shows.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -87,8 +89,8 @@ def _learns_mapping(experiment: Experiment) -> Outcome:
 
 def _is_fast(experiment: Experiment) -> Outcome:
     found = _numbers(experiment.speed)
-    rate, unit = found["generate_rate"], "real time" if experiment.data.channels[0].telemetry.has_time else "samples a second"
-    finding = f"{rate:,.0f} x {unit} for signal and noise; the coarse simulator alone is {found['cost_ratio']:.0f} times faster still"
+    rate, unit = found["generate_rate"], "x real time" if experiment.data.channels[0].telemetry.has_time else "samples a second"
+    finding = f"{rate:,.0f} {unit} for signal and noise; the coarse simulator alone is {found['cost_ratio']:.0f} times faster still"
     return Outcome(rate, _verdict(rate >= 10_000, rate >= 1), finding, found)
 
 
@@ -129,8 +131,9 @@ def _noise_is_similar(experiment: Experiment) -> Outcome:
     found = {key.removeprefix("noise_"): value for key, value in _numbers(experiment.resemblance).items() if key.startswith("noise_")}
     plain = found["scale_difference"] <= 0.1 and found["lag_one_difference"] <= 0.05 and found["marginal_distance"] <= 0.1
     strict = found["rank_ratio"] >= 0.8 and found["classifier_auc"] <= 0.6
+    contrast = "but it" if found["rank_ratio"] < 0.8 else "it"
     finding = (
-        f"sd off by {np.expm1(found['scale_difference']):.1%}, lag-1 correlation by {found['lag_one_difference']:.3f}; but it fills {found['rank']:.0f} effective "
+        f"sd off by {np.expm1(found['scale_difference']):.1%}, lag-1 correlation by {found['lag_one_difference']:.3f}; {contrast} fills {found['rank']:.0f} effective "
         f"dimensions where real noise fills {found['real_rank']:.0f}, and a classifier tells them apart at AUC {found['classifier_auc']:.2f} "
         f"(real from real: {found['floor_classifier_auc']:.2f})"
     )
@@ -152,12 +155,13 @@ def _is_robust(experiment: Experiment) -> Outcome:
     if found is None:
         return _no_false_alarms(experiment)
     rates, clean, real = (_arm(found, arm, "false_alarm_rate") for arm in ("enhanced + GAN noise", "enhanced", "real"))
-    recall, real_recall = (_arm(found, arm, "recall") for arm in ("enhanced + GAN noise", "real"))
-    gaussian = _arm(found, "enhanced + Gaussian noise", "false_alarm_rate")
+    recall, real_recall, blind = (_arm(found, arm, "recall") for arm in ("enhanced + GAN noise", "real", "coarse"))
+    gaussian, coarse = (_arm(found, arm, "false_alarm_rate") for arm in ("enhanced + Gaussian noise", "coarse"))
     good = (rates <= 2 * real + 0.01) & (recall >= real_recall - 0.05)
     finding = (
         f"false alarms on {int(found['num_test_windows']):,} real nominal windows, trained on enhanced + GAN noise: {_listed(found, rates)}; "
-        f"on the clean enhanced signal: {_listed(found, clean)}; on enhanced + Gaussian noise: {_listed(found, gaussian)}; on real telemetry: {_listed(found, real)}"
+        f"on the clean enhanced signal: {_listed(found, clean)}; on enhanced + Gaussian noise: {_listed(found, gaussian)}; on real telemetry: {_listed(found, real)}; "
+        f"on the coarse simulation: {_listed(found, coarse)}, at a recall of {_listed(found, blind)}"
     )
     details = {
         f"{arm}, {key}": value for arm in found["arms"] for key, value in _by_detector(found, _arm(found, arm, "false_alarm_rate")).items()
@@ -209,8 +213,7 @@ CLAIMS = (
         "NRMSE of the enhanced signal on held-out time",
         "at most 0.15, below the coarse signal and ridge regression (a real channel: below both)",
         _learns_mapping,
-        PARTLY,
-        close_call=REPRODUCED,
+        REPRODUCED,
     ),
     Claim(
         "C2",
@@ -251,14 +254,14 @@ CLAIMS = (
         "share of rows judged rightly, mean over the second half of training",
         "from 0.5 to 0.8",
         _stays_balanced,
-        REPRODUCED,
-        close_call=PARTLY,
+        PARTLY,
+        close_call=REPRODUCED,
     ),
     Claim(
         "C6",
         "After 1,000 iterations the generated noise is sufficiently similar to the actual noise.",
         "2.3",
-        "fig08_source_noise",
+        "fig06_real_or_generated_noise",
         "effective rank of generated over real noise",
         "scale, lag-1 and values within 0.1, 0.05, 0.1 (else not); rank at least 0.8 and classifier AUC at most 0.6 (else partly)",
         _noise_is_similar,
@@ -336,7 +339,20 @@ def ranges(records_of: Mapping[int, list[dict]], budget: str) -> dict:
     return {"budget": budget, "seeds": list(records_of), "claims": spread}
 
 
-def title_verdict(records: list[dict]) -> str:
-    """The overall verdict in ReScience's manner: [Re] where every tested claim is reproduced, [¬Re] where one is not at all."""
-    tested = {record["verdict"] for record in records} - {NOT_TESTED, NOT_MEASURED}
+def of_most(verdicts: Sequence[str]) -> str:
+    """The verdict of most seeds; where as many come to another, the worse."""
+    best_last = (NOT_REPRODUCED, PARTLY, REPRODUCED)
+    worst_first = sorted(set(verdicts), key=lambda verdict: best_last.index(verdict) if verdict in best_last else -1)
+    return max(worst_first, key=verdicts.count)
+
+
+def title_verdict(records: list[dict], spread: Mapping[str, Any] | None = None) -> str:
+    """The overall verdict in ReScience's manner: [Re] where every tested claim is reproduced, [¬Re] where one is not at all.
+
+    Args:
+        records: The judged claims.
+        spread: What `ranges` made of them and of further seeds: the verdict of each claim is then that of most seeds.
+    """
+    over_seeds = {} if spread is None else {name: about["verdicts"] for name, about in spread["claims"].items()}
+    tested = {of_most(over_seeds.get(record["id"]) or [record["verdict"]]) for record in records} - {NOT_TESTED, NOT_MEASURED}
     return "[Re]" if tested == {REPRODUCED} else "[¬Re]" if NOT_REPRODUCED in tested else "[Re, in part]"

@@ -92,7 +92,12 @@ def real_or_generated_noise(data: Arrays) -> matplotlib.figure.Figure:
 
 def real_or_generated_series(data: Arrays) -> matplotlib.figure.Figure:
     """Figure 7."""
-    return _guess(data, "stretches of telemetry", "A generated one is made of overlapping windows, without seams. ", columns=1)
+    return _guess(
+        data,
+        "stretches of telemetry",
+        "A generated one is made of overlapping windows, without seams, but its noise repeats a pattern every half window. ",
+        columns=1,
+    )
 
 
 def source_noise(data: Arrays) -> matplotlib.figure.Figure:

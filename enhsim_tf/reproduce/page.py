@@ -18,9 +18,9 @@ import numpy as np
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
 from enhsim_tf.reproduce import robustness_figures, robustness_report, robustness_run
-from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed
+from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed, title_verdict
 from enhsim_tf.reproduce.figures import FIGURES, Figure
-from enhsim_tf.reproduce.report import PAPER, read_spread, short
+from enhsim_tf.reproduce.report import PAPER, disagreement, read_spread, short
 from enhsim_tf.reproduce.settings import deviations
 
 NAME = "report.html"
@@ -89,7 +89,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
         "per_cent": robustness_report.per_cent,
         "kind": lambda verdict: _KINDS.get(verdict, "none"),
     }
-    rows = deviations()
+    rows, spread = deviations(), read_spread(folder, found)
     text = environment.get_template("page.html.jinja").render(
         found=found,
         changed=changed(found["claims"]),
@@ -100,7 +100,9 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
         pictures=[picture for picture in pictures if picture.name != PIPELINE],
         numbers={picture.name: picture.number for picture in pictures},
         widest=max((picture.width for picture in pictures), default=1),
-        spread=read_spread(folder, found),
+        verdict=title_verdict(found["claims"], spread),
+        spread=spread,
+        differ={claim["id"]: disagreement(spread, claim["id"]) for claim in found["claims"]},
         tally=_tally([claim["verdict"] for claim in found["claims"]], _KINDS),
         groups={name: list(group) for name, group in itertools.groupby(rows, lambda row: row["setting"].partition(".")[0])},
         num_settings=len(rows),

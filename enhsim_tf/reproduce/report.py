@@ -18,6 +18,7 @@ from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.settings import deviations
 from enhsim_tf.reproduce.stages import VERSIONS
 
+_SPEED = "C2"
 PAPER = "the paper's example"  # what `results.json` names as the source where no file of real telemetry is
 
 
@@ -56,13 +57,32 @@ def table(claims: list[dict]) -> str:
 
 
 def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The ranges over further seeds; those of another budget or of an older run say nothing of this one."""
+    """The ranges and verdicts over further seeds, with this run's own in the place of those that its seed had before.
+
+    Those of another budget or of an older run say nothing of this one. A speed is of one machine at one time and has no
+    range over seeds.
+    """
     path = folder / "spread.json"
     spread = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     if spread is None or spread["budget"] != found["budget"] or found["seed"] not in spread["seeds"]:
         return None
-    first = found["claims"][0]
-    return spread if short(first["value"]) in map(short, spread["claims"][first["id"]]["values"]) else None
+    first, here = found["claims"][0], spread["seeds"].index(found["seed"])
+    if {claim["id"] for claim in found["claims"]} != set(spread["claims"]):
+        return None
+    if short(first["value"]) not in map(short, spread["claims"][first["id"]]["values"]):
+        return None
+    for claim in found["claims"]:
+        over = spread["claims"][claim["id"]]
+        over["values"][here], over["verdicts"][here] = claim["value"], claim["verdict"]
+        values = [value for value in over["values"] if value is not None]
+        over["range"] = [min(values), max(values)] if values and claim["id"] != _SPEED else None
+    return spread
+
+
+def disagreement(spread: Mapping[str, Any] | None, claim_id: str) -> str:
+    """The verdicts on a claim over seeds, counted, where seeds come to different ones; else nothing."""
+    counted = collections.Counter(spread["claims"][claim_id]["verdicts"]) if spread is not None else {}
+    return ", ".join(f"{number} {name}" for name, number in counted.items()) if len(counted) > 1 else ""
 
 
 def fill_readme(path: Path, folder: Path) -> None:
@@ -75,17 +95,17 @@ def fill_readme(path: Path, folder: Path) -> None:
     if not path.is_file():
         return
     found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    text = path.read_text(encoding="utf-8")
+    text, spread = path.read_text(encoding="utf-8"), read_spread(folder, found)
     if ": generated -->" not in text:  # somebody else's
         return
     parts = {
-        "claims": claims_table(found, read_spread(folder, found)),
+        "claims": claims_table(found, spread),
         "channels": channels_table(sorted(folder.glob("*/results.json"))),
         "deviations": deviations_table(),
         "timings": timings_table(found),
     }
     text = fill_parts(text, parts, path.name)
-    text = re.sub(r"\A# (\[.*?\] )?", f"# {found['verdict']} ", text)
+    text = re.sub(r"\A# (\[.*?\] )?", f"# {title_verdict(found['claims'], spread)} ", text)
     with replace_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -113,11 +133,10 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
     """The claims as a Markdown table, with the range over seeds where it is known."""
     lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value, verdict = short(claim["value"]), f"**{claim['verdict']}**"
+        value, verdict, differ = short(claim["value"]), f"**{claim['verdict']}**", disagreement(spread, claim["id"])
         if spread is not None and spread["claims"][claim["id"]]["range"] is not None:
             value += " ({} to {})".format(*map(short, spread["claims"][claim["id"]]["range"]))
-            counted = collections.Counter(spread["claims"][claim["id"]]["verdicts"])
-            verdict += f" (over seeds: {', '.join(f'{number} {name}' for name, number in counted.items())})" if len(counted) > 1 else ""
+        verdict += f" (over seeds: {differ})" if differ else ""
         lines.append(
             f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "
             f"| {verdict} | {claim['finding']} |"
@@ -135,16 +154,19 @@ def short(value: float | None) -> str:
 
 def channels_table(files: Sequence[Path]) -> str:
     """What the pipeline reached on real channels, one row a `results.json`, in Markdown."""
-    names = ("nrmse", "ridge_nrmse", "identity_nrmse")
+    names, judged = ("nrmse", "ridge_nrmse", "identity_nrmse"), ("C1", "C4", "C5", "C6", "C7")
     lines = [
-        "| channel | enhanced | ridge regression | coarse | enhanced, in step | ridge, in step | coarse, in step | C1 |",
-        "|---|---|---|---|---|---|---|---|",
+        "| channel | enhanced | ridge regression | coarse | enhanced, in step | ridge, in step | coarse, in step "
+        f"| disjoint test windows | {' | '.join(judged)} |",
+        "|---|---|---|---|---|---|---|---|" + "---|" * len(judged),
     ]
     for file in files:
         found = json.loads(file.read_text(encoding="utf-8"))
-        claim = next(claim for claim in found["claims"] if claim["id"] == "C1")
-        errors = [f"{claim['details'][prefix + name]:.3f}" for prefix in ("", "synchronised_") for name in names]
-        lines.append(f"| `{found['source']}` | {' | '.join(errors)} | {claim['verdict']} |")
+        claims = {claim["id"]: claim for claim in found["claims"]}
+        errors = [f"{claims['C1']['details'][prefix + name]:.3f}" for prefix in ("", "synchronised_") for name in names]
+        number = claims["C3"]["finding"].partition(" ")[0]  # why C3 is not measured begins with it
+        verdicts = " | ".join(claims[name]["verdict"] for name in judged)
+        lines.append(f"| `{found['source']}` | {' | '.join(errors)} | {number} | {verdicts} |")
     return "\n".join(lines)
 
 
