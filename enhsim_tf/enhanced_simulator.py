@@ -3,13 +3,11 @@
 It puts the rooms below together and trains none of their networks by hand.
 """
 
-import json
+import dataclasses
 import operator
 import os
 import sys
-import zipfile
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import keras
@@ -18,15 +16,15 @@ import numpy as np
 from enhsim_tf import enhancer as enhancer_room
 from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator, num_overlapping
-from enhsim_tf.simulator import Degraded, SquareWaveSimulator, paired_windows, units_of
+from enhsim_tf.pairs import Pairs, at_level, cut_pairs, cut_parts, even_places, random_places
+from enhsim_tf.saved_simulator import read_saved, write_saved
+from enhsim_tf.simulator import Degraded, SquareWaveSimulator, units_of
 from enhsim_tf.store import write_windows
-from enhsim_tf.telemetry import Telemetry, check_telemetry, check_values, cut_windows, random_offsets
+from enhsim_tf.telemetry import Telemetry, check_telemetry, check_values, cut_windows
 
-_FORMAT = "enhsim_tf.EnhancedSimulator/1"
-_NETWORKS = ("enhancer", "generator", "discriminator")
+_NUM_LEVELS = 500  # times at which level and amplitude are remembered, at most
 _CHUNK = 4_096  # windows generated at a time
 _START_RANGE = 1_000_000  # samples; windows begin at a random one of these, so at every phase of the waves
 
@@ -41,6 +39,8 @@ class EnhancedSimulator:
         interval_s: Sampling interval in seconds.
         offset: What the enhancer's zero stands for, in the telemetry's unit.
         scale: What the enhancer's one stands for, in the telemetry's unit.
+        levels: For telemetry whose level and amplitude change: shift and gain against the coarse simulator, in the order
+            of time, shape `(times, 2)`. Each generated window has those of one of these times. None: they never change.
         trained: How the networks were trained, in plain JSON types: kept with them for the record.
 
     Example:
@@ -58,8 +58,10 @@ class EnhancedSimulator:
         interval_s: float = 1.0,
         offset: float = 0.0,
         scale: float = 1.0,
+        levels: np.ndarray | None = None,
         trained: Mapping[str, Any] | None = None,
     ):
+        self.levels = None if levels is None else np.asarray(levels, np.float64).reshape(-1, 2)
         self.trained = dict(trained or {})
         self.coarse, self.enhancer, self.noise = coarse, enhancer, noise
         self.interval_s, self.offset, self.scale = float(interval_s), float(offset), float(scale)
@@ -72,7 +74,7 @@ class EnhancedSimulator:
     @classmethod
     def fit(
         cls,
-        telemetry: Telemetry,
+        telemetry: Telemetry | Sequence[Telemetry],
         coarse: SquareWaveSimulator | None = None,
         seed: int = 0,
         num_windows: int = 1_500,
@@ -85,13 +87,14 @@ class EnhancedSimulator:
         extraction: str = "moving average",
         held_out: float = 0.25,
         decay: bool = False,
+        follow: bool = False,
         verbose: int | str = "auto",
     ) -> "EnhancedSimulator":
         """Trains both networks on nominal telemetry.
 
         Args:
-            telemetry: Nominal telemetry, at least two windows long.
-            coarse: The coarse simulator, configured like the telemetry; None fits square waves to it.
+            telemetry: Nominal telemetry, at least two windows long; where it has gaps, its stretches on one clock.
+            coarse: The coarse simulator, configured like the telemetry; None fits square waves to its longest stretch.
             seed: Seed of everything drawn.
             num_windows: Training windows, cut at random offsets.
             epochs: Passes of the enhancer over the windows.
@@ -108,6 +111,8 @@ class EnhancedSimulator:
                 repeat so often that the enhancer cannot remember the noise of any.
             decay: Whether the enhancer's learning rate falls to zero along a cosine, instead of staying as in the paper:
                 at a constant rate, the noise of the last batches stays in the weights.
+            follow: Whether the coarse simulator is set to the clock, level and amplitude of each window before the enhancer
+                learns it, for telemetry that drifts away from a fixed simulator. The levels are kept and drawn from again.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
 
         Returns:
@@ -116,32 +121,35 @@ class EnhancedSimulator:
         Raises:
             InputError: If the telemetry is none, not finite, constant or shorter than two windows, or if a count is too small.
         """
-        check_telemetry(telemetry)
+        parts = _parts_of(telemetry)
         _check_counts(window=(window, 2), num_windows=(num_windows, 1), epochs=(epochs, 1), num_iterations=(num_iterations, 0))
         if noise not in ("paper", "convolutional") or extraction not in ("moving average", "enhancer") or not 0 <= held_out < 1:
             raise InputError(
                 "Expected noise to be paper or convolutional, extraction to be moving average or enhancer, 0 <= held_out < 1. "
                 f"Received: noise={noise!r}, extraction={extraction!r}, held_out={held_out}."
             )
-        by_enhancer = extraction == "enhancer"
-        check_values(telemetry.values, telemetry.name, (8 if by_enhancer else 2) * window)
-        coarse = SquareWaveSimulator.fit(telemetry) if coarse is None else coarse
+        by_enhancer, values = extraction == "enhancer", np.concatenate([part.values for part in parts])
+        check_values(values, parts[0].name, (8 if by_enhancer else 2) * window)
+        coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
         bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
 
-        end = len(telemetry) - (round(held_out * len(telemetry)) if by_enhancer else 0)
-        learnt = telemetry.part(0, end)
-        rest = telemetry.part(end, len(telemetry)) if end < len(telemetry) else telemetry
-        offsets = random_offsets(len(learnt), window, num_windows, rng)
-        source, target = ((pair - offset) / scale for pair in paired_windows(learnt, coarse, offsets, window))
+        learnt, rest = _split_off(parts, held_out if by_enhancer else 0.0)
+        pairs = cut_pairs(learnt, coarse, random_places(learnt, window, num_windows, rng), window, follow)
+        pairs = pairs.clear() if follow else pairs
         network = enhancer_room.build_enhancer(window, seed=seed)
-        rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-num_windows // 15)) if decay else 0.001
+        rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(pairs) // 15)) if decay else 0.001
+        source, target = ((windows - offset) / scale for windows in (pairs.coarse, pairs.target_in_unit))
         enhancer_room.fit_windows(network, source, target, epochs, 15, seed, rate, verbose=bars)
 
+        levels = None
+        if follow:
+            seen = cut_pairs(parts, coarse, even_places(parts, window, _NUM_LEVELS), window, follow).clear()
+            levels = np.stack([seen.shift, seen.gain], axis=1)
         trained = {
-            "telemetry": telemetry.name,
-            "num_samples": len(telemetry),
+            "telemetry": parts[0].name,
+            "num_samples": len(values),
             "seed": seed,
             "num_windows": num_windows,
             "epochs": epochs,
@@ -151,14 +159,16 @@ class EnhancedSimulator:
             "extraction": extraction,
             "held_out": held_out,
             "decay": decay,
+            "follow": follow,
         }
-        simulator = cls(coarse, network, None, telemetry.interval_s, offset, scale, trained)
+        simulator = cls(coarse, network, None, parts[0].interval_s, offset, scale, levels, trained)
         draw = np.random.default_rng([seed, 1])
         if by_enhancer:
             noise_windows = simulator.residual_windows(rest, num_windows, draw)
         else:
-            extracted, _ = extract_noise(telemetry.values, moving_average)
-            noise_windows = cut_windows(extracted, random_offsets(len(extracted), window, num_windows, draw), window)
+            long_enough = [part for part in parts if len(part) >= window + moving_average - 1]
+            extracted = [dataclasses.replace(part, values=extract_noise(part.values, moving_average)[0]) for part in long_enough]
+            noise_windows, _ = cut_parts(extracted, random_places(extracted, window, num_windows, draw), window)
         if noise == "convolutional":
             simulator.noise = convolutional_noise_gan(noise_windows, num_iterations, seed)
         else:
@@ -168,22 +178,31 @@ class EnhancedSimulator:
         simulator.noise.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
         return simulator
 
-    def residual_windows(self, telemetry: Telemetry, num_windows: int, rng: np.random.Generator) -> np.ndarray:
+    def residual_windows(self, telemetry: Telemetry | Sequence[Telemetry], num_windows: int, rng: np.random.Generator) -> np.ndarray:
         """What the enhanced signal leaves of telemetry: its noise, and what the simulator does not know.
 
         Args:
-            telemetry: Telemetry that the coarse simulator is in step with.
+            telemetry: Telemetry that the coarse simulator is in step with, or its stretches; a simulator that remembers
+                levels is set to each window first.
             num_windows: Number of windows, cut at random offsets.
             rng: Owner of the offsets.
 
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
-        check_telemetry(telemetry)
+        parts = _parts_of(telemetry)
         _check_counts(num_windows=(num_windows, 0))
-        offsets = random_offsets(len(telemetry), self.window, num_windows, rng)
-        coarse, target = paired_windows(telemetry, self.coarse, offsets, self.window)
-        return target - self.enhance(coarse)
+        pairs = cut_pairs(parts, self.coarse, random_places(parts, self.window, num_windows, rng), self.window, self.levels is not None)
+        return pairs.target - self.follow(pairs)
+
+    def follow(self, pairs: Pairs) -> np.ndarray:
+        """The enhanced, still clean counterpart of telemetry, at the level of each window, float32 of shape `(windows, samples)`.
+
+        Args:
+            pairs: Windows of the coarse simulator and how it was set to the telemetry's.
+        """
+        enhanced = self.enhance(pairs.coarse)
+        return enhanced if self.levels is None else at_level(enhanced, pairs.shift, pairs.gain)
 
     def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Generates coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`.
@@ -195,8 +214,15 @@ class EnhancedSimulator:
         """
         _check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
-        begins = rng.integers(0, _START_RANGE, num_windows)
-        return self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
+        begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
+        coarse = self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
+        return coarse if levels is None else at_level(coarse, *levels.T)
+
+    def _draw_levels(self, num_windows: int, seed: int) -> np.ndarray | None:
+        """Shift and gain of each generated window, shape `(num_windows, 2)`: those of a time seen in training."""
+        if self.levels is None:
+            return None
+        return self.levels[np.random.default_rng([seed, 2]).integers(0, len(self.levels), num_windows)]
 
     def enhance(self, coarse: np.ndarray) -> np.ndarray:
         """Enhanced, still clean windows (step 5) from coarse ones, float32 of the same shape `(windows, samples)`.
@@ -245,10 +271,12 @@ class EnhancedSimulator:
         """
         _check_counts(num_windows=(num_windows, 0))
         rng, noise_rng = np.random.default_rng(seed), _noise_rng(seed)
-        begins = rng.integers(0, _START_RANGE, num_windows)
+        begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         for first in range(0, num_windows, _CHUNK):
             times = self.interval_s * (begins[first : first + _CHUNK, None] + np.arange(self.window))
             windows = self.enhance(self.coarse.simulate(times, scenario, rng))
+            if levels is not None:
+                windows = at_level(windows, *levels[first : first + _CHUNK].T)
             windows += self.noise.generate(len(windows), noise_rng)
             yield windows
 
@@ -290,6 +318,8 @@ class EnhancedSimulator:
             coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
+        if self.levels is not None:
+            enhanced = at_level(enhanced, *self._follow_levels(num_windows, seed).T)
 
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # of two windows half a window apart they add up to 1
         signal, total = np.zeros((2, length))
@@ -298,30 +328,30 @@ class EnhancedSimulator:
             total[begin : begin + window] += fade
         return (signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed))
 
+    def _follow_levels(self, num_windows: int, seed: int) -> np.ndarray:
+        """Shift and gain of windows that follow each other: the levels seen in training, forth and back from a random time."""
+        there_and_back = np.concatenate([self.levels, self.levels[-2:0:-1]])
+        begin = np.random.default_rng([seed, 2]).integers(0, len(there_and_back))
+        return there_and_back[(begin + np.arange(num_windows)) % len(there_and_back)]
+
     def save(self, folder: str | os.PathLike) -> None:
         """Saves to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
 
         Raises:
             InputError: If something else than a saved simulator stands there, which is left as it is.
         """
-        folder = Path(folder)
-        if folder.exists() and not (folder / "manifest.json").is_file() and not (folder.is_dir() and not any(folder.iterdir())):
-            raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which holds something else.")
-        with replace_folder(folder) as temporary:
-            for name, model in zip(_NETWORKS, (self.enhancer, self.noise.generator, self.noise.discriminator), strict=True):
-                model.save(temporary / f"{name}.keras", include_optimizer=False)
-            settings = {
-                "coarse": self.coarse.get_config(),
-                "noise": self.noise.get_config(),
-                "interval_s": self.interval_s,
-                "offset": self.offset,
-                "scale": self.scale,
-                "trained": self.trained,
-                "keras": keras.__version__,
-            }
-            write_json(temporary / "settings.json", settings)
-            checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
-            write_json(temporary / "manifest.json", {"format": _FORMAT, "sha256": checksums})
+        settings = {
+            "coarse": self.coarse.get_config(),
+            "noise": self.noise.get_config(),
+            "interval_s": self.interval_s,
+            "offset": self.offset,
+            "scale": self.scale,
+            "levels": None if self.levels is None else self.levels.tolist(),
+            "trained": self.trained,
+            "keras": keras.__version__,
+        }
+        networks = {"enhancer": self.enhancer, "generator": self.noise.generator, "discriminator": self.noise.discriminator}
+        write_saved(folder, networks, settings)
 
     @classmethod
     def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
@@ -330,32 +360,38 @@ class EnhancedSimulator:
         Raises:
             InputError: If the folder is not one that `save` wrote, or if a file in it was changed.
         """
-        folder = Path(folder)
-        try:
-            manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-            known, checksums = manifest["format"] == _FORMAT, manifest["sha256"]
-            complete = set(checksums) == {"settings.json", *(f"{name}.keras" for name in _NETWORKS)} and len(manifest) == 2
-            checksums = dict(checksums)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise InputError(f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__}).") from None
-        if not (known and complete):
-            raise InputError(f"Expected the format {_FORMAT}. Received: {str(manifest['format'])[:80]!r} in {folder}.")
-        for name, expected in checksums.items():
-            if not (folder / name).is_file() or sha256(folder / name) != expected:
-                raise InputError(
-                    f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again."
-                )
-        try:
-            settings = json.loads((folder / "settings.json").read_text(encoding="utf-8"))
-            enhancer, generator, discriminator = (
-                keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS
-            )
-            coarse = SquareWaveSimulator.from_config(settings["coarse"])
-            noise = NoiseGAN(generator, discriminator, **settings["noise"])
-            return cls(coarse, enhancer, noise, settings["interval_s"], settings["offset"], settings["scale"], settings["trained"])
-        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-            reason = (str(error).splitlines() or [""])[0]
-            raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None
+        return read_saved(folder, cls._from_saved)
+
+    @classmethod
+    def _from_saved(cls, networks: Mapping[str, keras.Model], settings: Mapping[str, Any]) -> "EnhancedSimulator":
+        coarse = SquareWaveSimulator.from_config(settings["coarse"])
+        noise = NoiseGAN(networks["generator"], networks["discriminator"], **settings["noise"])
+        units = settings["interval_s"], settings["offset"], settings["scale"], settings.get("levels")
+        return cls(coarse, networks["enhancer"], noise, *units, settings["trained"])
+
+
+def _parts_of(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
+    """The stretches of a series, each checked; a whole series is one."""
+    parts = [telemetry] if isinstance(telemetry, Telemetry) or not isinstance(telemetry, Sequence) else list(telemetry)
+    for part in parts:
+        check_telemetry(part)
+    if len({part.interval_s for part in parts}) != 1:
+        raise InputError(f"Expected stretches of one sampling interval. Received: {sorted({part.interval_s for part in parts})}.")
+    return parts
+
+
+def _split_off(parts: list[Telemetry], share: float) -> tuple[list[Telemetry], list[Telemetry]]:
+    """The stretches without their last samples, and those samples; share 0 gives everything twice."""
+    if not share:
+        return parts, parts
+    left = sum(map(len, parts)) - round(share * sum(map(len, parts)))
+    first, rest = [], []
+    for part in parts:
+        end = min(len(part), left)
+        first += [part.part(0, end)] if end else []
+        rest += [part.part(end, len(part))] if end < len(part) else []
+        left -= end
+    return first, rest
 
 
 def _check_counts(**counts: tuple[Any, int]) -> None:
