@@ -55,11 +55,12 @@ def build_convolutional_generator(
     shaped = white
     for number in (400, 401):
         shaped = layers.Conv1D(channels, width, activation="leaky_relu", kernel_initializer=kernel(number))(shaped)
-    rarely = keras.initializers.RandomUniform(-2.0, 0.0, seed=seed * 1000 + 402)
+    # units that fire at one to four standard deviations, and large when they do: tails that begin small grow too slowly
+    rarely = keras.initializers.RandomUniform(-4.0, -1.0, seed=seed * 1000 + 402)
     rare = layers.Conv1D(rare_units, 1, activation="relu", kernel_initializer=kernel(403), bias_initializer=rarely)(
         aligned[:, :, :num_white]
     )
-    paths = layers.Concatenate()([shaped, aligned[:, :, :num_white], rare, rare * rare])
+    paths = layers.Concatenate()([shaped, aligned[:, :, :num_white], rare, 2 * rare * rare])
     noise = layers.Conv1D(1, 1, kernel_initializer=kernel(404))(paths)
     if num_slow:
         gain = layers.Conv1D(8, 1, activation="tanh", kernel_initializer=kernel(405))(aligned[:, :, num_white:])

@@ -44,6 +44,16 @@ COUNTS = {
     "detectors.num_windows",
     "detectors.autoencoder_epochs",
     "detectors.num_speed_windows",
+    "second.num_windows",
+    "robustness.num_seeds",
+    "robustness.num_windows",
+    "robustness.num_anomalous",
+    "robustness.num_anomalous_varied",
+    "robustness.num_resplits",
+    "robustness.num_trace_samples",
+    "robustness.max_order",
+    "modes.num_windows",
+    "modes.windows_per_configuration",
 }
 
 

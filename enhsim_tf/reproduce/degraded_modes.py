@@ -57,8 +57,7 @@ class DegradedModes:
 
         _ = self.replicate.experiment.enhancer_folder, self.replicate.second_simulator
         chosen = self.settings
-        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.modes, chosen.robustness.enhancer_windows)
-        depends += (chosen.robustness.enhancer_epochs, chosen.seed)
+        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.modes, chosen.second, chosen.seed)
         after, rooms = ("telemetry", "enhancer", "second"), ("reproduce.degraded_modes",)
         folder = self.stages.run("degraded modes", self._make, rooms, depends, after)
         return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
@@ -126,7 +125,7 @@ class DegradedModes:
         return coarse, truth.astype(np.float32)
 
     def _nominal_pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        windows = self.data.windows("train", self.settings.robustness.enhancer_windows, "nominal configurations")
+        windows = self.data.windows("train", self.settings.second.num_windows, "nominal configurations")
         return windows["coarse"], windows["target"]
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +133,7 @@ class DegradedModes:
         chosen, draws = self.settings, self.data.draw("configurations")
         per_configuration = chosen.modes.windows_per_configuration
         parts = []
-        for number in range(chosen.robustness.enhancer_windows // per_configuration):
+        for number in range(chosen.second.num_windows // per_configuration):
             mode = (None, *MODES)[number % (1 + len(MODES))]
             severity, onset = draws.uniform(0, LARGEST_TRAINED), draws.uniform(0, 0.75)
             scenario = None if mode is None else Degraded(mode, severity, onset)
@@ -174,7 +173,7 @@ class DegradedModes:
 
         from enhsim_tf.enhancer import build_enhancer, fit_windows
 
-        seed, epochs, batch_size = self.settings.seed, self.settings.robustness.enhancer_epochs, self.settings.enhancer.batch_size
+        seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.enhancer.batch_size
         network = build_enhancer(self.data.window, seed=seed)
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
         fit_windows(network, coarse, target, epochs, batch_size, seed, rate, verbose=self.replicate.verbose)

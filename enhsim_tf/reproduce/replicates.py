@@ -65,11 +65,10 @@ class Replicate:
     def second_simulator(self) -> "EnhancedSimulator":
         """The second pipeline: more windows in fewer epochs, noise by the enhancer, the convolutional GAN."""
         _ = self.experiment.data
-        chosen = self.settings.robustness
-        depends = (self.settings.telemetry, self.settings.split, self.settings.adversarial, chosen.enhancer_windows)
-        depends += (chosen.enhancer_epochs, chosen.held_out)
+        chosen = self.settings
+        depends = (chosen.telemetry, chosen.split, chosen.adversarial, chosen.second, chosen.seed)
         rooms = ("reproduce.data", "enhanced_simulator")
-        folder = self.stages.run("second", self._make_second, rooms, (depends, self.settings.seed), after=("telemetry",))
+        folder = self.stages.run("second", self._make_second, rooms, depends, after=("telemetry",))
         start_tensorflow()
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
@@ -79,13 +78,13 @@ class Replicate:
         start_tensorflow()
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
-        channel, chosen = self.experiment.data.channels[0], self.settings.robustness
+        channel, chosen = self.experiment.data.channels[0], self.settings.second
         EnhancedSimulator.fit(
             channel.train,
             channel.coarse,
             self.settings.seed,
-            chosen.enhancer_windows,
-            chosen.enhancer_epochs,
+            chosen.num_windows,
+            chosen.epochs,
             self.settings.adversarial.num_iterations,
             window=self.settings.telemetry.window,
             noise="convolutional",
