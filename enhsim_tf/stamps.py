@@ -156,7 +156,8 @@ def _stamps_of_text(
     if leap.any():
         rows = tuple(f"row {row}" for row in np.flatnonzero(leap)[:3])
         findings.append(Finding("leap seconds", int(leap.sum()), f"leap seconds, taken as the second after them: {leap.sum():,}", rows))
-    aware, given = zoned[~missing].any(), zoned[~missing]
+    given = zoned[~missing & ~bad]
+    aware = given.any()
     if aware and not given.all():
         findings.append(
             Finding("time zone", int((~given).sum()), f"times without a zone among others with one, taken as UTC: {(~given).sum():,}")

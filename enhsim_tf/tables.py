@@ -16,7 +16,7 @@ from enhsim_tf.repairs import Finding
 
 NO_TIME = "none"  # in place of a time column's name: samples are counted
 _TIME_NAMES = ("time", "times", "timestamp", "datetime", "date", "date_time", "utc", "_time", "t", "epoch", "time_s", "time_ms")
-_SEPARATORS = ",;\t|"
+_SEPARATORS = ";\t|,"  # the comma last: it may part decimals
 _HEAD = 100_000  # characters in which the header is looked for
 _LOOK = 200  # rows that are looked at to tell what a column of text holds
 
@@ -66,6 +66,8 @@ def _read_text(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
         raise ValueError("it is no text" if text.strip() else "it is empty")
     lines = text[:_HEAD].split("\n")
     comments = next((number for number, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
+    if comments == len(lines):
+        raise ValueError("it is empty")
     if any(line.strip() for line in lines[:comments]):
         findings.append(Finding("header lines", comments, f"lines before the header, skipped: {comments:,}"))
     separator = _separator(lines[comments : comments + 3])
