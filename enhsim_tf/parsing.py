@@ -45,8 +45,14 @@ def numbers_of(values: Any, what: str, drop: bool = False, decimal: str | None =
     if is_text(values):
         parsed, bad, findings = _numbers_of_text(values.astype(object), decimal)
     else:
-        parsed = values.to_numpy(np.float64, na_value=np.nan)
+        with np.errstate(over="ignore"):
+            parsed = values.to_numpy(np.float64, na_value=np.nan)
         bad = np.zeros(len(parsed), bool)
+        if values.dtype == np.longdouble:
+            bad = np.isinf(parsed) & np.isfinite(values.to_numpy())
+    too_fine = np.abs(parsed) > 2**53
+    if pd.api.types.is_integer_dtype(values.dtype) and too_fine.any():
+        findings.append(Finding("resolution", int(too_fine.sum()), f"integers beyond 2^53, rounded to float64: {too_fine.sum():,}"))
     beyond = np.isfinite(parsed) & (np.abs(parsed) > _LARGEST)
     if (bad | beyond).any() and not drop:
         row = int(np.argmax(bad | beyond))
@@ -63,7 +69,8 @@ def column(values: Any, what: str) -> pd.Series:
     if isinstance(values, pd.DataFrame) or np.ndim(values) != 1:
         raise InputError(f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column.")
     try:
-        return pd.Series(values).reset_index(drop=True)
+        cells = pd.Series(values).reset_index(drop=True)
+        return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
     except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not hold
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(f"Expected numbers. Received: {type(values).__name__} from {what} ({reason}). Give an array of numbers.") from None

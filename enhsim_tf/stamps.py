@@ -42,15 +42,18 @@ def stamps_of(
         raise InputError(f"Expected time_unit, one of: {', '.join(UNITS_NS)}. Received: time_unit={unit!r}.")
     if isinstance(times, pd.MultiIndex):
         raise InputError(f"Expected one time for a row. Received: an index of {times.nlevels} levels from {what}. Name one time column.")
-    if isinstance(times, pd.PeriodIndex) or isinstance(getattr(times, "dtype", None), pd.PeriodDtype):
-        times = pd.PeriodIndex(times).to_timestamp()
     times = column(times, what)
+    if isinstance(times.dtype, pd.PeriodDtype):
+        times = (
+            pd.to_datetime(times.astype(str).where(times.notna()), format="ISO8601", errors="coerce")
+            if len(times)
+            else times.astype(object)
+        )
     kind = times.dtype
     if pd.api.types.is_datetime64_any_dtype(kind):
         return _stamps_of_dates(times, what, drop)
     if pd.api.types.is_timedelta64_dtype(kind):
-        since = pd.to_datetime(times.astype("timedelta64[ns]").astype(np.int64).where(times.notna()), unit="ns", utc=True)
-        return pd.DatetimeIndex(since), np.zeros(len(times), bool), []
+        return _stamps_of_numbers(times.dt.total_seconds(), what, drop, "s")
     if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
         raise InputError(f"Expected times as ISO 8601 date-times or seconds. Received: dtype {kind} from {what}. Name another time column.")
     if not is_text(times):
@@ -60,7 +63,8 @@ def stamps_of(
     given = cells[~missing]
     if given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # a datetime is a date
         aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
-        return _stamps_of_dates(pd.Series(pd.to_datetime(cells.where(~missing), utc=bool(aware))), what, drop)
+        dates = pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")
+        return _stamps_of_dates(pd.Series(dates), what, drop)
     if form is None and not numbers_of(given.iloc[:1], what, drop=True)[1].any():  # the first cell is a number: all may be
         values, bad, _ = numbers_of(cells, what, drop=True)
         if not bad.any():
@@ -140,7 +144,7 @@ def _stamps_of_text(
     cells: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str | None
 ) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
     findings = []
-    text = cells.where(~missing)
+    text = cells.where(~missing).map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None)
     of_text = text.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
     words = text[of_text].astype(str).str.strip()
     leap, zoned = np.zeros((2, len(cells)), bool)

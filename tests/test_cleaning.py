@@ -126,6 +126,8 @@ REPAIRED = {
     "epoch nanoseconds as text": (with_times(NANOSECONDS.astype(str)), {}, {"time unit": N}),
     "days since 1970": (with_times(NANOSECONDS / 86_400e9), {"time_unit": "D"}, {"time unit": N}),
     "periods": (with_times(pd.period_range("2020-03-01", periods=N, freq="s")), {}, {"time zone": N}),
+    "time spans since 1970": (with_times(TIMES - pd.Timestamp(0, tz="UTC")), {}, {"time unit": N}),
+    "categories": (with_times(pd.CategoricalIndex(TIMES.astype(str)), pd.Categorical(WORDS)), {}, {}),
     "rows without a time": (
         with_times(
             pd.DatetimeIndex(np.insert(TIMES.tz_localize(None).to_numpy(), [5, 5, 9], np.datetime64("NaT"))),
@@ -212,6 +214,7 @@ BAD_VALUES = {
     "an underscore": (set_rows([7], "1_000"), "'1_000' at row 7"),
     "beyond float32": (set_rows([7], 1e39, float), "1e+39 at row 7"),
     "an integer beyond float64": (set_rows([7], 10**400), "at row 7"),
+    "a longer float beyond float64": (with_times(TIMES, np.full(N, np.longdouble(10) ** 400)), "at row 0"),
     "text beyond float64": (set_rows([7], "1e999"), "'1e999' at row 7"),
     "true among numbers": (set_rows([7], True), "True at row 7"),
     "complex among numbers": (set_rows([7], 1j), "1j at row 7"),
@@ -243,6 +246,9 @@ BAD_TIMES = {
     "dates as numbers": (with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)), "time_format='%Y%m%d'"),
     "dates as number text": (with_times(TIMES.strftime("%Y%m%d%H%M%S")), "time_format='%Y%m%d%H%M%S'"),
     "numbers of no unit": (with_times(np.arange(N) + 10**10), "time_unit"),
+    "numbers, text and dates": (with_times(pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)), "1 at row 0"),
+    "intervals": (with_times(pd.interval_range(0, N)), "interval"),
+    "date-times in the year 9000": (with_times(pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]"))), "1678 to 2261"),
     "infinite": (with_times(np.where(np.arange(N) == 9, np.inf, np.arange(N))), "inf at row 9"),
     "far away": (with_times(np.where(np.arange(N) == 9, 1e18, np.arange(N))), "1e+18 at row 9"),
     "true and false": (with_times(np.arange(N) % 2 == 0), "dtype bool"),
@@ -481,6 +487,8 @@ def test_what_a_channel_is_like_is_reported():
     drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find("changing level")
     assert drifting.count == 10 and drifting.details["low"][-1] - drifting.details["low"][0] == pytest.approx(3.6, abs=1)
     assert cleaned_of(with_times(TIMES, VALUES * np.linspace(1, 5, N))).report.find("changing level") is not None
+    counter = cleaned_of(with_times(TIMES, np.arange(N, dtype=np.uint64) + 2**63)).report.find("resolution")
+    assert counter.count == N, "float64 cannot tell them apart"
     rounded = cleaned_of(with_times(TIMES, VALUES + 1e6)).report.find("resolution")
     assert rounded.details["error"] == pytest.approx(0.03, abs=0.01)  # float32 keeps steps of 1/16 at a million
 
