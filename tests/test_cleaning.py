@@ -414,6 +414,26 @@ def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
     assert left.report.find("other rates").rows_left_out == 50 * 5 + (where == 0) and left.report.find("finer stretches") is None
 
 
+def test_a_finer_stretch_at_the_beginning_takes_the_grid_of_what_follows():
+    fine = pd.Series(1.5, index=START - pd.to_timedelta(np.arange(1, 34) * 0.3, unit="s"), name="volts").sort_index()  # from 9.9 s before
+    cleaned = cleaned_of(pd.concat([fine, CLEAN]))
+    (part,) = cleaned.parts
+    assert part.start == "2020-02-29T23:59:50+00:00" and len(part) == N + 10
+    np.testing.assert_allclose(part.values[11:], VALUES[1:], atol=1e-6)
+    assert set(part.values[:10]) == {np.float32(1.5)}
+
+
+def test_a_wandering_clock_parts_the_series_before_a_sample_is_moved_too_far():
+    wander = 2 * np.sin(np.arange(N) / 40)  # intervals: more than can be snapped
+    cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), np.arange(N)), max_jitter=0.2)
+    assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
+    begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
+    for part in cleaned.parts:
+        rows = part.values.astype(int)  # the values count the rows; one that was filled lies between two
+        real = part.values == rows
+        assert np.abs(begin + part.time_s - rows - wander[rows])[real].max() <= 0.2 + 1e-6
+
+
 def test_a_coarser_stretch_is_interpolated_or_left_out():
     inside = np.delete(np.arange(120, 241), np.arange(0, 121, 4))  # a row every 4 s from 120 to 240
     series = CLEAN.drop(TIMES[inside])
@@ -482,6 +502,9 @@ def test_what_a_channel_is_like_is_reported():
     assert cleaned_of(CLEAN).report.findings == ()
     stuck = cleaned_of(set_rows(np.arange(200, 260), VALUES[200], float)).report.find("stuck")
     assert (stuck.count, stuck.details["longest"]) == (1, 60) and stuck.places[0].startswith("row 200,")
+    plateaus = np.where(np.arange(N) // 25 % 2, 1.0, -1.0)
+    plateaus[200:300] = 0.5
+    assert cleaned_of(with_times(TIMES, plateaus)).report.find("stuck").count == 1, "plateaus are what this channel does"
     constant = cleaned_of(with_times(TIMES, 3.5))
     assert [finding.kind for finding in constant.report.findings] == ["constant"] and set(constant.parts[0].values) == {3.5}
     drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find("changing level")
