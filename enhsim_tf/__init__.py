@@ -9,6 +9,8 @@ import importlib
 __version__ = "0.1.0"
 
 _ROOMS = {
+    "Cleaned": "cleaning",
+    "Cleaning": "cleaning",
     "Degraded": "simulator",
     "EnhancedSimulator": "enhanced_simulator",
     "InputError": "errors",
@@ -18,8 +20,13 @@ _ROOMS = {
     "SquareWaveSimulator": "simulator",
     "Telemetry": "telemetry",
     "build_enhancer": "enhancer",
+    "clean": "cleaning",
     "extract_noise": "noise",
+    "from_series": "sources",
+    "load_labelled": "labelled",
+    "read_source": "sources",
     "read_telemetry": "telemetry",
+    "to_series": "sources",
 }
 __all__ = list(_ROOMS)
 

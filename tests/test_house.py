@@ -36,6 +36,16 @@ FLOORS = {
     "simulator": 1,
     "periodicity": 1,
     "store": 1,
+    "sources": 1,
+    "tables": 1,
+    "labelled": 0,
+    "cleaning": 0,
+    "characteristics": 0,
+    "rows": 0,
+    "sampling": 0,
+    "stamps": 0,
+    "parsing": 0,
+    "repairs": 0,
     "telemetry": 0,
     "signals": 0,
     "noise_processes": 0,
@@ -60,6 +70,9 @@ WITHOUT_TENSORFLOW = [
     "two_sample",
     "realism",
     "store",
+    "cleaning",
+    "sources",
+    "labelled",
     "periodicity",
     "simulator",
     "noise",
@@ -270,7 +283,14 @@ def test_no_exception_is_caught_blindly(module):
 
 
 def test_every_room_has_its_tests():
-    with_others = {"periodicity": "simulator", "terminal": "house", "fused_adam": "fast_paths", "autoencoders": "detectors"}
+    with_others = {
+        "periodicity": "simulator",
+        "terminal": "house",
+        "fused_adam": "fast_paths",
+        "autoencoders": "detectors",
+        "tables": "sources",
+    }
+    with_others |= dict.fromkeys(("characteristics", "rows", "sampling", "stamps", "parsing", "repairs"), "cleaning")
     rooms = {module for module in TREES if "." not in module} - {"__init__", "__main__", "errors"}
     assert {f"test_{with_others.get(room, room)}.py" for room in rooms} <= {path.name for path in (ROOT / "tests").iterdir()}
 
