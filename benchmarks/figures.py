@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 
 from enhsim_tf.reproduce.figures import Figure, save
-from enhsim_tf.reproduce.sheet import DOUBLE, ENHANCED, FOOT, GENERATED, LINE, QUIET, REAL, beside, new_sheet, panels
+from enhsim_tf.sheet import DOUBLE, ENHANCED, FOOT, GENERATED, LINE, QUIET, REAL, beside, new_sheet, panels
 
 
 def draw(results: dict, folder: Path) -> list[Path]:

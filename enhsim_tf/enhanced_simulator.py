@@ -18,7 +18,7 @@ from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.errors import InputError
 from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator, num_overlapping
-from enhsim_tf.pairs import Pairs, at_level, cut_pairs, cut_parts, even_places, random_places
+from enhsim_tf.pairs import Pairs, at_level, cut_pairs, cut_parts, even_places, random_places, split_off
 from enhsim_tf.saved_simulator import read_saved, write_saved
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, units_of
 from enhsim_tf.store import write_windows
@@ -135,7 +135,7 @@ class EnhancedSimulator:
         rng = np.random.default_rng(seed)
         bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
 
-        learnt, rest = _split_off(parts, held_out if by_enhancer else 0.0)
+        learnt, rest = split_off(parts, held_out if by_enhancer else 0.0)
         pairs = cut_pairs(learnt, coarse, random_places(learnt, window, num_windows, rng), window, follow)
         pairs = pairs.clear() if follow else pairs
         network = enhancer_room.build_enhancer(window, seed=seed)
@@ -378,20 +378,6 @@ def _parts_of(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
     if len({part.interval_s for part in parts}) != 1:
         raise InputError(f"Expected stretches of one sampling interval. Received: {sorted({part.interval_s for part in parts})}.")
     return parts
-
-
-def _split_off(parts: list[Telemetry], share: float) -> tuple[list[Telemetry], list[Telemetry]]:
-    """The stretches without their last samples, and those samples; share 0 gives everything twice."""
-    if not share:
-        return parts, parts
-    left = sum(map(len, parts)) - round(share * sum(map(len, parts)))
-    first, rest = [], []
-    for part in parts:
-        end = min(len(part), left)
-        first += [part.part(0, end)] if end else []
-        rest += [part.part(end, len(part))] if end < len(part) else []
-        left -= end
-    return first, rest
 
 
 def _check_counts(**counts: tuple[Any, int]) -> None:

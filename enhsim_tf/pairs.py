@@ -72,6 +72,28 @@ def at_level(windows: np.ndarray, shift: np.ndarray, gain: np.ndarray) -> np.nda
     return (shift[:, None] + gain[:, None] * windows).astype(np.float32)
 
 
+def split_off(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry], list[Telemetry]]:
+    """Splits the end off a series.
+
+    Args:
+        parts: Stretches of one series, in the order of time.
+        share: Share of the samples at the end, from 0 to below 1; 0 gives everything twice.
+
+    Returns:
+        The stretches without their last samples, and the stretches of those.
+    """
+    if not share:
+        return list(parts), list(parts)
+    left = sum(map(len, parts)) - round(share * sum(map(len, parts)))
+    first, rest = [], []
+    for part in parts:
+        end = min(len(part), left)
+        first += [part.part(0, end)] if end else []
+        rest += [part.part(end, len(part))] if end < len(part) else []
+        left -= end
+    return first, rest
+
+
 def num_places(parts: Sequence[Telemetry], window: int) -> int:
     """At how many samples a whole window can begin."""
     return sum(max(0, len(part) - window + 1) for part in parts)

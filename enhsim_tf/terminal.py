@@ -1,7 +1,37 @@
-"""What the commands keep off the terminal."""
+"""How the commands speak: one line for a user's mistake, nothing of what others write to the terminal."""
 
+import argparse
 import os
 import sys
+from collections.abc import Callable
+from typing import NoReturn
+
+from enhsim_tf.errors import InputError
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose refusals are those of the whole command: one line, exit code 2."""
+
+    def error(self, message: str) -> NoReturn:
+        """Refuses the command line."""
+        raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
+
+
+def finish(run: Callable[[], int], interrupted: str) -> int:
+    """Runs a command and returns its exit code: 2 and one line for a user's mistake, 130 for an interrupt.
+
+    Args:
+        run: The command; returns its exit code.
+        interrupted: What to say of an interrupt.
+    """
+    try:
+        return run()
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(interrupted, file=sys.stderr)
+        return 130
 
 
 def start_tensorflow() -> None:
@@ -19,6 +49,7 @@ def start_tensorflow() -> None:
         os.dup2(nowhere, 2)
         import tensorflow as tf
 
+        tf.get_logger().setLevel("ERROR")  # its warnings are about how often a graph is built, and name no remedy a user has
         tf.config.list_physical_devices()  # the notes about devices come with the first look at them
     finally:
         os.dup2(kept, 2)

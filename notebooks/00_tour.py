@@ -14,8 +14,8 @@ import sys
 
 sys.path.insert(0, "..")  # the clone that this notebook lies in
 
-from enhsim_tf.reproduce.sheet import COARSE, GENERATED
 from enhsim_tf.reproduce.teaching import drawing, open_experiment, show, verdict
+from enhsim_tf.sheet import COARSE, GENERATED
 
 experiment = open_experiment()
 

@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.sheet import COARSE, ENHANCED
 from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
+from enhsim_tf.sheet import COARSE, ENHANCED
 
 experiment = open_experiment()
 claim("C5")

@@ -13,8 +13,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 import numpy as np
 
 from enhsim_tf import fidelity
-from enhsim_tf.reproduce.sheet import COARSE, GENERATED, QUIET, REAL
 from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show, verdict
+from enhsim_tf.sheet import COARSE, GENERATED, QUIET, REAL
 
 experiment = open_experiment()
 claim("C6", "C8")

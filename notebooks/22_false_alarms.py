@@ -12,8 +12,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 import numpy as np
 
 from enhsim_tf import detection
-from enhsim_tf.reproduce.sheet import ENHANCED, GENERATED, QUIET, REAL
 from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, open_findings, show_finding
+from enhsim_tf.sheet import ENHANCED, GENERATED, QUIET, REAL
 
 experiment = open_experiment()
 claim("C8")

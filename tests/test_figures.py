@@ -13,7 +13,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from enhsim_tf.reproduce import sheet
+from enhsim_tf import sheet
 from enhsim_tf.reproduce.data import Source
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.figure_data import FIGURE_DATA

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from enhsim_tf.fidelity import nrmse, roughness
-from enhsim_tf.reproduce.sheet import (
+from enhsim_tf.sheet import (
     AVERAGE,
     COARSE,
     DOUBLE,

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
-from enhsim_tf.reproduce.sheet import (
+from enhsim_tf.sheet import (
     BLUE_TINT,
     COARSE,
     DOUBLE,

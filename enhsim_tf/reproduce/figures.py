@@ -16,10 +16,9 @@ import numpy as np
 
 from enhsim_tf.files import replace_file
 from enhsim_tf.reproduce import curves, diagrams
-from enhsim_tf.reproduce.sheet import EDGE, GENERATED, QUIET
+from enhsim_tf.sheet import EDGE, GENERATED, QUIET, STYLE
 
 WATERMARK = "SMOKE BUDGET"
-_STYLE = ("default", Path(__file__).with_name("style.mplstyle"))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Figure:
         Args:
             data: The arrays that `figure_data.FIGURE_DATA` makes for it.
         """
-        with matplotlib.style.context(_STYLE):
+        with matplotlib.style.context(STYLE):
             return self.drawn_by(data)
 
 
@@ -184,7 +183,7 @@ def save(
         mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
         figure.text(0.5, 0.5, WATERMARK, **mark, ha="center", va="center", zorder=10, gid="watermark")
     paths = [Path(folder) / f"{name}.{kind}" for kind in saved_as]
-    with matplotlib.style.context(_STYLE):
+    with matplotlib.style.context(STYLE):
         for path in paths:
             undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
             with replace_file(path) as temporary:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from enhsim_tf.reproduce.degraded_modes import LARGEST_TRAINED, SCORED
 from enhsim_tf.reproduce.figures import Figure
 from enhsim_tf.reproduce.replicates import ARMS
-from enhsim_tf.reproduce.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, label_ends, new_sheet, panels
+from enhsim_tf.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, label_ends, new_sheet, panels
 
 Findings = Mapping[str, Any]
 _NAMES = {

@@ -30,6 +30,7 @@ from enhsim_tf.reproduce.findings import read_tables
 from enhsim_tf.reproduce.robustness_run import FOLDER, draw
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages, default_cache
+from enhsim_tf.sheet import STYLE
 from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def drawing(alt: str, columns: int = 1, height: float = 2.4, **shared: bool) -> 
         height: Height in inches.
         **shared: What `matplotlib.figure.Figure.subplots` takes, for example `sharey`.
     """
-    with matplotlib.style.context(("default", Path(__file__).with_name("style.mplstyle"))):
+    with matplotlib.style.context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(7.2, height), layout="constrained")
         yield figure.subplots(1, columns, **shared)
         picture = io.BytesIO()

@@ -6,12 +6,14 @@ panel also in line style, width or label.
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib.figure
 import numpy as np
 from matplotlib.axes import Axes
 
+STYLE = ("default", Path(__file__).with_name("style.mplstyle"))  # for `matplotlib.style.context`
 REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
 QUIET, LINE = "#595959", "#8c8c8c"  # small print; outlines
 IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker, for words in the colour of a curve
