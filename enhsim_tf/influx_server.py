@@ -146,24 +146,32 @@ class InfluxServer:
         if self._opened is None:
             from influxdb_client import InfluxDBClient
 
-            self._opened = InfluxDBClient.from_env_properties()
+            try:
+                self._opened = InfluxDBClient.from_env_properties()
+            except ValueError:
+                self._opened = None
+            if self._opened is None:
+                raise InputError(
+                    "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. Received: others. Correct them."
+                )
             if "INFLUXDB_V2_TIMEOUT" not in os.environ:
                 self._opened.api_client.configuration.timeout = _TIMEOUT_MS
         return self._opened
 
     def _repeat(self, request: Callable[["InfluxDBClient"], _Answer]) -> _Answer:
         """Does a request until it is answered, or says in one line why it will not be."""
-        from influxdb_client.client.flux_csv_parser import FluxQueryException
+        from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
         from influxdb_client.rest import ApiException
         from urllib3.exceptions import HTTPError
 
+        said_no = ApiException, FluxQueryException, FluxCsvParserException
         began, pause_s = time.monotonic(), 0.1
         while True:
             try:
                 answer = request(self._client())
-            except (ApiException, FluxQueryException, HTTPError, OSError) as error:
+            except (*said_no, HTTPError, OSError) as error:
                 status = getattr(error, "status", None)
-                is_final = isinstance(error, ApiException | FluxQueryException) and status not in _MAY_PASS
+                is_final = isinstance(error, said_no) and status not in _MAY_PASS
                 words = self._in_words(error, status)
             else:
                 self._has_answered = True
@@ -174,7 +182,7 @@ class InfluxServer:
             pause_s = min(2 * pause_s, 5.0)
 
     def _in_words(self, error: Exception, status: int | None) -> str:
-        said = str(getattr(error, "message", None) or "" if status else error)
+        said = str(getattr(error, "message", None) if status else getattr(error, "reason", error))
         said = " ".join(said.replace(os.environ.get(VARIABLES[1]) or "\n", "***").split())[:300]
         if status == 401:
             return f"Expected a token that {self.url} knows. Received: another in {VARIABLES[1]}. Copy it again."
@@ -187,8 +195,8 @@ class InfluxServer:
                 f"Expected a bucket of organisation {self.organisation!r} that the token may see. Received: {self.bucket!r}. "
                 "Create it or name another."
             )
-        if status == 404:
-            return f"Expected an InfluxDB 2 server at {self.url}. Received: an answer of something else (404). Correct {VARIABLES[0]}."
+        if status == 404 or type(error).__name__ == "FluxCsvParserException":
+            return f"Expected an InfluxDB 2 server at {self.url}. Received: an answer of something else. Correct {VARIABLES[0]}."
         if "outside retention policy" in said:
             return (
                 f"Expected times that bucket {self.bucket!r} retains. Received: older ones ({said}). Write to a bucket that retains more."

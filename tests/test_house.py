@@ -36,6 +36,8 @@ FLOORS = {
     "simulator": 1,
     "periodicity": 1,
     "store": 1,
+    "influx_store": 1,
+    "influx_server": 0,
     "telemetry": 0,
     "signals": 0,
     "noise_processes": 0,
@@ -60,6 +62,8 @@ WITHOUT_TENSORFLOW = [
     "two_sample",
     "realism",
     "store",
+    "influx_store",
+    "influx_server",
     "periodicity",
     "simulator",
     "noise",
@@ -270,7 +274,13 @@ def test_no_exception_is_caught_blindly(module):
 
 
 def test_every_room_has_its_tests():
-    with_others = {"periodicity": "simulator", "terminal": "house", "fused_adam": "fast_paths", "autoencoders": "detectors"}
+    with_others = {
+        "periodicity": "simulator",
+        "terminal": "house",
+        "fused_adam": "fast_paths",
+        "autoencoders": "detectors",
+        "influx_server": "influx_store",
+    }
     rooms = {module for module in TREES if "." not in module} - {"__init__", "__main__", "errors"}
     assert {f"test_{with_others.get(room, room)}.py" for room in rooms} <= {path.name for path in (ROOT / "tests").iterdir()}
 

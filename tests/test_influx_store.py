@@ -117,6 +117,18 @@ def _same(first, second):
     return about[0] == about[1]
 
 
+def _count(thing, method):
+    """A list that grows with each call of a method."""
+    calls, plain = [], getattr(thing, method)
+
+    def counted(*given):
+        calls.append(given)
+        return plain(*given)
+
+    setattr(thing, method, counted)
+    return calls
+
+
 _ABOUT = ("interval_s", "offset_s", "start", "name", "unit")
 
 
@@ -189,7 +201,7 @@ def test_flux_strings_end_where_they_should():
         {"interval_s": 3_600.0, "offset_s": -7_200.0, "start": "2020-02-28T00:00:00+00:00", "unit": "µm"},
         {"interval_s": 0.1, "offset_s": 1e8 + 0.1, "start": "2020-03-01"},
         {"interval_s": 1e-9, "start": "2020-03-01T00:00:00.123456789"},
-        {"interval_s": 86_400.0, "start": "1700-01-01"},
+        {"interval_s": 3_600.0, "start": "1700-01-01"},
     ],
     ids=["counted", "tenths", "thirds", "hours, before the clock's zero", "years after the clock's zero", "nanoseconds", "long ago"],
 )
@@ -380,10 +392,12 @@ def test_restarts_in_the_middle_of_writing_lose_and_double_nothing(mortal, bucke
         send(lines)
 
     store.server.send = counted
+    refusals = _count(store.server, "_in_words")
     store.write(million)
     for thread in restarts:
         thread.join()
     assert len(restarts) == 3 and len(sent) == MILLION // 5_000 + 1
+    assert len(refusals) >= 3, "each time a batch met no server"
 
     points = f'from(bucket: "{bucket}") |> range(start: 1960-01-01T00:00:00Z) |> filter(fn: (r) => r._field == "speed")'
     ((count,), (total,)) = ([row["_value"] for row in _flux(f"{points} |> {what}()")] for what in ("count", "sum"))
@@ -400,6 +414,7 @@ def test_restarts_in_the_middle_of_writing_lose_and_double_nothing(mortal, bucke
     assert many_bytes < 1.2 * few_bytes and many_arrow < 1.2 * few_arrow and many_bytes + many_arrow < 16 * MILLION
 
     for stop in (mortal.kill, mortal.end):
+        asked = _count(store.server, "points")
         chunks = store.chunks("million")
         parts = [next(chunks)]
         stop()
@@ -407,6 +422,7 @@ def test_restarts_in_the_middle_of_writing_lose_and_double_nothing(mortal, bucke
         parts += chunks
         assert np.array_equal(np.concatenate([times for times, _ in parts]), times)
         assert np.array_equal(np.concatenate([values for _, values in parts]), million.values)
+        assert len(asked) >= 3, "for the description, for the points, and for those behind the break"
 
 
 def test_the_old_stands_until_the_new_is_whole(mortal, bucket, refused):
@@ -479,6 +495,12 @@ def test_a_server_that_is_down_is_said_at_once(pretended, refused, use):
     store = InfluxStore("influxdb://b/m/f", max_retry_s=3_600)
     with refused("http://127.0.0.1:9", "no answer"):
         use(store.chunks() if use is list else store)
+
+
+def test_a_variable_of_the_client_that_is_no_number_is_refused(pretended, monkeypatch, refused):
+    monkeypatch.setenv("INFLUXDB_V2_TIMEOUT", "soon")
+    with refused("INFLUXDB_V2_TIMEOUT"):
+        InfluxStore("influxdb://b/m/f").check()
 
 
 def test_what_influxdb_cannot_keep_is_refused(pretended, refused):
@@ -568,17 +590,29 @@ def test_a_field_of_another_type_is_named(bucket, refused):
 def test_something_else_at_the_address_is_named(pretended, monkeypatch, refused):
     import http.server
 
+    answers = []
+
     class Silent(http.server.SimpleHTTPRequestHandler):
         def log_message(self, *words):
             pass
 
         def do_POST(self):  # noqa: N802
-            self.send_error(404)
+            self.send_response(answers[-1])
+            self.end_headers()
+            self.wfile.write(b"<html><body>Welcome,\nfriend</body></html>")
 
     with http.server.HTTPServer(("127.0.0.1", 0), Silent) as other:
         threading.Thread(target=other.serve_forever, daemon=True).start()
         monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{other.server_port}")
-        with refused("something else", "INFLUXDB_V2_URL"):
+        for status in (200, 404):
+            answers.append(status)
+            with refused("something else", "INFLUXDB_V2_URL"):
+                InfluxStore("influxdb://b/m/f").check()
+        answers.append(302)
+        with refused("(302)"):
+            InfluxStore("influxdb://b/m/f").check()
+        monkeypatch.setenv("INFLUXDB_V2_URL", f"https://127.0.0.1:{other.server_port}")
+        with refused("SSL"):
             InfluxStore("influxdb://b/m/f").check()
         other.shutdown()
 
