@@ -3,6 +3,7 @@
 Knows nothing of telemetry. The token is kept by the client alone: no message, log or copy of these objects holds it.
 """
 
+import contextlib
 import io
 import itertools
 import os
@@ -44,28 +45,13 @@ class InfluxServer:
 
     def __init__(self, bucket: str, max_retry_s: float = 60.0):
         self.bucket, self.max_retry_s = bucket, max_retry_s
-        missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
-        if missing:
-            raise InputError(f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them.")
-        url, token, self.organisation = (os.environ[name].strip() for name in VARIABLES)
-        try:
-            parts = urllib.parse.urlsplit(url)
-            usable = parts.scheme in ("http", "https") and parts.hostname and (parts.port is None or parts.port > 0)
-        except ValueError:
-            usable = False
-        if not usable or parts.username or parts.password:
-            raise InputError(
-                "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. Received: another. Correct it."
-            )
-        if not (token.isascii() and token.isprintable()):
-            raise InputError("Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: other characters in it. Copy it again.")
+        self.url, self.organisation = _variables()
         try:
             import influxdb_client  # noqa: F401 - only to see whether it is there
         except ImportError:
             raise InputError(
                 "Expected the package influxdb-client. Received: it is not installed. Run python -m pip install influxdb-client."
             ) from None
-        self.url = url.rstrip("/")
         self._opened: InfluxDBClient | None = None
         self._has_answered = False
 
@@ -120,19 +106,21 @@ class InfluxServer:
         while start_ns < stop_ns:
             query = f'{self.points(start_ns, stop_ns)} {steps} |> keep(columns: ["_time", "_value"])'
             answer = self._repeat(lambda client, query=query: client.query_api().query_raw(query, dialect=dialect))
-            blocks, is_broken = _blocks(answer), False
-            while True:
-                try:
-                    block = next(blocks, None)
-                except (HTTPError, OSError):
-                    is_broken = True
-                if is_broken or block is None:
-                    break
-                yield block
-                start_ns, moved = int(block[0][-1]) + 1, time.monotonic()
-            answer.close()
+            is_broken = False
+            with contextlib.closing(answer):
+                blocks = _blocks(answer)
+                while True:
+                    try:
+                        block = next(blocks, None)
+                    except (HTTPError, OSError):
+                        is_broken = True
+                    if is_broken or block is None:
+                        break
+                    yield block
+                    start_ns, moved = int(block[0][-1]) + 1, time.monotonic()
             if not is_broken:
                 return
+            time.sleep(0.1)
             if time.monotonic() - moved > self.max_retry_s:
                 raise InputError(f"Expected an answer of {self.url}. Received: a part of it, again and again. See the server's log.")
 
@@ -146,6 +134,7 @@ class InfluxServer:
         if self._opened is None:
             from influxdb_client import InfluxDBClient
 
+            _variables()  # they may have changed since
             try:
                 self._opened = InfluxDBClient.from_env_properties()
             except ValueError:
@@ -207,6 +196,26 @@ class InfluxServer:
         return f"Expected a request that {self.url} can do. Received: {said or type(error).__name__} ({status or 'query'}). See its log."
 
 
+def _variables() -> tuple[str, str]:
+    """Address and organisation, once all that the client reads can be used: its own errors would show the token."""
+    missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
+    if missing:
+        raise InputError(f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them.")
+    url, token, organisation = (os.environ[name] for name in VARIABLES)
+    try:
+        parts = urllib.parse.urlsplit(url)
+        usable = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0 and url.isprintable() and " " not in url
+    except ValueError:
+        usable = False
+    if not usable or parts.username or parts.password:
+        raise InputError(
+            "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. Received: another. Correct it."
+        )
+    if not (token.isascii() and token.isprintable()):
+        raise InputError("Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other characters in it. Copy it again.")
+    return url.rstrip("/"), organisation
+
+
 def quote(text: str) -> str:
     """A text as a Flux string: what could end it, or begin an expression in it, is written as a number."""
     return '"' + re.sub(r'[\\"$\x00-\x1f\x7f]', lambda found: f"\\x{ord(found[0]):02x}", text) + '"'
@@ -223,8 +232,10 @@ def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     while True:
         data = answer.read(_BLOCK)
         block = left + data
-        cut = len(block) if not data else block.rfind(b"\n") + 1
+        cut = block.rfind(b"\n") + 1
         block, left = block[:cut], block[cut:]
+        if left and not data:
+            raise ConnectionError("the answer ends within a line")
         if kind is None and block.strip():
             head, kind, block = _head(block)
         if b",error,reference" in block:  # a table of its own, behind the points that were found before

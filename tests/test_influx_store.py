@@ -16,6 +16,7 @@ import influxd
 import numpy as np
 import pytest
 
+from enhsim_tf import influx_server
 from enhsim_tf.errors import InputError
 from enhsim_tf.influx_server import VARIABLES, quote
 from enhsim_tf.influx_store import InfluxLocation, InfluxStore, parse_location
@@ -187,6 +188,29 @@ def test_what_is_no_location_is_refused(text, word, refused):
 
 def test_flux_strings_end_where_they_should():
     assert quote('a"b\\c${d}\n') == '"a\\x22b\\x5cc\\x24{d}\\x0a"'
+
+
+ANSWER = b"#datatype,string,long,dateTime:RFC3339,long\r\n,result,table,_time,_value\r\n"
+
+
+def test_an_answer_is_the_same_in_blocks_of_any_size(monkeypatch):
+    rows = b"".join(b",_result,0,1970-01-01T00:00:00.%09dZ,%d\r\n" % (7 * number, number - 50) for number in range(100))
+    for size in (len(ANSWER), len(ANSWER) + 1, 131, 1_000, 10**6):
+        monkeypatch.setattr(influx_server, "_BLOCK", size)
+        times, values = _all(influx_server._blocks(io.BytesIO(ANSWER + rows + b"\r\n")))
+        assert np.array_equal(times, 7 * np.arange(100)) and np.array_equal(values, np.arange(100) - 50)
+    assert list(influx_server._blocks(io.BytesIO(b"\r\n"))) == []
+
+
+def test_an_answer_that_ends_within_a_line_is_not_taken_for_whole(refused):
+    row = b",_result,0,1970-01-01T00:00:01Z,1234\r\n"
+    for cut in (1, 2, 4, 30):
+        blocks = influx_server._blocks(io.BytesIO(ANSWER + row + row[:-cut]))
+        with pytest.raises(ConnectionError):
+            list(blocks)
+    blocks = influx_server._blocks(io.BytesIO(ANSWER + row + b"\r\n#datatype,string,string\r\n,error,reference\r\n,out of memory,\r\n"))
+    with refused("out of memory"):
+        list(blocks)
 
 
 # -- kept and read back ----------------------------------------------------------------------------------------------------
@@ -475,7 +499,18 @@ def test_a_missing_client_is_named(pretended, monkeypatch, refused):
 
 
 @pytest.mark.parametrize(
-    "url", ["localhost:8086", "ftp://localhost", "http://", "http://[", "http://a:b", "http://user:secret-token@localhost"]
+    "url",
+    [
+        "localhost:8086",
+        "ftp://localhost",
+        "http://",
+        "http://[",
+        "http://a:b",
+        "http://a:0",
+        "http://a b",
+        "http://a\n",
+        "http://user:secret-token@localhost",
+    ],
 )
 def test_an_address_that_is_none_is_refused(pretended, monkeypatch, refused, url):
     monkeypatch.setenv("INFLUXDB_V2_URL", url)
@@ -638,7 +673,10 @@ def _told(error):
     return "\n".join(seen)
 
 
-@pytest.mark.parametrize("token", ["not-the-right-one-0123456789", "in two\nlines-0123456789", "not latin €-0123456789"])
+@pytest.mark.parametrize(
+    "token",
+    ["not-the-right-one-0123456789", "lines-0123456789\ntwo-of-them-0123456789", "not-the-end-0123456789\n", "not-latin-€-0123456789"],
+)
 def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, token):
     told = io.StringIO()
     caplog.set_level(logging.DEBUG)
@@ -658,7 +696,7 @@ def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, to
                     told.write(f"{store!r} {vars(store)} {store.server!r} {vars(store.server)} {pickle.dumps(store)}")
     said = told.getvalue() + caplog.text + "".join(capfd.readouterr())
     assert "Expected" in said and "INFLUXDB_V2_TOKEN" in said
-    for part in (token, named.token, *token.split("\n"), repr(token)):
+    for part in (token, named.token, *token.split(), repr(token)):
         assert part not in said
 
 
