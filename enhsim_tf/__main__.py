@@ -189,14 +189,14 @@ def run_generate(options: argparse.Namespace) -> int:
 
 def run_score(options: argparse.Namespace) -> int:
     """Scores each channel of the source that has a simulator."""
+    from enhsim_tf import detectors
     from enhsim_tf.channels import models_of
     from enhsim_tf.cleaning import clean
-    from enhsim_tf.detectors import DETECTORS as known_detectors
     from enhsim_tf.errors import InputError
     from enhsim_tf.scoring import ScoreOptions, score_channel, write_scores
     from enhsim_tf.sources import read_source
 
-    detector = {name.casefold().replace(" ", "-"): name for name in known_detectors}[options.detector]
+    detector = {name.casefold().replace(" ", "-"): name for name in detectors.DETECTORS}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
     models = models_of(options.models)
     cleaning = cleaning_of(options, 2)

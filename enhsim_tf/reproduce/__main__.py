@@ -12,6 +12,7 @@ examples:
   python -m enhsim_tf.reproduce --budget smoke       the same path with small counts, below a minute, into smoke/
   python -m enhsim_tf.reproduce --only fig04         one figure and what it needs
   python -m enhsim_tf.reproduce --telemetry my.csv --column volts --time utc --out my_figures
+  python -m enhsim_tf.reproduce --store influxdb     through a server that INFLUXDB_V2_URL, _TOKEN and _ORG name
   python -m enhsim_tf.reproduce --experiment robustness
                                                      what the noise is worth to detectors: hours; stop it and go on at will
 
@@ -49,6 +50,12 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--telemetry", type=Path, metavar="PATH", help="run the pipeline on a real channel: .npy, .csv or .parquet")
     parser.add_argument("--column", help="which column of the file holds the values: a number for .npy, else a name")
     parser.add_argument("--time", help="which column of a table holds the times (default: samples are counted)")
+    parser.add_argument(
+        "--store",
+        default="parquet",
+        metavar="STORE",
+        help="where the telemetry is placed and read back from: parquet (default), influxdb, or influxdb://bucket/measurement/field",
+    )
     parser.add_argument("--only", metavar="FIGURE", help="draw one figure, for example fig04, and judge no claim")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where figures and results.json go (default: figures; smoke: smoke)")
@@ -85,7 +92,12 @@ def run(options: argparse.Namespace) -> int:
 
     def experiment_of(seed: int) -> Experiment:
         stages = Stages(options.cache or default_cache(), options.fresh, tell)
-        return Experiment(make_settings(options.budget, seed), stages, source, verbose=int(sys.stdout.isatty()))
+        given = make_settings(options.budget, seed), stages, source, int(sys.stdout.isatty())
+        if options.store == "parquet":
+            return Experiment(*given)
+        from enhsim_tf.reproduce.influx_experiment import InfluxExperiment
+
+        return InfluxExperiment(location_of(options.store), *given)
 
     began, is_smoke = time.perf_counter(), options.budget == "smoke"
     source = None if options.telemetry is None else Source(options.telemetry, options.column, options.time)
@@ -164,6 +176,8 @@ def check(options: argparse.Namespace) -> None:
         raise InputError(
             "Expected --experiment without --only, --telemetry, --spread, --seed and --arrays: its seeds are its own. Received: one of them."
         )
+    if options.experiment and options.store != "parquet":
+        raise InputError(f"Expected --experiment with the Parquet store. Received: --store {options.store}.")
     if options.seeds is not None and options.seeds < 1:
         raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
     for name in ("column", "time"):
@@ -171,12 +185,26 @@ def check(options: argparse.Namespace) -> None:
             raise InputError(f"Expected --{name} together with --telemetry. Received: --{name} alone.")
     if options.budget == "smoke" and out_folder(options).resolve() == Path("figures").resolve():
         raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
+    if options.store != "parquet":
+        from enhsim_tf.influx_store import InfluxStore
+
+        InfluxStore(location_of(options.store)).check()
     if options.telemetry is not None:
         from enhsim_tf.reproduce.data import least_part
         from enhsim_tf.reproduce.settings import Settings
         from enhsim_tf.telemetry import read_telemetry
 
         read_telemetry(options.telemetry, options.column, options.time, 2 * least_part(Settings()))
+
+
+def location_of(place: str) -> str:
+    """Where in InfluxDB `--store` puts the telemetry."""
+    from enhsim_tf.errors import InputError
+    from enhsim_tf.reproduce.settings import LOCATION
+
+    if place != "influxdb" and not place.startswith("influxdb://"):
+        raise InputError(f"Expected --store parquet, influxdb or influxdb://bucket/measurement/field. Received: --store {place}.")
+    return LOCATION if place == "influxdb" else place
 
 
 def chosen_figures(only: str | None) -> list[str]:

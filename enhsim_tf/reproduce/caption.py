@@ -5,6 +5,8 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enhsim_tf.reproduce.settings import LOCATION
+
 if TYPE_CHECKING:
     from enhsim_tf.reproduce.experiments import Experiment
 
@@ -21,6 +23,8 @@ def caption_of(name: str, experiment: "Experiment") -> str:
         options += ["--telemetry", _as_typed(source.path)]
         options += [] if source.column is None else ["--column", source.column]
         options += [] if source.time is None else ["--time", source.time]
+    if location := str(getattr(experiment, "location", "")):  # of a store that is not the default one
+        options += ["--store", "influxdb" if location == LOCATION else location]
     options += [] if settings.budget == "full" else ["--budget", settings.budget]
     options += ["--seed", str(settings.seed)] if settings.seed else []
     options += ["--only", name.split("_")[0]]

@@ -12,6 +12,7 @@ from enhsim_tf.errors import InputError
 
 OURS = "ours"
 BUDGETS = ("smoke", "full")
+LOCATION = "influxdb://telemetry/enhsim_tf/value"  # where `--store influxdb` places the telemetry
 FIGURES = (
     "fig01_pipeline",
     "fig02_source_target",
