@@ -4,7 +4,6 @@ Values stay as the source has them, dirty or not, and times are read but neither
 business. What reading itself noticed stands in `series.attrs["findings"]` and becomes part of the cleaning report.
 """
 
-import importlib
 import os
 import tokenize
 from collections.abc import Sequence
@@ -78,18 +77,21 @@ def _exists(path: Path) -> bool:
 
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:
-    """The hook for InfluxDB: `influx_store.read_channels(source)` returns raw Series by name, with times in UTC."""
-    if columns is not None or time is not None:
-        raise InputError(
-            f"Expected the field in the address alone. Received: columns={columns}, time={time!r} with {source}. Leave them out."
-        )
-    try:
-        room = importlib.import_module("enhsim_tf.influx_store")
-    except ImportError as error:
-        raise InputError(
-            f"Expected the optional extra influxdb for {source}. Received: {error}. Install it: pip install 'enhsim_tf[influxdb]'."
-        ) from None
-    return room.read_channels(source)
+    """Series that an `InfluxStore` wrote there, or the one that somebody else did, by its field."""
+    from enhsim_tf.influx_store import InfluxStore  # the client is an optional extra
+
+    if time is not None:
+        raise InputError(f"Expected time with a table only. Received: time={time!r} with {source}. Leave it out.")
+    store = InfluxStore(source)
+    names = store.names()
+    if names:
+        return {name: to_series(store.read(name)) for name in (names if columns is None else columns)}
+    if columns is not None:
+        raise InputError(f"Expected the field in the address alone. Received: columns={columns} with {source}. Leave them out.")
+    blocks = list(store.chunks())
+    times, values = (np.concatenate([block[part] for block in blocks]) for part in (0, 1)) if blocks else (np.empty(0, int), np.empty(0))
+    field = store.location.field
+    return {field: pd.Series(values, index=pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time"), name=field)}
 
 
 def _read_store(folder: Path, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:

@@ -17,9 +17,11 @@ import numpy as np
 import pytest
 
 from enhsim_tf import influx_server
+from enhsim_tf.cleaning import clean
 from enhsim_tf.errors import InputError
 from enhsim_tf.influx_server import VARIABLES, quote
 from enhsim_tf.influx_store import InfluxLocation, InfluxStore, parse_location
+from enhsim_tf.sources import read_source, to_series
 from enhsim_tf.telemetry import Telemetry
 
 ROOT = Path(__file__).parents[1]
@@ -275,6 +277,26 @@ def test_the_same_written_twice_is_there_once(bucket):
     assert _same(kept, store.read("wheel")) and store.versions() == versions
     (row,) = _flux(f'from(bucket: "{bucket}") |> range(start: 1960-01-01T00:00:00Z) |> filter(fn: (r) => r._field == "speed") |> count()')
     assert row["_value"] == 1_000
+
+
+def test_what_was_written_here_is_a_source_by_its_name(bucket):
+    first, second = _series(50, name="wheel"), _series(60, 1, name="gyro", start="2020-01-01T00:00:00+00:00", interval_s=0.5, unit="V")
+    for each in (first, second):
+        InfluxStore(_location(bucket)).write(each)
+    channels = read_source(_location(bucket))
+    assert sorted(channels) == ["gyro", "wheel"] and (channels["wheel"].to_numpy() == first.values).all()
+    assert (channels["gyro"].index == to_series(second).index).all() and channels["gyro"].attrs["unit"] == "V"
+    assert list(read_source(_location(bucket), columns=["gyro"])) == ["gyro"]
+
+
+def test_a_series_of_somebody_else_is_a_source_and_can_be_cleaned(bucket):
+    places = [place for place in range(100) if place != 40]
+    _put(bucket, [f"bus,craft=a volts={place % 7} {10**18 + place * 10**9}" for place in places])
+    (series,) = read_source(_location(bucket, "bus/volts?craft=a")).values()
+    assert (series.index.as_unit("ns").asi8 == [10**18 + place * 10**9 for place in places]).all()
+    cleaned = clean(series)
+    assert [len(part) for part in cleaned.parts] == [100] and cleaned.report.samples_filled == 1
+    assert cleaned.parts[0].values[40] == (39 % 7 + 41 % 7) / 2 and cleaned.parts[0].interval_s == 1.0
 
 
 def test_writing_again_replaces_all_of_the_old_and_may_go_back(bucket):

@@ -1,8 +1,5 @@
 """Raw channels from every kind of source, and what a source cannot be."""
 
-import sys
-import types
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -221,18 +218,13 @@ def test_the_series_of_a_store(tmp_path, refused):
         read_source(tmp_path / "empty")
 
 
-def test_influxdb_is_read_by_its_own_room(monkeypatch, refused):
-    address, asked = "influxdb://bucket/bus/volts?craft=a", []
-    series = pd.Series(VALUES, index=TIMES, name="volts")
-    room = types.ModuleType("enhsim_tf.influx_store")
-    room.read_channels = lambda source: asked.append(source) or {"volts": series}
-    monkeypatch.setitem(sys.modules, "enhsim_tf.influx_store", room)
-    assert read_source(address)["volts"] is series and asked == [address]
-    with refused("columns=['volts']"):
-        read_source(address, columns=["volts"])
-    monkeypatch.setitem(sys.modules, "enhsim_tf.influx_store", None)  # as if it could not be imported
-    with refused("influxdb"):
-        read_source(address)
+def test_influxdb_has_its_time_and_wants_a_location(monkeypatch, refused):
+    for name in ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG"):
+        monkeypatch.delenv(name, raising=False)
+    with refused("time='utc'"):
+        read_source("influxdb://bucket/bus/volts", time="utc")
+    with refused("INFLUXDB_V2_URL"):
+        read_source("influxdb://bucket/bus/volts")
 
 
 def test_telemetry_to_pandas_and_back(refused):
