@@ -50,13 +50,8 @@ for name, windows in arms.items():
 alt = "Scores of healthy real windows over the threshold, for the detector trained on clean, GAN and real windows"
 with drawing(alt, height=2.2) as panel:
     for name, color in {"clean": GENERATED, "GAN": ENHANCED, "real": REAL}.items():
-        panel.hist(
-            np.log10(scores[name]),
-            60,
-            histtype="step",
-            color=color,
-            label=f"trained on {name}",
-        )
+        logs = np.log10(scores[name])
+        panel.hist(logs, 60, histtype="step", color=color, label=f"trained on {name}")
     panel.axvline(0, color=QUIET, linestyle=":")
     panel.set(xlabel="score over threshold (log10); right of the dotted line: an alarm", ylabel="windows")
     panel.legend(frameon=False)
