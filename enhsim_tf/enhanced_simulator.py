@@ -269,16 +269,30 @@ class EnhancedSimulator:
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Seed of everything drawn; the same seed gives the same.
         """
+        noise_rng = _noise_rng(seed)
+        for windows in self._clean_chunks(num_windows, scenario, seed):
+            windows += self.noise.generate(len(windows), noise_rng)
+            yield windows
+
+    def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+        """The windows of `generate` before noise is added, of the same shape.
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: The seed of `generate`.
+        """
+        chunks = list(self._clean_chunks(num_windows, scenario, seed))
+        return np.concatenate(chunks) if chunks else np.empty((0, self.window), np.float32)
+
+    def _clean_chunks(self, num_windows: int, scenario: Degraded | None, seed: int) -> Iterator[np.ndarray]:
         _check_counts(num_windows=(num_windows, 0))
-        rng, noise_rng = np.random.default_rng(seed), _noise_rng(seed)
+        rng = np.random.default_rng(seed)
         begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         for first in range(0, num_windows, _CHUNK):
             times = self.interval_s * (begins[first : first + _CHUNK, None] + np.arange(self.window))
             windows = self.enhance(self.coarse.simulate(times, scenario, rng))
-            if levels is not None:
-                windows = at_level(windows, *levels[first : first + _CHUNK].T)
-            windows += self.noise.generate(len(windows), noise_rng)
-            yield windows
+            yield windows if levels is None else at_level(windows, *levels[first : first + _CHUNK].T)
 
     def generate_to_parquet(self, path: str | os.PathLike, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> None:
         """Writes the windows of `generate` to a Parquet file as they are made; the memory needed does not grow with their number.

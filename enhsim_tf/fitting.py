@@ -53,9 +53,6 @@ def fit_channel(
 ) -> tuple[EnhancedSimulator, ChannelReport]:
     """Fits an enhanced simulator to a channel and reports on what was held out.
 
-    The coarse simulator is one square wave, set to the clock and the levels of each window; the noise is what the
-    enhancer leaves of the telemetry.
-
     Args:
         parts: Regular stretches of nominal telemetry on one clock, as `cleaning.clean` makes them.
         options: Every choice.
@@ -67,18 +64,38 @@ def fit_channel(
     Raises:
         InputError: If the telemetry is too short, constant or not periodic.
     """
-    options, parts = options or FitOptions(), list(parts)
+    options = options or FitOptions()
     learnt, held_out = split_off(parts, options.held_out)
-    coarse = SquareWaveSimulator.fit(max(learnt, key=len))
+    simulator = fit_simulator(learnt, options, verbose)
+    usable = [part for part in learnt if len(part) >= simulator.window]
+    is_held_out = bool(options.held_out) and num_places(held_out, simulator.window) >= simulator.window
+    return simulator, report_on(simulator, usable, held_out if is_held_out else usable, is_held_out, options.seed)
+
+
+def fit_simulator(parts: Sequence[Telemetry], options: FitOptions, verbose: int | str = "auto") -> EnhancedSimulator:
+    """Fits an enhanced simulator to all that is given.
+
+    The coarse simulator is one square wave, set to the clock and the levels of each window; the noise is what the
+    enhancer leaves of the telemetry.
+
+    Args:
+        parts: Regular stretches of nominal telemetry on one clock.
+        options: Every choice but `held_out`.
+        verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
+
+    Raises:
+        InputError: If the telemetry is too short, constant or not periodic.
+    """
+    coarse = SquareWaveSimulator.fit(max(parts, key=len))
     window = options.window or window_of(coarse, parts[0].interval_s)
-    usable = [part for part in learnt if len(part) >= window]
+    usable = [part for part in parts if len(part) >= window]
     samples = sum(map(len, usable))
     if samples < _LEAST_LEARNT * window:
         raise InputError(
             f"Expected at least {_LEAST_LEARNT} windows of {window} samples to learn from. Received: {samples} samples of {parts[0].name} "
             "in pieces as long as a window. Give more telemetry or a smaller window."
         )
-    simulator = EnhancedSimulator.fit(
+    return EnhancedSimulator.fit(
         usable,
         coarse,
         options.seed,
@@ -93,8 +110,6 @@ def fit_channel(
         follow=True,
         verbose=verbose,
     )
-    is_held_out = num_places(held_out, window) >= window and bool(options.held_out)
-    return simulator, report_on(simulator, usable, held_out if is_held_out else usable, is_held_out, options.seed)
 
 
 def window_of(coarse: SquareWaveSimulator, interval_s: float) -> int:

@@ -182,6 +182,19 @@ class ModesSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class LabelledSettings:
+    """The study of real telemetry with labelled anomalies: `python -m enhsim_tf.reproduce --experiment labelled`."""
+
+    num_windows: int = setting(2_500, "windows", f"{OURS}: about every place in a channel of the data set once", smoke=60)
+    epochs: int = setting(6, "epochs", f"{OURS}: 1,000 steps, a minute; more brought nothing", smoke=1)
+    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
+    num_arm_windows: int = setting(2_000, "windows", f"{OURS}: of each arm to learn from; as many set the threshold", smoke=200)
+    false_alarm_rate: float = setting(0.01, "share", f"{OURS}: as in the experiment on robustness")
+    max_order: int = setting(60, "samples", f"{OURS}: largest order of the fitted autoregression; AIC chooses", smoke=20)
+    block: int = setting(50, "samples", f"{OURS}: of the block bootstrap: half a period")
+
+
+@dataclasses.dataclass(frozen=True)
 class Settings:
     """All of them, the budget and the seed."""
 
@@ -194,6 +207,7 @@ class Settings:
     second: SecondSettings = SecondSettings()
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()
+    labelled: LabelledSettings = LabelledSettings()
     budget: str = "full"
     seed: int = 0
 
