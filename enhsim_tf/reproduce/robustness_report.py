@@ -3,6 +3,7 @@
 No number is written here: each comes from the findings, and a test renders the report again from the tables.
 """
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -58,11 +59,12 @@ def share_c8(found: Findings) -> tuple[int, int]:
     return kept, total
 
 
-def render(found: Findings, template: str = "robustness_report.md.jinja") -> str:
+def render(found: Findings, labelled: Findings | None = None, template: str = "robustness_report.md.jinja") -> str:
     """The report as Markdown.
 
     Args:
         found: The findings.
+        labelled: Those of the study of real telemetry, or None where there was none.
         template: Its template, beside this module.
     """
     import jinja2
@@ -74,7 +76,18 @@ def render(found: Findings, template: str = "robustness_report.md.jinja") -> str
     )
     environment.filters |= {"per_cent": per_cent, "interval": interval, "p_value": p_value, "reached": reached}
     words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
-    return environment.get_template(template).render(found=found, words=words, c8=share_c8(found))
+    return environment.get_template(template).render(found=found, labelled=labelled, words=words, c8=share_c8(found))
+
+
+def findings_of(root: Path, name: str) -> Findings | None:
+    """The findings that a project keeps of an experiment, or None.
+
+    Args:
+        root: Folder of the project.
+        name: `robustness` or `labelled`.
+    """
+    path = root / "figures" / name / "findings.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
 def report(found: Findings, root: Path) -> None:
@@ -88,7 +101,7 @@ def report(found: Findings, root: Path) -> None:
 
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
-        temporary.write_text(render(found), encoding="utf-8")
+        temporary.write_text(render(found, findings_of(root, "labelled")), encoding="utf-8")
     readme = root / "README.md"
     if readme.is_file() and "<!-- robustness: generated -->" in (text := readme.read_text(encoding="utf-8")):
         with replace_file(readme) as temporary:

@@ -1,0 +1,135 @@
+"""`python -m enhsim_tf.reproduce --experiment labelled --data FOLDER`: every channel, its tables, findings, figures and report."""
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enhsim_tf.errors import InputError
+from enhsim_tf.files import make_folder, write_json
+from enhsim_tf.labelled import load_channel, read_labels
+from enhsim_tf.reproduce.settings import Settings
+from enhsim_tf.reproduce.stages import VERSIONS, Stages
+from enhsim_tf.terminal import start_tensorflow
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDER = "labelled"  # below the folder of the figures
+
+
+def run(
+    settings: Settings, cache: Path, data: Path, out: Path, channels: Sequence[str] | None, fresh: bool, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """Runs the study and writes what it found; finished channels are taken from the cache.
+
+    Args:
+        settings: Every number.
+        cache: Where stages are kept.
+        data: Folder with `train/`, `test/` and `labeled_anomalies.csv`.
+        out: Where tables, findings and figures go.
+        channels: Which channels. None: all of the folder.
+        fresh: Whether to do every stage anew.
+        tell: Called with a line about each stage.
+
+    Returns:
+        The findings.
+
+    Raises:
+        InputError: If the folder is none of this layout, a channel is not in it, or no channel can be used.
+    """
+    from enhsim_tf.reproduce.labelled_findings import read_tables, summarise, write_tables
+
+    folder = make_folder(out)
+    tables, skipped = collect(settings, cache, data, channels, fresh, tell)
+    write_tables(tables, folder)
+    found = summarise(read_tables(folder))
+    found |= {"budget": settings.budget, "skipped": skipped, "versions": VERSIONS}
+    write_json(folder / "findings.json", found)
+    draw(found, folder)
+    return found
+
+
+def collect(
+    settings: Settings, cache: Path, data: Path, channels: Sequence[str] | None, fresh: bool, tell: Callable[[str], None]
+) -> "tuple[dict[str, pd.DataFrame], dict[str, str]]":
+    """The tables of all channels, and why a channel could not be used, by its name.
+
+    Args:
+        settings: Every number.
+        cache: Where stages are kept.
+        data: Folder of the data set.
+        channels: Which channels. None: all.
+        fresh: Whether to do every stage anew.
+        tell: Called with a line about each stage.
+    """
+    import pandas as pd
+
+    from enhsim_tf.reproduce.labelled_study import ChannelStudy
+
+    labels = read_labels(data)
+    unknown = [name for name in channels or () if name not in labels]
+    if unknown:
+        raise InputError(f"Expected --channels of {', '.join(list(labels)[:8])}. Received: {unknown[0]!r}. Name labelled ones.")
+    parts: dict[str, list[pd.DataFrame]] = {}
+    skipped: dict[str, str] = {}
+    chosen = list(channels or labels)
+    for number, name in enumerate(chosen, 1):
+        tell(f"channel {number} of {len(chosen)}: {name}")
+        try:
+            study = ChannelStudy(load_channel(data, name), settings, Stages(cache, fresh, tell), int(sys.stdout.isatty()))
+            tables = study.tables
+        except InputError as error:
+            skipped[name] = str(error)
+            tell(f"left out: {error}")
+            continue
+        for each, table in tables.items():
+            parts.setdefault(each, []).append(table)
+        start_tensorflow()
+        import keras
+
+        keras.backend.clear_session()  # dozens of networks would fill the memory
+    if not parts:
+        raise InputError(f"Expected a channel that can be used. Received: none of {len(chosen)} in {data}. The first: {skipped[chosen[0]]}")
+    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}, skipped
+
+
+def draw(found: dict[str, Any], folder: Path, names: Sequence[str] = ()) -> list[Path]:
+    """Draws figures of the study from its findings.
+
+    Args:
+        found: The findings.
+        folder: Where to.
+        names: Which; none for all.
+
+    Returns:
+        The paths of the files.
+    """
+    from enhsim_tf.reproduce.figures import save
+    from enhsim_tf.reproduce.labelled_figures import FIGURES
+
+    caption = f"seed {found['seeds'][0]} · {found['budget']} budget · python -m enhsim_tf.reproduce --experiment labelled --data FOLDER"
+    paths = []
+    for name in names or FIGURES:
+        paths += save(name, found, folder, caption, found["budget"] == "smoke", figures=FIGURES)
+    return paths
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """What the command says at its end."""
+    from enhsim_tf.reproduce.labelled_study import GENERATED_ARM
+
+    said = []
+    for name, about in found["channels"].items():
+        error = about["nrmse"]
+        caught = sum(bool(found["bars"]["found"][name][number]) for number in range(len(about["sequences"])))
+        said.append(
+            f"{name:6} NRMSE {error['enhanced']:.2f} (coarse {error['coarse']:.2f}, ridge {error['ridge']:.2f}); false alarms "
+            f"{about['median_ratio']:.2f} times the real-trained ones (median detector); {caught} of {len(about['sequences'])} sequences found"
+        )
+    arms = found["arms"]
+    said.append(
+        f"all    false alarms trained on generated telemetry {arms[GENERATED_ARM]['false_alarms']['mean']:.1%}, on real {arms['real']['false_alarms']['mean']:.1%}; "
+        f"sequences found {arms[GENERATED_ARM]['found']['mean']:.0%} and {arms['real']['found']['mean']:.0%} (mean over detectors)"
+    )
+    return said
