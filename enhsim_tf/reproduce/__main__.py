@@ -15,6 +15,8 @@ examples:
   python -m enhsim_tf.reproduce --store influxdb     through a server that INFLUXDB_V2_URL, _TOKEN and _ORG name
   python -m enhsim_tf.reproduce --experiment robustness
                                                      what the noise is worth to detectors: hours; stop it and go on at will
+  python -m enhsim_tf.reproduce --experiment labelled --data DIR
+                                                     real telemetry with labelled anomalies: some minutes a channel
 
 exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
 """
@@ -60,7 +62,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where figures and results.json go (default: figures; smoke: smoke)")
     parser.add_argument("--spread", type=int, default=0, metavar="N", help="judge the claims for N further seeds, ranges in spread.json")
-    parser.add_argument("--experiment", choices=("robustness",), help="instead of the paper: train detectors on every kind of noise")
+    parser.add_argument(
+        "--experiment",
+        choices=("robustness", "labelled"),
+        help="instead of the paper: train detectors on every kind of noise; judge them on real telemetry with labelled anomalies",
+    )
+    parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
+    parser.add_argument("--channels", metavar="A,B", help="only these channels of it (default: all)")
     parser.add_argument("--environment", choices=NOISES, help="only this noise in the experiment (default: all four)")
     parser.add_argument("--seeds", type=int, metavar="N", help="seeds of the experiment (default: 10; smoke: 2)")
     parser.add_argument("--arrays", action="store_true", help="save the arrays behind each figure beside it, as .npz")
@@ -74,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     check(options)
     folder = make_folders(options)
     if options.experiment:
-        return run_experiment(options, folder)
+        return run_labelled(options, folder) if options.experiment == "labelled" else run_experiment(options, folder)
     from enhsim_tf.files import write_json
     from enhsim_tf.reproduce.caption import caption_of
     from enhsim_tf.reproduce.claims import CLAIMS, changed, judge, ranges
@@ -160,6 +168,28 @@ def run_experiment(options: argparse.Namespace, folder: Path) -> int:
     return 0
 
 
+def run_labelled(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the study of real telemetry, below the figures' folder, and returns the exit code."""
+    from enhsim_tf.reproduce.labelled_run import FOLDER, lines, run
+    from enhsim_tf.reproduce.robustness_report import findings_of, report
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    def tell(line: str) -> None:
+        print(line, flush=True)
+
+    out = folder / FOLDER
+    chosen = None if options.channels is None else [name.strip() for name in options.channels.split(",")]
+    cache = options.cache or default_cache()
+    found = run(make_settings(options.budget), cache, options.data, out, chosen, options.fresh, tell)
+    tell("\n" + "\n".join(lines(found)))
+    kept = findings_of(Path(), "robustness")
+    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None:
+        report(kept, Path())
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
 def check(options: argparse.Namespace) -> None:
     """Refuses what cannot be used before anything is made; needs no TensorFlow."""
     from enhsim_tf.errors import InputError
@@ -170,8 +200,14 @@ def check(options: argparse.Namespace) -> None:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)
     for name in ("environment", "seeds"):
-        if getattr(options, name) is not None and options.experiment is None:
-            raise InputError(f"Expected --{name} together with --experiment robustness. Received: --{name} alone.")
+        if getattr(options, name) is not None and options.experiment != "robustness":
+            raise InputError(f"Expected --{name} together with --experiment robustness. Received: --{name} without it.")
+    if (options.experiment == "labelled") != (options.data is not None) or (options.channels and options.data is None):
+        raise InputError("Expected --experiment labelled and --data DIR together, and --channels only with them. Received: one alone.")
+    if options.data is not None:
+        from enhsim_tf.labelled import read_labels
+
+        read_labels(options.data)
     if options.experiment and (options.only or options.telemetry or options.spread or options.seed or options.arrays):
         raise InputError(
             "Expected --experiment without --only, --telemetry, --spread, --seed and --arrays: its seeds are its own. Received: one of them."
