@@ -18,12 +18,13 @@ from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.errors import InputError
 from enhsim_tf.noise import extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator, num_overlapping
-from enhsim_tf.pairs import Pairs, at_level, cut_pairs, cut_parts, even_places, random_places, split_off
+from enhsim_tf.pairs import Pairs, at_level, cut_pairs, cut_parts, even_places, random_places, set_by_shape, split_off
 from enhsim_tf.saved_simulator import read_saved, write_saved
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, units_of
 from enhsim_tf.store import write_windows
 from enhsim_tf.telemetry import Telemetry, check_telemetry, check_values, cut_windows
 
+_NUM_PHASES, _ROUNDS = 400, 3  # of a period, at which shapes are compared; trainings between which the clock is set anew
 _NUM_LEVELS = 500  # times at which level and amplitude are remembered, at most
 _CHUNK = 4_096  # windows generated at a time
 _START_RANGE = 1_000_000  # samples; windows begin at a random one of these, so at every phase of the waves
@@ -112,7 +113,8 @@ class EnhancedSimulator:
             decay: Whether the enhancer's learning rate falls to zero along a cosine, instead of staying as in the paper:
                 at a constant rate, the noise of the last batches stays in the weights.
             follow: Whether the coarse simulator is set to the clock, level and amplitude of each window before the enhancer
-                learns it, for telemetry that drifts away from a fixed simulator. The levels are kept and drawn from again.
+                learns it, for telemetry that drifts away from a fixed simulator. The epochs are done in three rounds; from
+                the second on, clock and levels are set by the enhanced shape. The levels are kept and drawn from again.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
 
         Returns:
@@ -137,17 +139,18 @@ class EnhancedSimulator:
 
         learnt, rest = split_off(parts, held_out if by_enhancer else 0.0)
         pairs = cut_pairs(learnt, coarse, random_places(learnt, window, num_windows, rng), window, follow)
-        pairs = pairs.clear() if follow else pairs
         network = enhancer_room.build_enhancer(window, seed=seed)
-        rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(pairs) // 15)) if decay else 0.001
-        source, target = ((windows - offset) / scale for windows in (pairs.coarse, pairs.target_in_unit))
-        enhancer_room.fit_windows(network, source, target, epochs, 15, seed, rate, verbose=bars)
-
-        levels = None
+        simulator = cls(coarse, network, None, parts[0].interval_s, offset, scale, levels=[[0.0, 1.0]] if follow else None)
+        for number, some in enumerate(np.diff(np.linspace(0, epochs, 1 + (min(_ROUNDS, epochs) if follow else 1)).astype(int)).tolist()):
+            pairs = simulator._set_by_shape(pairs) if number else pairs
+            pairs = pairs.clear() if follow else pairs
+            rate = keras.optimizers.schedules.CosineDecay(0.001, some * -(-len(pairs) // 15)) if decay else 0.001
+            source, target = ((windows - offset) / scale for windows in (pairs.coarse, pairs.target_in_unit))
+            enhancer_room.fit_windows(network, source, target, some, 15, seed + number, rate, verbose=bars)
         if follow:
-            seen = cut_pairs(parts, coarse, even_places(parts, window, _NUM_LEVELS), window, follow).clear()
-            levels = np.stack([seen.shift, seen.gain], axis=1)
-        trained = {
+            seen = simulator.pairs(parts, even_places(parts, window, _NUM_LEVELS)).clear()
+            simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
+        simulator.trained = {
             "telemetry": parts[0].name,
             "num_samples": len(values),
             "seed": seed,
@@ -161,7 +164,6 @@ class EnhancedSimulator:
             "decay": decay,
             "follow": follow,
         }
-        simulator = cls(coarse, network, None, parts[0].interval_s, offset, scale, levels, trained)
         draw = np.random.default_rng([seed, 1])
         if by_enhancer:
             noise_windows = simulator.residual_windows(rest, num_windows, draw)
@@ -192,8 +194,26 @@ class EnhancedSimulator:
         """
         parts = _parts_of(telemetry)
         _check_counts(num_windows=(num_windows, 0))
-        pairs = cut_pairs(parts, self.coarse, random_places(parts, self.window, num_windows, rng), self.window, self.levels is not None)
+        pairs = self.pairs(parts, random_places(parts, self.window, num_windows, rng))
         return pairs.target - self.follow(pairs)
+
+    def pairs(self, telemetry: Telemetry | Sequence[Telemetry], places: np.ndarray) -> Pairs:
+        """Windows of telemetry with the coarse ones of the same times, set to their clock and levels if levels are remembered.
+
+        Args:
+            telemetry: Telemetry, or its stretches.
+            places: Where each window begins, counted over the stretches as `pairs.num_places` counts.
+        """
+        pairs = cut_pairs(_parts_of(telemetry), self.coarse, places, self.window, self.levels is not None)
+        return pairs if self.levels is None else self._set_by_shape(pairs)
+
+    def _set_by_shape(self, pairs: Pairs) -> Pairs:
+        """Pairs set by the enhanced shape; sums of several waves do not repeat, so they stay as their edges set them."""
+        if len(self.coarse.waves) > 1:
+            return pairs
+        phases = self.coarse.waves[0].period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
+        coarse = self.coarse.simulate(phases[:, None] + self.interval_s * np.arange(self.window))
+        return set_by_shape(pairs, coarse, self.enhance(coarse))
 
     def follow(self, pairs: Pairs) -> np.ndarray:
         """The enhanced, still clean counterpart of telemetry, at the level of each window, float32 of shape `(windows, samples)`.

@@ -169,6 +169,26 @@ def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, places: n
     return Pairs(windows, target, *_least_squares(windows, target), time_s)
 
 
+def set_by_shape(pairs: Pairs, coarse: np.ndarray, shapes: np.ndarray) -> Pairs:
+    """Sets the simulator to each window again, by what its windows look like once they are enhanced.
+
+    A square wave tells the clock by its edges alone; the enhanced shape tells it by every sample.
+
+    Args:
+        pairs: Pairs that follow the telemetry.
+        coarse: Coarse windows at every phase of a period, shape `(phases, samples)`.
+        shapes: The same windows enhanced, same shape.
+
+    Returns:
+        Pairs of the same telemetry with the coarse windows, shifts and gains whose shapes correlate best with it.
+    """
+    centred = shapes - shapes.mean(axis=1, keepdims=True, dtype=np.float64)
+    length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
+    agreement = pairs.target @ (centred / np.where(length > 0, length, 1.0)).T  # a centred shape sees no level
+    best = np.argmax(agreement, axis=1)
+    return Pairs(coarse[best], pairs.target, *_least_squares(shapes[best], pairs.target), pairs.time_s)
+
+
 def _least_squares(coarse: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shift and gain of each coarse window that bring it nearest to its target; a window without an edge gets gain 0."""
     coarse_mean, target_mean = (each.mean(axis=1, dtype=np.float64) for each in (coarse, target))
