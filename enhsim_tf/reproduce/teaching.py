@@ -22,12 +22,11 @@ from IPython.display import Markdown, display
 from PIL import Image
 
 from enhsim_tf.errors import InputError
-from enhsim_tf.reproduce import claims, figures, robustness_figures
+from enhsim_tf.reproduce import claims, figures, labelled_figures, labelled_findings, labelled_run, robustness_figures, robustness_run
 from enhsim_tf.reproduce.caption import caption_of
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.figure_data import FIGURE_DATA
 from enhsim_tf.reproduce.findings import read_tables
-from enhsim_tf.reproduce.robustness_run import FOLDER, draw
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages, default_cache
 from enhsim_tf.sheet import STYLE
@@ -42,7 +41,7 @@ _STAGES = {"telemetry": "store", "enhancer": "enhancer_folder", "noise GAN": "no
 _STAGES |= {"speed": "speed", "false alarms": "false_alarms", "resemblance": "resemblance", "degraded": "degraded"}
 _LEDGER = {known.id: known for known in claims.CLAIMS}
 _ROOT = Path(__file__).parents[2]
-_KEPT = _ROOT / "figures" / FOLDER
+_KEPT = _ROOT / "figures" / robustness_run.FOLDER
 _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 
 
@@ -121,11 +120,20 @@ def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
     return found, read_tables(_KEPT)
 
 
+def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
+    """The study of real telemetry as it was run and kept: its findings, and the tables they come from."""
+    folder = _ROOT / "figures" / labelled_run.FOLDER
+    found = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
+    print(f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in figures/.")
+    return found, labelled_findings.read_tables(folder)
+
+
 def show_finding(found: dict, name: str) -> None:
-    """Shows a figure of the experiment (one of `robustness_figures.FIGURES`) from its findings."""
+    """Shows a figure of an experiment from its findings: one of `robustness_figures.FIGURES` or `labelled_figures.FIGURES`."""
+    room, drawn = (labelled_run, labelled_figures) if name in labelled_figures.FIGURES else (robustness_run, robustness_figures)
     with tempfile.TemporaryDirectory() as folder:
-        path = next(path for path in draw(found, Path(folder), (name,)) if path.suffix == ".png")
-        _show_picture(path.read_bytes(), robustness_figures.FIGURES[name].alt)
+        path = next(path for path in room.draw(found, Path(folder), (name,)) if path.suffix == ".png")
+        _show_picture(path.read_bytes(), drawn.FIGURES[name].alt)
 
 
 @contextlib.contextmanager
