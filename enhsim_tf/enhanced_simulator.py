@@ -141,12 +141,13 @@ class EnhancedSimulator:
         pairs = cut_pairs(learnt, coarse, random_places(learnt, window, num_windows, rng), window, follow)
         network = enhancer_room.build_enhancer(window, seed=seed)
         simulator = cls(coarse, network, None, parts[0].interval_s, offset, scale, levels=[[0.0, 1.0]] if follow else None)
-        for number, some in enumerate(np.diff(np.linspace(0, epochs, 1 + (min(_ROUNDS, epochs) if follow else 1)).astype(int)).tolist()):
+        rounds = min(_ROUNDS, epochs) if follow else 1
+        for number, epochs_now in enumerate(np.diff(np.linspace(0, epochs, rounds + 1).astype(int)).tolist()):
             pairs = simulator._set_by_shape(pairs) if number else pairs
             pairs = pairs.clear() if follow else pairs
-            rate = keras.optimizers.schedules.CosineDecay(0.001, some * -(-len(pairs) // 15)) if decay else 0.001
+            rate = keras.optimizers.schedules.CosineDecay(0.001, epochs_now * -(-len(pairs) // 15)) if decay else 0.001
             source, target = ((windows - offset) / scale for windows in (pairs.coarse, pairs.target_in_unit))
-            enhancer_room.fit_windows(network, source, target, some, 15, seed + number, rate, verbose=bars)
+            enhancer_room.fit_windows(network, source, target, epochs_now, 15, seed + number, rate, verbose=bars)
         if follow:
             seen = simulator.pairs(parts, even_places(parts, window, _NUM_LEVELS)).clear()
             simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
