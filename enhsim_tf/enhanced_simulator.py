@@ -132,6 +132,7 @@ class EnhancedSimulator:
             )
         by_enhancer, values = extraction == "enhancer", np.concatenate([part.values for part in parts])
         check_values(values, parts[0].name, (8 if by_enhancer else 2) * window)
+        averaged = [] if by_enhancer else _extracted([part for part in parts if len(part) >= window + moving_average - 1], moving_average)
         coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
@@ -169,9 +170,7 @@ class EnhancedSimulator:
         if by_enhancer:
             noise_windows = simulator.residual_windows(rest, num_windows, draw)
         else:
-            long_enough = [part for part in parts if len(part) >= window + moving_average - 1]
-            extracted = [dataclasses.replace(part, values=extract_noise(part.values, moving_average)[0]) for part in long_enough]
-            noise_windows, _ = cut_parts(extracted, random_places(extracted, window, num_windows, draw), window)
+            noise_windows, _ = cut_parts(averaged, random_places(averaged, window, num_windows, draw), window)
         if noise == "convolutional":
             simulator.noise = convolutional_noise_gan(noise_windows, num_iterations, seed)
         else:
@@ -413,6 +412,11 @@ def _parts_of(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
     if len({part.interval_s for part in parts}) != 1:
         raise InputError(f"Expected stretches of one sampling interval. Received: {sorted({part.interval_s for part in parts})}.")
     return parts
+
+
+def _extracted(parts: Sequence[Telemetry], width: int) -> list[Telemetry]:
+    """The noise that a moving average leaves of each stretch."""
+    return [dataclasses.replace(part, values=extract_noise(part.values, width)[0]) for part in parts]
 
 
 def _check_counts(**counts: tuple[Any, int]) -> None:
