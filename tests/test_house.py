@@ -68,6 +68,7 @@ FLOORS = {
     "files": 0,
     "errors": 0,
     "terminal": 0,
+    "commands": 0,
     "__init__": 4,  # the door: it may name every room
 }
 WITHOUT_TENSORFLOW = [
@@ -101,6 +102,8 @@ WITHOUT_TENSORFLOW = [
     "scoring",
     "training_sets",
     "terminal",
+    "commands",
+    "__main__",
 ]
 
 
