@@ -137,9 +137,14 @@ def cut_parts(parts: Sequence[Telemetry], places: np.ndarray, window: int) -> tu
 
     Returns:
         The windows, float32 of shape `(windows, samples)`, and when each begins in seconds, shape `(windows,)`.
+
+    Raises:
+        InputError: If no whole window begins at one of the places.
     """
     places, usable = np.asarray(places), [part for part in parts if len(part) >= window]
     firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
+    if len(places) and not 0 <= places.min() <= places.max() < firsts[-1]:
+        raise InputError(f"Expected places from 0 to before {firsts[-1]}. Received: from {places.min()} to {places.max()}.")
     which = np.searchsorted(firsts, places, "right") - 1
     windows, time_s = np.empty((len(places), window), np.float32), np.empty(len(places))
     for number, part in enumerate(usable):

@@ -6,6 +6,7 @@ first sample that it concerns.
 
 import dataclasses
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 NOMINAL = "nominal"
+_SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
+_LENGTH = re.compile(r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?")  # samples are whole
 _MOST_SAMPLES = 20_000_000  # of a continuous series, which is made in memory
 
 
@@ -62,15 +65,11 @@ def parse_length(text: str) -> tuple[float, str]:
     Raises:
         InputError: If it is no length.
     """
-    import pandas as pd
-
-    try:
-        length, unit = (float(text), "samples") if text.isdecimal() else (pd.Timedelta(text).total_seconds(), "s")
-    except (ValueError, OverflowError):
-        length, unit = 0.0, ""
+    found = _LENGTH.fullmatch(text.casefold())
+    length = float(found["number"]) if found else 0.0
     if not 0 < length < float("inf"):
-        raise InputError(f"Expected a length such as 1d, 6h, 90min or 5000 (samples). Received: {text[:80]!r}.")
-    return length, unit
+        raise InputError(f"Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: {text[:80]!r}.")
+    return (length * _SECONDS[found["unit"]], "s") if found["unit"] else (length, "samples")
 
 
 def num_samples_of(text: str, interval_s: float) -> int:
