@@ -22,7 +22,7 @@ def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
         report: The report.
     """
     with matplotlib.style.context(STYLE):
-        name, unit = drawable(report.channel), drawable(report.unit)
+        name, unit = drawable(report.channel), drawable(report.unit, 10)
         where = "held-out telemetry" if report.is_held_out else "the telemetry it learnt from"
         errors = {key: "not measurable" if np.isnan(error) else f"{error:.2f}" for key, error in report.nrmse.items()}
         subtitle = (
@@ -61,15 +61,16 @@ def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
     return figure
 
 
-def drawable(text: str) -> str:
+def drawable(text: str, most_letters: int = 60) -> str:
     """Text of one line that the font has letters for, without mathematics.
 
     Args:
         text: For example a channel's name, which may hold anything.
+        most_letters: What is longer is cut.
     """
     letters = font_manager.get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
     known = "".join(letter if ord(letter) in letters else "?" for letter in printable(text))
-    return (known if len(known) <= 60 else f"{known[:57]}...").replace("$", r"\$")
+    return (known if len(known) <= most_letters else f"{known[: most_letters - 3]}...").replace("$", r"\$")
 
 
 def _message(report: ChannelReport) -> str:

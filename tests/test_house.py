@@ -315,7 +315,6 @@ def test_every_room_has_its_tests():
         "influx_server": "influx_store",
         "saved_simulator": "enhanced_simulator",
         "sheet": "figures",
-        "channel_figure": "channels",
         "channel_report": "fitting",
         "channel_verdict": "fitting",
     }
