@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 MANIFEST = "manifest.json"  # by it a folder is known as a saved simulator
 _OURS = '"enhsim_tf.EnhancedSimulator/'  # and by this in it as one of ours
+_THREADS = 2  # of TensorFlow for each channel: how it adds up depends on their number, so that must not depend on the workers
 _MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
 
 
@@ -109,9 +110,10 @@ def fit_channels(
         out: The folder of the models.
         options: Fields of `fitting.FitOptions`.
         cleaning: What to do with dirty values.
-        workers: Channels fitted at a time, each in a process of its own; 1 fits them here.
+        workers: Channels fitted at a time, each in a process of its own. Their number changes no bit of the simulators.
+            0 fits them in this process, with the threads that it has.
         tell: Called with each line.
-        verbose: Whether to show progress bars, with one worker.
+        verbose: Whether to show progress bars, where one channel is fitted at a time.
 
     Returns:
         For each channel that could not be fitted, why.
@@ -122,11 +124,12 @@ def fit_channels(
     out = make_folder(out)
     if (out / MANIFEST).is_file():
         raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
+    verbose = verbose and min(workers, len(series)) <= 1
     jobs = [Job(name, each, folder_of(out, name), dict(options), cleaning, verbose) for name, each in series.items()]
     for job in jobs:
         refuse_foreign(job.folder)
     remove_leftovers(out)
-    if min(workers, len(jobs)) > 1:
+    if workers and jobs:
         return _fit_in_processes(jobs, workers, tell)
     failed: dict[str, str] = {}
     for job in jobs:
@@ -140,10 +143,9 @@ def fit_channels(
 def _fit_in_processes(jobs: list[Job], workers: int, tell: Callable[[str], None]) -> dict[str, str]:
     """Each channel in a process of its own; one that fails or is killed does not stop the others' results."""
     failed: dict[str, str] = {}
-    threads = str(max(1, (os.cpu_count() or 1) // workers))
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
-    with concurrent.futures.ProcessPoolExecutor(min(workers, len(jobs)), context, _begin, (threads,)) as pool:
+    with concurrent.futures.ProcessPoolExecutor(min(workers, len(jobs)), context, _begin) as pool:
         running = {pool.submit(fit_job, job): job for job in jobs}
         try:
             for done in concurrent.futures.as_completed(running):
@@ -162,9 +164,9 @@ def _fit_in_processes(jobs: list[Job], workers: int, tell: Callable[[str], None]
     return failed
 
 
-def _begin(threads: str) -> None:
-    """Begins a process: its share of the cores, and an interrupt ends it without a word."""
-    os.environ |= {"TF_NUM_INTRAOP_THREADS": threads, "OMP_NUM_THREADS": threads}
+def _begin() -> None:
+    """Begins a process: its threads, before TensorFlow is imported, and an interrupt ends it without a word."""
+    os.environ["TF_NUM_INTRAOP_THREADS"] = str(_THREADS)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
