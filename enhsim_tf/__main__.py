@@ -192,7 +192,16 @@ def chosen_of(models: dict[str, Path], channels: list[str] | None) -> dict[str, 
 
 
 def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
-    """A file for each channel: the one that was named, or one a channel in the folder that was named."""
+    """A file for each channel: the one that was named, or one a channel in the folder that was named.
+
+    Args:
+        out: What was named.
+        channels: Names of the channels.
+        suffixes: Of the files that can be written; the first where a folder was named.
+
+    Raises:
+        InputError: If one file was named for several channels, or it cannot be written.
+    """
     from enhsim_tf.channels import folder_of
     from enhsim_tf.errors import InputError
     from enhsim_tf.files import make_folder

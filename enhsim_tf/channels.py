@@ -5,12 +5,14 @@ MODEL_DIR/volts/report.json, report.png
 """
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import multiprocessing
 import os
 import signal
+import threading
 import urllib.parse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -146,7 +148,8 @@ def _fit_in_processes(jobs: list[Job], workers: int, tell: Callable[[str], None]
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
     with concurrent.futures.ProcessPoolExecutor(min(workers, len(jobs)), context, _begin) as pool:
-        running = {pool.submit(fit_job, job): job for job in jobs}
+        with _ignored_interrupts():  # processes inherit it: at an interrupt they are ended below, without a word
+            running = {pool.submit(fit_job, job): job for job in jobs}
         try:
             for done in concurrent.futures.as_completed(running):
                 channel = running[done].channel
@@ -156,18 +159,30 @@ def _fit_in_processes(jobs: list[Job], workers: int, tell: Callable[[str], None]
                     failed[channel] = str(error)
                 except BrokenProcessPool:
                     failed[channel] = "Expected to fit it in a process. Received: one that was killed, perhaps for memory. Use --workers 1."
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in set(multiprocessing.active_children()) - before:
-                child.terminate()
-            raise
+        finally:
+            if not all(future.done() for future in running):  # at an interrupt
+                pool.shutdown(wait=False, cancel_futures=True)
+                for child in set(multiprocessing.active_children()) - before:
+                    child.terminate()
     return failed
 
 
 def _begin() -> None:
-    """Begins a process: its threads, before TensorFlow is imported, and an interrupt ends it without a word."""
+    """Begins a process: its threads, before TensorFlow is imported."""
     os.environ["TF_NUM_INTRAOP_THREADS"] = str(_THREADS)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextlib.contextmanager
+def _ignored_interrupts() -> Iterator[None]:
+    """Ignores interrupts for a moment, where that can be chosen: in the main thread."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def fit_job(job: Job) -> list[str]:

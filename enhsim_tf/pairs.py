@@ -122,7 +122,13 @@ def random_places(parts: Sequence[Telemetry], window: int, num_windows: int, rng
 
 
 def even_places(parts: Sequence[Telemetry], window: int, num_windows: int) -> np.ndarray:
-    """Places spread evenly over the stretches, in the order of time: at most `num_windows`, none twice."""
+    """Places spread evenly over the stretches, in the order of time.
+
+    Args:
+        parts: Stretches of one series.
+        window: Samples of a window.
+        num_windows: Number of places, at most; none comes twice.
+    """
     places = num_places(parts, window)
     return np.unique(np.linspace(0, places - 1, min(num_windows, places)).astype(np.int64))
 

@@ -14,6 +14,9 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Refuses the command line."""
+        missing = message.partition("arguments are required: ")[2]
+        if missing:
+            raise InputError(f"Expected {missing}. Received: no such argument. See {self.prog} --help.")
         raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
 
 
