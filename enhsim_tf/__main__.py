@@ -3,126 +3,16 @@
 import argparse
 import os
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from enhsim_tf.terminal import Parser, finish
+from enhsim_tf.commands import LEAST_WINDOW, parse
+from enhsim_tf.terminal import finish, printable
 
-EXAMPLES = """\
-three commands:
-  python -m enhsim_tf fit telemetry.csv --out models
-  python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
-  python -m enhsim_tf score models new.csv --out scores.parquet
-
-python -m enhsim_tf fit --help (generate, score) tells each command's options. The paper's reproduction is another
-command: python -m enhsim_tf.reproduce.
-"""
-SOURCE = "a .csv, .parquet or .npy file, a store's folder, folder#channel, or influxdb://bucket/measurement/field?tag=value"
-DETECTORS = (
-    "limit-check",
-    "pca-residual",
-    "nearest-neighbours",
-    "isolation-forest",
-    "one-class-svm",
-    "dense-autoencoder",
-    "convolutional-autoencoder",
-)
-EXIT = "exit code: 0 done, 2 the input or an option cannot be used"
-
-
-def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """Reads the command line; imports nothing that is slow.
-
-    Raises:
-        InputError: If an option is unknown or its value is not of its kind.
-    """
-    form = {"formatter_class": argparse.RawDescriptionHelpFormatter}
-    parser = Parser(
-        prog="python -m enhsim_tf",
-        description="Realistic telemetry from telemetry: fit a simulator to a channel, generate training data, score new telemetry.",
-        epilog=EXAMPLES + EXIT,
-        **form,
-    )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,score}", required=True)
-
-    fit = commands.add_parser(
-        "fit",
-        help="fit an enhanced simulator to nominal telemetry",
-        description="Fits an enhanced simulator to each channel of nominal, periodic telemetry, and reports how realistic it is on the end\n"
-        "of the telemetry, which it has not seen. About a minute and a half a channel on two cores.",
-        epilog=EXIT,
-        **form,
-    )
-    _add_source(fit)
-    fit.add_argument("--out", type=Path, required=True, metavar="MODEL_DIR", help="where the simulators go, a folder a channel")
-    fit.add_argument("--window", type=int, metavar="N", help="samples of a window (default: two periods, from 64 to 500)")
-    fit.add_argument(
-        "--noise", choices=("convolutional", "paper"), default="convolutional", help="networks of the noise (default: %(default)s)"
-    )
-    fit.add_argument("--held-out", type=float, default=0.2, metavar="SHARE", help="end of the telemetry kept for the report (default: 0.2)")
-    fit.add_argument("--num-windows", type=int, default=2_500, metavar="N", help="training windows (default: 2500)")
-    fit.add_argument("--epochs", type=int, default=6, metavar="N", help="passes of the enhancer over them (default: 6)")
-    fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="adversarial iterations of the noise (default: 1000)")
-    fit.add_argument("--workers", type=int, metavar="N", help="channels fitted at a time (default: one a core)")
-    _add_seed(fit)
-
-    generate = commands.add_parser(
-        "generate",
-        help="generate labelled training data",
-        description="Generates windows, or one continuous series, with labels: nominal or a degraded mode, its severity and onset.",
-        epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change\n" + EXIT,
-        **form,
-    )
-    generate.add_argument("models", type=Path, metavar="MODEL_DIR", help="what `fit` wrote")
-    how_many = generate.add_mutually_exclusive_group(required=True)
-    how_many.add_argument("--windows", type=int, metavar="N", help="windows in all")
-    how_many.add_argument("--continuous", metavar="LENGTH", help="one series instead, such as 1d, 6h, 90min or 5000 (samples)")
-    generate.add_argument(
-        "--scenario",
-        action="append",
-        default=[],
-        metavar="MODE:SEVERITY[:ONSET]",
-        help="a degraded mode, such as stuck:0.5; may be repeated",
-    )
-    generate.add_argument(
-        "--nominal-share", type=float, default=0.5, metavar="SHARE", help="nominal windows, where there are scenarios (default: 0.5)"
-    )
-    generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
-    generate.add_argument(
-        "--out", type=Path, required=True, metavar="OUT", help="a .parquet file; a folder where there are several channels"
-    )
-    _add_seed(generate)
-
-    score = commands.add_parser(
-        "score",
-        help="score telemetry with a detector trained on generated telemetry",
-        description="Trains a detector on generated nominal telemetry only, and writes a score and a flag for each sample.",
-        epilog=f"detectors: {', '.join(DETECTORS)}\n{EXIT}",
-        **form,
-    )
-    score.add_argument("models", type=Path, metavar="MODEL_DIR", help="what `fit` wrote")
-    _add_source(score)
-    score.add_argument(
-        "--detector", choices=DETECTORS, default="pca-residual", metavar="NAME", help="which detector (default: %(default)s)"
-    )
-    score.add_argument("--windows", type=int, default=2_000, metavar="N", help="generated windows that it learns from (default: 2000)")
-    score.add_argument("--false-alarm-rate", type=float, default=0.01, metavar="SHARE", help="samples that may be flagged (default: 0.01)")
-    score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
-    _add_seed(score)
-    return parser.parse_args(arguments)
-
-
-def _add_seed(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
-
-
-def _add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("source", metavar="SOURCE", help=SOURCE)
-    parser.add_argument("--column", action="append", metavar="NAME", help="only this column; may be repeated (default: all of numbers)")
-    parser.add_argument("--time", metavar="NAME", help="the column of times (default: found; none: samples are counted)")
-    parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the one most rows have)")
-    parser.add_argument("--timezone", metavar="ZONE", help="zone of times without one, such as Europe/Berlin (default: UTC)")
-    parser.add_argument("--max-fill", type=int, default=5, metavar="N", help="longest gap filled by a straight line (default: 5 samples)")
-    parser.add_argument("--drop-bad", action="store_true", help="leave out what is no number or no time, counted, instead of refusing it")
+if TYPE_CHECKING:
+    from enhsim_tf.cleaning import Cleaning
+    from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 
 def run(options: argparse.Namespace) -> int:
@@ -139,11 +29,12 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.errors import InputError
 
     counts = {"num_windows": options.num_windows, "epochs": options.epochs, "num_iterations": options.iterations}
-    if min(counts["num_windows"], counts["epochs"]) < 1 or options.iterations < 0 or (options.workers or 1) < 1:
+    if min(counts["num_windows"], counts["epochs"]) < 1 or options.iterations < 0 or (options.workers is not None and options.workers < 1):
         raise InputError("Expected at least one window, epoch and worker, and no negative number of iterations. Received: less.")
-    if not 0 <= options.held_out <= 0.5 or (options.window or 16) < 16:
+    if not 0 <= options.held_out <= 0.5 or (options.window is not None and options.window < LEAST_WINDOW):
         raise InputError(
-            f"Expected --held-out from 0 to 0.5 and --window of at least 16. Received: {options.held_out} and {options.window}."
+            f"Expected --held-out from 0 to 0.5 and --window of at least {LEAST_WINDOW}. "
+            f"Received: {options.held_out} and {options.window or 'no window'}."
         )
     from enhsim_tf.channels import fit_channels  # pandas takes a while
     from enhsim_tf.sources import read_source
@@ -153,74 +44,129 @@ def run_fit(options: argparse.Namespace) -> int:
     chosen = {"window": options.window, "noise": options.noise, "held_out": options.held_out, "seed": options.seed} | counts
     workers = options.workers or min(len(series), os.cpu_count() or 1)
     failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, sys.stdout.isatty())
-    for channel, reason in failed.items():
-        print(f"error: {channel}: {reason}", file=sys.stderr)
-    return 2 if failed else 0
+    return tell_failed(failed)
 
 
 def run_generate(options: argparse.Namespace) -> int:
     """Generates labelled training data from each channel's simulator."""
-    from enhsim_tf.channels import models_of
     from enhsim_tf.errors import InputError
-    from enhsim_tf.training_sets import num_samples_of, parse_scenario, shares_of, write_series_labelled, write_windows_labelled
+    from enhsim_tf.training_sets import (
+        num_samples_of,
+        parse_length,
+        parse_scenario,
+        shares_of,
+        start_of,
+        write_series_labelled,
+        write_windows_labelled,
+    )
 
     scenarios = [parse_scenario(text) for text in options.scenario]
     if options.windows is not None and options.windows < 1:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
     if options.continuous is not None and len(scenarios) > 1:
         raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write a series for each.")
+    if options.nominal_share is not None and (options.continuous is not None or not scenarios):
+        raise InputError("Expected --nominal-share with --windows and --scenario only. Received: it without them. Leave it out.")
+    if options.start is not None and options.continuous is None:
+        raise InputError(f"Expected --start with --continuous only. Received: --start {options.start} with --windows. Leave it out.")
+    nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
+    shares = shares_of(scenarios, options.windows or 0, nominal_share, options.seed) if options.windows else []
+    start = None if options.start is None else start_of(options.start)
+    if options.continuous is not None:
+        parse_length(options.continuous)
+    from enhsim_tf.channels import models_of
+
     models = chosen_of(models_of(options.models), options.channel)
     paths = outputs_of(options.out, models, (".parquet",))
-    shares = shares_of(scenarios, options.windows or 0, options.nominal_share, options.seed)
-    if options.continuous is not None:
-        num_samples_of(options.continuous, 1.0)  # refused before TensorFlow is loaded
-    for channel, folder in models.items():
-        simulator = load(folder)
+
+    def write(channel: str) -> None:
+        simulator = load(models[channel])
         if options.continuous is None:
             write_windows_labelled(paths[channel], simulator, shares)
-            what = f"{options.windows:,} windows of {simulator.window} samples"
+            what = f"{counted(options.windows, 'window')} of {simulator.window} samples"
         else:
             length = num_samples_of(options.continuous, simulator.interval_s)
-            write_series_labelled(paths[channel], simulator, length, scenarios[0] if scenarios else None, options.seed)
-            what = f"{length:,} samples"
-        tell(f"{channel}: {what} in {paths[channel]}")
-    return 0
+            scenario = scenarios[0] if scenarios else None
+            write_series_labelled(paths[channel], simulator, length, scenario, options.seed, start)
+            what = f"{counted(length, 'sample')}, one every {simulator.interval_s:g} s"
+        tell(f"{printable(channel)}: {what} in {paths[channel]}")
+
+    return for_each(models, write)
 
 
 def run_score(options: argparse.Namespace) -> int:
     """Scores each channel of the source that has a simulator."""
     from enhsim_tf import detectors
-    from enhsim_tf.channels import models_of
-    from enhsim_tf.cleaning import clean
     from enhsim_tf.errors import InputError
     from enhsim_tf.scoring import ScoreOptions, score_channel, write_scores
-    from enhsim_tf.sources import read_source
 
     detector = {name.casefold().replace(" ", "-"): name for name in detectors.DETECTORS}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
-    models = models_of(options.models)
     cleaning = cleaning_of(options, 2)
+    from enhsim_tf.channels import models_of
+    from enhsim_tf.cleaning import clean
+    from enhsim_tf.sources import read_source
+
+    models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
     if len(models) == 1 and len(series) == 1:  # one of each belong together, whatever they are called
         models = dict(zip(series, models.values(), strict=True))
     unknown = [name for name in series if name not in models]
     if unknown:
         known = ", ".join(list(models)[:8])
-        raise InputError(f"Expected channels that were fitted: {known}. Received: {unknown[0]!r}. Name the others with --column.")
+        raise InputError(
+            f"Expected channels that were fitted: {printable(known)}. Received: {unknown[0]!r}. Name those to be scored with --column."
+        )
     paths = outputs_of(options.out, series, (".parquet", ".csv"))
-    for channel, raw in series.items():
-        cleaned = clean(raw, cleaning)
+    for path in paths.values():
+        if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
+            raise InputError(f"Expected another --out than the source. Received: {path} for both. Name another.")
+
+    def write(channel: str) -> None:
+        cleaned = clean(series[channel], cleaning)
         frame = score_channel(load(models[channel]), cleaned.parts, chosen)
         write_scores(paths[channel], frame)
         tell("\n".join(cleaned.report.lines()))
+        left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
+        scored = len(frame) - left
         tell(
-            f"{channel}: {frame['flag'].mean():.1%} of {len(frame):,} samples flagged by {chosen.detector}, set to flag "
-            f"{chosen.false_alarm_rate:.1%} of nominal ones; {int(frame['score'].isna().sum()):,} not scored; in {paths[channel]}"
+            f"{printable(channel)}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector}, "
+            f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal ones"
+            + (f"; {counted(left, 'sample')} not scored, in pieces shorter than a window" if left else "")
+            + f"; in {paths[channel]}"
         )
-    return 0
+
+    return for_each(series, write)
 
 
-def cleaning_of(options: argparse.Namespace, min_part: int):
+def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
+    """Does the work for each channel; one that cannot be used does not stop the others. Returns the exit code."""
+    from enhsim_tf.errors import InputError
+
+    channels, failed = list(channels), {}
+    for channel in channels:
+        try:
+            work(channel)
+        except InputError as error:
+            if len(channels) == 1:
+                raise
+            failed[channel] = str(error)
+    return tell_failed(failed)
+
+
+def tell_failed(failed: dict[str, str]) -> int:
+    """A line for each channel that could not be used; returns the exit code."""
+    for channel, reason in failed.items():
+        print(f"error: {printable(channel)}: {' '.join(reason.splitlines())}", file=sys.stderr)
+    return 2 if failed else 0
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: 1 window, 2,000 windows."""
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+
+
+def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
     """The options of cleaning."""
     from enhsim_tf.cleaning import Cleaning
 
@@ -241,29 +187,42 @@ def chosen_of(models: dict[str, Path], channels: list[str] | None) -> dict[str, 
 
     unknown = [name for name in channels or () if name not in models]
     if unknown:
-        raise InputError(f"Expected --channel, one of: {', '.join(list(models)[:8])}. Received: {unknown[0]!r}.")
+        raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
     return {name: models[name] for name in channels or models}
 
 
-def outputs_of(out: Path, channels, suffixes: tuple[str, ...]) -> dict[str, Path]:
-    """A file for each channel: the one that was named, or one a channel in the folder that was named."""
+def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
+    """A file for each channel: the one that was named, or one a channel in the folder that was named.
+
+    Args:
+        out: What was named.
+        channels: Names of the channels.
+        suffixes: Of the files that can be written; the first where a folder was named.
+
+    Raises:
+        InputError: If one file was named for several channels, or it cannot be written.
+    """
     from enhsim_tf.channels import folder_of
     from enhsim_tf.errors import InputError
     from enhsim_tf.files import make_folder
 
-    names = list(channels)
-    if out.suffix in suffixes:
+    names, is_folder = list(channels), os.path.isdir(out)
+    if out.suffix in suffixes and not is_folder:
         if len(names) > 1:
             raise InputError(f"Expected a folder for {len(names)} channels. Received: --out {out}. Name a folder, or one channel.")
         make_folder(out.parent)
         return {names[0]: out}
-    if out.suffix:
+    if out.suffix and not is_folder:
         raise InputError(f"Expected a file that ends in {' or '.join(suffixes)}, or a folder. Received: --out {out}.")
+    paths = {name: folder_of(out, name).with_suffix(suffixes[0]) for name in names}
+    for path in paths.values():
+        if os.path.isdir(path):
+            raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Name another --out.")
     make_folder(out)
-    return {name: folder_of(out, name).with_suffix(suffixes[0]) for name in names}
+    return paths
 
 
-def load(folder: Path):
+def load(folder: Path) -> "EnhancedSimulator":
     """The simulator of a folder."""
     from enhsim_tf.terminal import start_tensorflow
 

@@ -3,9 +3,16 @@
 import matplotlib.figure
 import matplotlib.style
 import numpy as np
+from matplotlib import font_manager
+from matplotlib.axes import Axes
 
-from enhsim_tf.channel_report import SEVERITY, ChannelReport
-from enhsim_tf.sheet import COARSE, DOUBLE, EDGE, ENHANCED, GENERATED, QUIET, REAL, STYLE, new_sheet, panels
+from enhsim_tf.channel_verdict import RATE, SEVERITY, ChannelReport
+from enhsim_tf.sheet import COARSE, DOUBLE, EDGE, ENHANCED, FOOT, GENERATED, LINE, QUIET, REAL, STYLE, new_sheet, title_words
+from enhsim_tf.terminal import printable
+
+_HEIGHT = 4.3  # inches
+_LEFT, _MIDDLE = (0.68, 3.36), (4.66, 7.0)  # where the columns of panels begin and end, inches from the left
+_BETWEEN = 0.62  # inches between two rows: an axis label below, a title above
 
 
 def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
@@ -14,40 +21,97 @@ def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
     Args:
         report: The report.
     """
-    name = "".join(letter if letter.isprintable() else "?" for letter in report.channel).replace("$", r"\$")[:60]
-    ours, coarse = report.nrmse["enhanced"], report.nrmse["coarse"]
-    title = f"{name}: the enhanced signal is {1 - ours / coarse:.0%} nearer to the telemetry than the coarse one"
-    if ours >= coarse:
-        title = f"{name}: the enhanced signal is no nearer to the telemetry than the coarse one"
-    where = "on telemetry that was held out" if report.is_held_out else "on the telemetry that it learnt from"
-    subtitle = f"NRMSE {coarse:.2f} coarse, {report.nrmse['ridge']:.2f} ridge regression, {ours:.2f} enhanced, {where}."
     with matplotlib.style.context(STYLE):
-        figure, down = new_sheet(DOUBLE, 4.0, title, subtitle)
-        (signal, alarms), (made, found) = panels(figure, down, 2, 2, gap=(0.45, 0.28))
-        for key, color, words in (("real", REAL, "telemetry"), ("coarse", COARSE, "coarse"), ("enhanced", ENHANCED, "enhanced")):
-            signal.plot(report.examples[key], color=color, label=words, linewidth=1)
-        signal.legend(frameon=False, fontsize=6, ncols=3, loc="upper center", bbox_to_anchor=(0.5, 1.16))
-        made.plot(report.examples["generated"], color=GENERATED, linewidth=1)
-        made.set_title("a generated window, with noise", fontsize=7, color=QUIET)
-        made.set_xlabel("sample")
-        for panel in (signal, made):
-            panel.set_ylabel("value")
-        _bars(alarms, report.false_alarms["generated"], report.false_alarms["real"], "false alarms on real windows")
-        kinds = list(next(iter(report.recall.values())))
-        best = {kind.replace("_", " "): max(rates[kind] for rates in report.recall.values()) for kind in kinds}
-        _bars(found, best, None, f"anomalies of {SEVERITY:g} sd found, best detector")
-        figure.text(EDGE / DOUBLE, 0.012, f"python -m enhsim_tf fit · windows of {report.window} samples", size=6.5, color=QUIET)
+        name, unit = drawable(report.channel), drawable(report.unit, 10)
+        where = "held-out telemetry" if report.is_held_out else "the telemetry it learnt from"
+        errors = {key: "not measurable" if np.isnan(error) else f"{error:.2f}" for key, error in report.nrmse.items()}
+        subtitle = (
+            f"Error on {where} (NRMSE, median window): {errors['coarse']} coarse, {errors['ridge']} ridge regression, "
+            f"{errors['enhanced']} enhanced. Left, above: the window with the median error; below: a generated window, with noise."
+        )
+        figure, down = new_sheet(DOUBLE, _HEIGHT, f"{name}: {_message(report)}", subtitle)
+        (signal, alarms), (made, found) = _grid(figure, down + 0.24)
+
+        signal.plot(report.examples["real"], color=REAL, linewidth=0.7)
+        signal.plot(report.examples["coarse"], color=COARSE, linewidth=1.0, linestyle=(0, (4, 1.5)), zorder=3)
+        signal.plot(report.examples["enhanced"], color=ENHANCED, linewidth=1.5)
+        title_words(signal, [("telemetry", REAL), ("coarse (dashed)", COARSE), ("enhanced (thick)", ENHANCED)])
+        made.plot(report.examples["generated"], color=GENERATED, linewidth=0.7)
+        title_words(made, [("generated", GENERATED)])
+        for axes in (signal, made):
+            axes.set_xlabel("sample")
+            _name_values(axes, "" if unit == "1" else unit)
+
+        _dots(alarms, report.false_alarms["generated"], report.false_alarms["real"])
+        alarms.axvline(100 * RATE, color=LINE, linewidth=0.6, zorder=0)
+        title_words(alarms, [("trained on generated (dots)", ENHANCED), ("real (rings)", REAL)])
+        alarms.set_xlabel(f"false alarms (%), set for {RATE:.0%} (line)")
+        kinds = {kind.replace("_", " "): share for kind, (_, share) in report.found.items()}
+        _dots(found, kinds)
+        title_words(found, [("trained on generated, best detector", ENHANCED)])
+        found.set_xlabel(f"found (%) of anomalies of {SEVERITY:g} sd of the noise")
+        if not kinds:
+            found.text(
+                0.5, 0.5, "no detector can be used:\neach has too many false alarms", ha="center", va="center", transform=found.transAxes
+            )
+        windows = f"{report.num_windows:,} windows" if report.num_windows != 1 else "1 window"
+        alone = "" if report.num_disjoint >= report.num_windows else f", of which {report.num_disjoint:,} share no sample"
+        foot = f"python -m enhsim_tf fit · windows of {report.window:,} samples · rates on {windows}{alone}"
+        figure.text(EDGE / DOUBLE, 0.08 / _HEIGHT, foot, size=7, color=QUIET)
     return figure
 
 
-def _bars(panel: matplotlib.axes.Axes, shares: dict[str, float], others: dict[str, float] | None, words: str) -> None:
-    places = np.arange(len(shares))[::-1]
-    panel.barh(places, [100 * share for share in shares.values()], 0.6 if others is None else 0.35, color=ENHANCED)
+def drawable(text: str, most_letters: int = 60) -> str:
+    """Text of one line that the font has letters for, without mathematics.
+
+    Args:
+        text: For example a channel's name, which may hold anything.
+        most_letters: What is longer is cut.
+    """
+    letters = font_manager.get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
+    known = "".join(letter if ord(letter) in letters else "?" for letter in printable(text))
+    return (known if len(known) <= most_letters else f"{known[: most_letters - 3]}...").replace("$", r"\$")
+
+
+def _message(report: ChannelReport) -> str:
+    ours, coarse = report.nrmse["enhanced"], report.nrmse["coarse"]
+    if np.isnan(ours) or np.isnan(coarse):
+        return "no window moves, so nothing can be said of the enhanced signal"
+    if ours >= coarse:
+        return "the enhanced signal is no nearer to the telemetry than the coarse one"
+    return f"the enhanced signal is {1 - ours / coarse:.0%} nearer to the telemetry than the coarse one"
+
+
+def _grid(figure: matplotlib.figure.Figure, down: float) -> list[list[Axes]]:
+    """Two rows of two panels: curves, and rates with the names of their rows beside them."""
+    bottom = FOOT + 0.36
+    height = (_HEIGHT - down - bottom - _BETWEEN) / 2
+    return [
+        [figure.add_axes((left / DOUBLE, foot / _HEIGHT, (right - left) / DOUBLE, height / _HEIGHT)) for left, right in (_LEFT, _MIDDLE)]
+        for foot in (bottom + height + _BETWEEN, bottom)
+    ]
+
+
+def _name_values(axes: Axes, unit: str) -> None:
+    """The value axis with its unit, and with the power of ten or the level that its numbers leave out."""
+    axes.locator_params(axis="y", nbins=5)
+    axes.ticklabel_format(axis="y", scilimits=(-3, 4))
+    axes.figure.draw_without_rendering()
+    left_out = axes.yaxis.get_offset_text()
+    left_out.set_visible(False)  # it would stand where the title does
+    about = ", ".join(word for word in (unit, left_out.get_text()) if word)
+    axes.set_ylabel(f"value ({about})" if about else "value")
+    axes.yaxis.set_label_coords(-0.5 / (_LEFT[1] - _LEFT[0]), 0.5)
+
+
+def _dots(axes: Axes, shares: dict[str, float], others: dict[str, float] | None = None) -> None:
+    """A dot for each share, a ring for what it is compared with, from the top down."""
+    heights = -np.arange(len(shares), dtype=float)
+    axes.hlines(heights, 0, [100 * share for share in shares.values()], color=ENHANCED, linewidth=0.8)
+    axes.plot([100 * share for share in shares.values()], heights, "o", color=ENHANCED, markersize=4, clip_on=False)
     if others is not None:
-        panel.barh(places - 0.36, [100 * others[name] for name in shares], 0.35, color=REAL)
-        words += " (%), trained on generated (blue), real (black)"
-    else:
-        words += " (%)"
-    panel.set_yticks(places, list(shares), fontsize=6)
-    panel.set_xlim(0, 100)
-    panel.set_title(words, fontsize=7, color=QUIET, loc="right")
+        ring = {"markersize": 7, "markerfacecolor": "none", "markeredgewidth": 0.8, "clip_on": False}
+        axes.plot([100 * others[name] for name in shares], heights, "o", color=REAL, **ring)
+    axes.set_yticks(heights, list(shares))
+    axes.set_ylim(0.6 - max(1, len(shares)), 0.6)
+    axes.set_xlim(-2, 102)

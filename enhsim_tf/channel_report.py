@@ -1,15 +1,16 @@
-"""What a simulator fitted to a channel is worth: its error, its noise, and what detectors trained on it say of real windows.
+"""Measures what a simulator fitted to a channel is worth: its error, its noise, what detectors trained on it say of real windows.
 
 Everything is measured on telemetry that the simulator has not seen, where there is any.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enhsim_tf import realism, robustness
+from enhsim_tf.channel_verdict import SEVERITY, ChannelReport
 from enhsim_tf.detectors import DETECTORS
 from enhsim_tf.pairs import at_level, cut_pairs, cut_parts, even_places
 from enhsim_tf.telemetry import Telemetry
@@ -18,101 +19,10 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors that train in a second
-NOTICED, MISSED = 0.8, 0.2  # shares of anomalies that count as found and as missed
-SEVERITY = 4.0  # standard deviations of the noise, of the anomalies that the verdict speaks of
 _NUM_WINDOWS = 1_000  # generated windows that a detector learns from; as many set its threshold
 _NUM_COMPARED = 200  # windows that errors and alarms are measured on, at most
-_RATE = 0.01
 _LEAST_NOISE_WINDOW, _NUM_NOISE_WINDOWS = 16, 40  # of the comparison of noises, which needs windows that share no sample
-_SUSPICIOUS = 2.0  # times its floor: from there on a measure tells generated noise from real
-
-
-@dataclasses.dataclass(frozen=True)
-class ChannelReport:
-    """The report on a fitted simulator.
-
-    Args:
-        channel: Name of the channel.
-        window: Samples of a window.
-        period_s: Period of the coarse simulator, in seconds (in samples where the channel has no time).
-        is_held_out: Whether it was measured on telemetry that the simulator has not seen.
-        num_windows: Real windows behind the errors and alarms; they overlap.
-        num_disjoint: How many of them share no sample: the honest size of the sample.
-        nrmse: Median error over windows, in units of each window's standard deviation: `coarse`, `ridge`, `enhanced`.
-        noise: Rows of `realism.Row` as dictionaries, generated against extracted noise; empty where telemetry is too short.
-        noise_window: Samples of the windows that noises were compared in.
-        false_alarms: Share of real windows that each detector alarms on, by what it was trained on: `generated`, `real`.
-        recall: Share of anomalies of `SEVERITY` that each detector trained on generated windows finds, by kind.
-        noise_sd: Standard deviation of the extracted noise, in the telemetry's unit.
-        examples: Windows for the figure: `coarse`, `enhanced`, `generated` and `real`.
-    """
-
-    channel: str
-    window: int
-    period_s: float
-    is_held_out: bool
-    num_windows: int
-    num_disjoint: int
-    nrmse: Mapping[str, float]
-    noise: Sequence[Mapping[str, Any]]
-    noise_window: int
-    false_alarms: Mapping[str, Mapping[str, float]]
-    recall: Mapping[str, Mapping[str, float]]
-    noise_sd: float
-    examples: Mapping[str, np.ndarray]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything but the examples, in plain JSON types."""
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name not in ("examples", "noise")} | {
-            "noise": [dict(row) for row in self.noise],
-            "verdict": self.verdict,
-        }
-
-    @property
-    def verdict(self) -> list[str]:
-        """What a detector trained on this would and would not notice, in plain sentences."""
-        where = "telemetry it has not seen" if self.is_held_out else "the telemetry it learnt from (none was held out)"
-        error = self.nrmse["enhanced"]
-        best = min(("coarse", "ridge"), key=lambda name: self.nrmse[name])
-        said = [
-            f"Signal: NRMSE {error:.3f} on {where}; the coarse simulator {self.nrmse['coarse']:.3f}, ridge regression "
-            f"{self.nrmse['ridge']:.3f}. "
-            + ("The enhancer earns its place." if error < self.nrmse[best] else f"The enhancer is no better than {best}.")
-        ]
-        told = [row["measure"] for row in self.noise if row["ratio"] > _SUSPICIOUS]
-        if not self.noise:
-            said.append("Noise: the telemetry is too short to compare its noise with generated noise.")
-        elif told:
-            said.append(f"Noise: of {len(self.noise)} measures these tell generated from extracted noise: {', '.join(told)}.")
-        else:
-            said.append(f"Noise: none of {len(self.noise)} measures tells generated from extracted noise.")
-        alarms = self.false_alarms["generated"]
-        said.append(
-            f"False alarms, set for {_RATE:.0%}, on {self.num_disjoint} windows that share no sample ({self.num_windows} that overlap): "
-            + ", ".join(
-                f"{name} {rate:.0%} (trained on real telemetry {self.false_alarms['real'][name]:.0%})" for name, rate in alarms.items()
-            )
-            + "."
-        )
-        best_of = {kind: max(rates, key=rates.get) for kind, rates in _by_kind(self.recall).items()}
-        found = {kind: self.recall[name][kind] for kind, name in best_of.items()}
-        noticed = [f"{kind.replace('_', ' ')} ({best_of[kind]})" for kind, rate in found.items() if rate >= NOTICED]
-        missed = [kind.replace("_", " ") for kind, rate in found.items() if rate <= MISSED]
-        said.append(
-            f"Anomalies of {SEVERITY:g} standard deviations of the noise: a detector trained on this notices "
-            f"{', '.join(noticed) or 'none of the kinds tried'}; it does not notice {', '.join(missed) or 'less than a fifth of none'}."
-        )
-        return said
-
-    def lines(self) -> list[str]:
-        """The report in plain words."""
-        where = f"{self.num_windows} windows held out" if self.is_held_out else "the telemetry it learnt from"
-        return [f"{self.channel}: windows of {self.window} samples, period {self.period_s:g}; measured on {where}", *self.verdict]
-
-
-def _by_kind(recall: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
-    kinds = next(iter(recall.values()))
-    return {kind: {name: rates[kind] for name, rates in recall.items()} for kind in kinds}
+_OFTEN = 3  # times that a value occurs, to be a level of quantised telemetry
 
 
 def report_on(
@@ -130,6 +40,7 @@ def report_on(
     window = simulator.window
     pairs = cut_pairs(held_out, simulator.coarse, even_places(held_out, window, _NUM_COMPARED), window, follow=True)
     enhanced = simulator.follow(pairs)
+    typical = _typical(enhanced, pairs.target)
     generated = simulator.generate(2 * _NUM_WINDOWS, seed=seed + 1)
     extracted = simulator.residual_windows(learnt, _NUM_WINDOWS, np.random.default_rng([seed, 2]))
     noise_sd = float(np.std(extracted, dtype=np.float64))
@@ -151,7 +62,7 @@ def report_on(
         max(wave.period_s for wave in simulator.coarse.waves),
         is_held_out,
         len(pairs),
-        sum(len(part) // window for part in held_out),
+        min(len(pairs), sum(len(part) // window for part in held_out)),
         {
             "coarse": _nrmse(pairs.coarse_at_level, pairs.target),
             "ridge": _nrmse(_ridge(simulator, learnt, pairs), pairs.target),
@@ -162,16 +73,51 @@ def report_on(
         {name: robustness.summary(tables["alarms"]) for name, tables in judged.items()},
         recall,
         noise_sd,
-        {"coarse": pairs.coarse_at_level[0], "enhanced": enhanced[0], "real": pairs.target[0], "generated": generated[0]},
+        {
+            "coarse": pairs.coarse_at_level[typical],
+            "enhanced": enhanced[typical],
+            "real": pairs.target[typical],
+            "generated": generated[0],
+        },
+        learnt[0].unit,
+        learnt[0].time_unit,
+        levels_of(np.concatenate([part.values for part in learnt])),
     )
 
 
-def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
-    """Median over windows of the error in units of the window's own standard deviation; flat windows say nothing."""
+def levels_of(values: np.ndarray) -> dict[str, float]:
+    """The `count` of levels of quantised values and the `step` between the nearest two; empty where they are not.
+
+    Args:
+        values: The telemetry; a few values that are none of its levels, such as those that fill gaps, do not count.
+    """
+    levels, counts = np.unique(values, return_counts=True)
+    often = levels[counts >= _OFTEN].astype(np.float64)
+    if not 2 <= len(often) <= len(values) // 10 or counts[counts >= _OFTEN].sum() < 0.99 * len(values):
+        return {}
+    step = float(np.diff(often).min())
+    multiples = (often - often[0]) / step
+    is_even = np.abs(multiples - np.round(multiples)).max() < 0.1  # the values of a wave without noise repeat too
+    return {"count": len(often), "step": step} if is_even else {}
+
+
+def _errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Error of each window in units of its own standard deviation; NaN where it is flat, which says nothing."""
     deviation = target.std(axis=1, dtype=np.float64)
     error = np.sqrt(np.mean((windows - target) ** 2, axis=1, dtype=np.float64))
-    moves = deviation > 0
-    return float(np.median(error[moves] / deviation[moves])) if moves.any() else float("nan")
+    return error / np.where(deviation > 0, deviation, np.nan)
+
+
+def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
+    """Median of the errors over windows that are not flat, NaN where all are."""
+    errors = _errors(windows, target)
+    return float(np.nanmedian(errors)) if np.isfinite(errors).any() else float("nan")
+
+
+def _typical(windows: np.ndarray, target: np.ndarray) -> int:
+    """The window whose error is nearest to the median."""
+    apart = np.abs(_errors(windows, target) - _nrmse(windows, target))
+    return int(np.argmin(np.where(np.isnan(apart), np.inf, apart)))
 
 
 def _ridge(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], pairs: Any) -> np.ndarray:

@@ -5,23 +5,30 @@ MODEL_DIR/volts/report.json, report.png
 """
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import multiprocessing
 import os
+import signal
+import threading
 import urllib.parse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.cleaning import Cleaning, clean
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import make_folder, replace_file, write_json
-from enhsim_tf.terminal import start_tensorflow
+from enhsim_tf.files import make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.terminal import printable, start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MANIFEST = "manifest.json"  # by it a folder is known as a saved simulator
+_OURS = '"enhsim_tf.EnhancedSimulator/'  # and by this in it as one of ours
+_THREADS = 2  # of TensorFlow for each channel: how it adds up depends on their number, so that must not depend on the workers
+_MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,8 +53,18 @@ class Job:
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """The folder of a channel: its name, percent-encoded so that no name can leave the folder or hide in it."""
-    return Path(models) / urllib.parse.quote(channel, safe=" ").replace(".", "%2E")
+    """The folder of a channel: its name, percent-encoded so that no name can leave the folder or hide in it.
+
+    Raises:
+        InputError: If the name is empty, or too long for a file.
+    """
+    encoded = urllib.parse.quote(channel, safe=" ").replace(".", "%2E")
+    if not 1 <= len(encoded) <= _MOST_LETTERS:
+        raise InputError(
+            f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
+            f"Received: {printable(channel)[:60]!r} with {len(encoded)}. Rename it, or name the other channels."
+        )
+    return Path(models) / encoded
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:
@@ -56,13 +73,27 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
     Raises:
         InputError: If there is none.
     """
-    models = Path(models)
-    if (models / MANIFEST).is_file():
+    models = Path(os.path.abspath(models))  # so that "." has a name too
+    if os.path.isfile(models / MANIFEST):  # asked in this way, a name that no file can have is no error
         return {urllib.parse.unquote(models.name): models}
-    folders = sorted(models.glob(f"[!.]*/{MANIFEST}")) if models.is_dir() else []
+    folders = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
     if not folders:
-        raise InputError(f"Expected a folder of fitted simulators. Received: {models}, which holds none. Make one with `fit`.")
+        raise InputError(
+            f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which holds none. Make one with `fit`."
+        )
     return {urllib.parse.unquote(folder.parent.name): folder.parent for folder in folders}
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Refuses a folder that holds something else than a saved simulator; an empty one is as good as none.
+
+    Raises:
+        InputError: If it does.
+    """
+    manifest, is_empty = folder / MANIFEST, folder.is_dir() and not any(folder.iterdir())
+    is_ours = manifest.is_file() and _OURS in manifest.read_text(encoding="utf-8", errors="replace")  # others have manifests too
+    if os.path.lexists(folder) and not (is_ours or is_empty):
+        raise InputError(f"Expected a folder for models. Received: {folder}, which holds something else. Name another --out.")
 
 
 def fit_channels(
@@ -81,51 +112,81 @@ def fit_channels(
         out: The folder of the models.
         options: Fields of `fitting.FitOptions`.
         cleaning: What to do with dirty values.
-        workers: Channels fitted at a time, each in a process of its own; 1 fits them here.
+        workers: Channels fitted at a time, each in a process of its own. Their number changes no bit of the simulators.
+            0 fits them in this process, with the threads that it has.
         tell: Called with each line.
-        verbose: Whether to show progress bars, with one worker.
+        verbose: Whether to show progress bars, where one channel is fitted at a time.
 
     Returns:
         For each channel that could not be fitted, why.
+
+    Raises:
+        InputError: If a channel has no usable name, or something else stands where a simulator would go; before any is fitted.
     """
     out = make_folder(out)
-    for name in series:
-        existing = folder_of(out, name)
-        if existing.exists() and not (existing / MANIFEST).is_file():
-            raise InputError(f"Expected a folder for models. Received: {existing}, which holds something else. Name another --out.")
+    if (out / MANIFEST).is_file():
+        raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
+    verbose = verbose and min(workers, len(series)) <= 1
     jobs = [Job(name, each, folder_of(out, name), dict(options), cleaning, verbose) for name, each in series.items()]
+    for job in jobs:
+        refuse_foreign(job.folder)
+    remove_leftovers(out)
+    if workers and jobs:
+        return _fit_in_processes(jobs, workers, tell)
     failed: dict[str, str] = {}
-    if min(workers, len(jobs)) <= 1:
-        for job in jobs:
-            try:
-                lines = fit_job(job)
-            except InputError as error:
-                failed[job.channel] = str(error)
-            else:
-                tell("\n".join(lines))
-        return failed
-    threads = str(max(1, (os.cpu_count() or 1) // workers))
-    context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
-    with concurrent.futures.ProcessPoolExecutor(workers, context, _set_threads, (threads,)) as pool:
-        running = {pool.submit(fit_job, job): job for job in jobs}
+    for job in jobs:
         try:
-            for done in concurrent.futures.as_completed(running):
-                try:
-                    tell("\n".join(done.result()))
-                except InputError as error:
-                    failed[running[done].channel] = str(error)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+            tell("\n".join(fit_job(job)))
+        except InputError as error:
+            failed[job.channel] = str(error)
     return failed
 
 
-def _set_threads(threads: str) -> None:
-    os.environ |= {"TF_NUM_INTRAOP_THREADS": threads, "OMP_NUM_THREADS": threads}
+def _fit_in_processes(jobs: list[Job], workers: int, tell: Callable[[str], None]) -> dict[str, str]:
+    """Each channel in a process of its own; one that fails or is killed does not stop the others' results."""
+    failed: dict[str, str] = {}
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
+    with concurrent.futures.ProcessPoolExecutor(min(workers, len(jobs)), context, _begin) as pool:
+        with _ignored_interrupts():  # processes inherit it: at an interrupt they are ended below, without a word
+            running = {pool.submit(fit_job, job): job for job in jobs}
+        try:
+            for done in concurrent.futures.as_completed(running):
+                channel = running[done].channel
+                try:
+                    tell("\n".join(done.result()))
+                except InputError as error:
+                    failed[channel] = str(error)
+                except BrokenProcessPool:
+                    failed[channel] = "Expected to fit it in a process. Received: one that was killed, perhaps for memory. Use --workers 1."
+        finally:
+            if not all(future.done() for future in running):  # at an interrupt
+                pool.shutdown(wait=False, cancel_futures=True)
+                for child in set(multiprocessing.active_children()) - before:
+                    child.terminate()
+    return failed
+
+
+def _begin() -> None:
+    """Begins a process: its threads, before TensorFlow is imported."""
+    os.environ["TF_NUM_INTRAOP_THREADS"] = str(_THREADS)
+
+
+@contextlib.contextmanager
+def _ignored_interrupts() -> Iterator[None]:
+    """Ignores interrupts for a moment, where that can be chosen: in the main thread."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def fit_job(job: Job) -> list[str]:
-    """Cleans, fits and writes one channel; returns the lines of its reports.
+    """Cleans, fits and writes one channel, whole or not at all; returns the lines of its reports.
 
     Raises:
         InputError: If the channel cannot be used.
@@ -137,8 +198,9 @@ def fit_job(job: Job) -> list[str]:
 
     parts = [dataclasses.replace(part, name=job.channel) for part in cleaned.parts]
     simulator, report = fit_channel(parts, FitOptions(**job.options), "auto" if job.verbose else 0)
-    simulator.save(job.folder)
-    write_json(job.folder / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
-    with replace_file(job.folder / "report.png") as temporary:
-        channel_figure(report).savefig(temporary, dpi=200, format="png")
+    refuse_foreign(job.folder)  # it has been minutes
+    with replace_folder(job.folder) as temporary:
+        simulator.save(temporary)
+        write_json(temporary / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
+        channel_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
     return [*cleaned.report.lines(), *report.lines(), f"simulator, report.json and report.png in {job.folder}/"]

@@ -122,7 +122,13 @@ def random_places(parts: Sequence[Telemetry], window: int, num_windows: int, rng
 
 
 def even_places(parts: Sequence[Telemetry], window: int, num_windows: int) -> np.ndarray:
-    """Places spread evenly over the stretches, in the order of time: at most `num_windows`, none twice."""
+    """Places spread evenly over the stretches, in the order of time.
+
+    Args:
+        parts: Stretches of one series.
+        window: Samples of a window.
+        num_windows: Number of places, at most; none comes twice.
+    """
     places = num_places(parts, window)
     return np.unique(np.linspace(0, places - 1, min(num_windows, places)).astype(np.int64))
 
@@ -137,9 +143,14 @@ def cut_parts(parts: Sequence[Telemetry], places: np.ndarray, window: int) -> tu
 
     Returns:
         The windows, float32 of shape `(windows, samples)`, and when each begins in seconds, shape `(windows,)`.
+
+    Raises:
+        InputError: If no whole window begins at one of the places.
     """
     places, usable = np.asarray(places), [part for part in parts if len(part) >= window]
     firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
+    if len(places) and not 0 <= places.min() <= places.max() < firsts[-1]:
+        raise InputError(f"Expected places from 0 to before {firsts[-1]}. Received: from {places.min()} to {places.max()}.")
     which = np.searchsorted(firsts, places, "right") - 1
     windows, time_s = np.empty((len(places), window), np.float32), np.empty(len(places))
     for number, part in enumerate(usable):

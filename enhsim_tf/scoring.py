@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
-_THRESHOLD_WINDOWS = 100  # length of the generated series that sets the threshold
+_THRESHOLD_WINDOWS = 1_000  # length of the generated series that sets the threshold: neighbouring scores are alike, so few are too few
 _STRIDES = 8  # scored windows a window's length
 
 
@@ -76,7 +76,9 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
             "Give telemetry of the same rate, or --interval."
         )
     if all(len(part) < window for part in parts):
-        raise InputError(f"Expected a stretch of at least a window of {window} samples. Received: {max(map(len, parts))}. Give more.")
+        raise InputError(
+            f"Expected a stretch of at least a window of {window} samples. Received: {max(map(len, parts), default=0)}. Give more."
+        )
     training = simulator.generate(options.num_windows, seed=options.seed)
     detector = DETECTORS[options.detector](options.seed).fit(training)
     nominal = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 1)

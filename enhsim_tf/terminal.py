@@ -14,11 +14,22 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Refuses the command line."""
+        missing = message.partition("arguments are required: ")[2]
+        if missing:
+            raise InputError(f"Expected {missing}. Received: no such argument. See {self.prog} --help.")
         raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
 
 
+def printable(text: str) -> str:
+    """Text for one line of a terminal: what cannot be printed, such as a line's end, becomes a question mark."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
 def finish(run: Callable[[], int], interrupted: str) -> int:
-    """Runs a command and returns its exit code: 2 and one line for a user's mistake, 130 for an interrupt.
+    """Runs a command and returns its exit code.
+
+    It is 2 with one line for a user's mistake and for what the machine refuses, 130 for an interrupt, and 141, as a shell
+    has it, where whoever read the output has left.
 
     Args:
         run: The command; returns its exit code.
@@ -27,7 +38,16 @@ def finish(run: Callable[[], int], interrupted: str) -> int:
     try:
         return run()
     except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {' '.join(str(error).splitlines())}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it once more at its end
+        return 141
+    except (OSError, MemoryError) as error:
+        reason = " ".join(str(error).splitlines()) or "more than there is"
+        print(
+            f"error: Expected files and memory as they are needed. Received: {reason[:300]}. Make room, or ask for less.", file=sys.stderr
+        )
         return 2
     except KeyboardInterrupt:
         print(interrupted, file=sys.stderr)

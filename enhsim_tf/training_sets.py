@@ -6,7 +6,8 @@ first sample that it concerns.
 
 import dataclasses
 import os
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,10 +18,13 @@ from enhsim_tf.files import make_folder, replace_file
 from enhsim_tf.simulator import MODES, Degraded
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 NOMINAL = "nominal"
-_WRITTEN = 65_536  # samples of a series written at a time
+_SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
+_LENGTH = re.compile(r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?")  # samples are whole
 _MOST_SAMPLES = 20_000_000  # of a continuous series, which is made in memory
 
 
@@ -55,23 +59,54 @@ def parse_scenario(text: str) -> Degraded:
     return Degraded(mode, *values)
 
 
-def num_samples_of(length: str, interval_s: float) -> int:
-    """Samples of a length such as `1d`, `6h`, `90min`, `30s`, or a number of samples.
+def parse_length(text: str) -> tuple[float, str]:
+    """Reads a length such as `1d`, `6h`, `90min`, `30s`, or a number of samples: `(86400.0, "s")`, `(5000.0, "samples")`.
 
     Raises:
-        InputError: If it is no length, or less than a sample.
+        InputError: If it is no length.
+    """
+    found = _LENGTH.fullmatch(text.casefold())
+    length = float(found["number"]) if found else 0.0
+    if not 0 < length < float("inf"):
+        raise InputError(f"Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: {text[:80]!r}.")
+    return (length * _SECONDS[found["unit"]], "s") if found["unit"] else (length, "samples")
+
+
+def num_samples_of(text: str, interval_s: float) -> int:
+    """Samples of a length, as `parse_length` reads it.
+
+    Args:
+        text: The length.
+        interval_s: Sampling interval in seconds.
+
+    Raises:
+        InputError: If it is no length, less than a sample or more than is made at once.
+    """
+    length, unit = parse_length(text)
+    samples = round(length if unit == "samples" else length / interval_s)
+    if not 1 <= samples <= _MOST_SAMPLES:
+        raise InputError(
+            f"Expected a length of 1 to {_MOST_SAMPLES:,} samples, one every {interval_s:g} s. Received: {text[:80]!r}, which is "
+            f"{samples:,}. Write several series, each with its --seed."
+        )
+    return samples
+
+
+def start_of(start: "str | pd.Timestamp") -> "pd.Timestamp":
+    """A start in UTC, such as that of `2024-01-01`, which names no zone and is taken as UTC.
+
+    Raises:
+        InputError: If it is no time, or too early or late for nanoseconds.
     """
     import pandas as pd
 
     try:
-        samples = int(length) if length.isdecimal() else round(pd.Timedelta(length).total_seconds() / interval_s)
-    except (ValueError, OverflowError):
-        samples = 0
-    if not 1 <= samples <= _MOST_SAMPLES:
-        raise InputError(
-            f"Expected a length such as 1d, 6h, 90min or 5000 (samples), up to {_MOST_SAMPLES:,} samples. Received: {length!r}."
-        )
-    return samples
+        time = pd.to_datetime(start, utc=True, format="ISO8601").as_unit("ns")
+    except (ValueError, TypeError, OverflowError, AttributeError):
+        time = pd.NaT
+    if pd.isna(time) or not 1700 <= time.year <= 2200:
+        raise InputError(f"Expected a start such as 2024-01-01 or 2024-01-01T12:00, from 1700 to 2200. Received: {str(start)[:80]!r}.")
+    return time
 
 
 def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: float, seed: int) -> list[Share]:
@@ -82,6 +117,9 @@ def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: fl
         num_windows: Windows in all.
         nominal_share: Share of them that is nominal, where there are scenarios.
         seed: Seed of the whole set.
+
+    Raises:
+        InputError: If the share is not from 0 to 1, or a scenario would get no window.
     """
     if not 0 <= nominal_share <= 1:
         raise InputError(f"Expected a nominal share from 0 to 1. Received: {nominal_share}.")
@@ -90,6 +128,11 @@ def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: fl
         (num_windows - num_nominal) // len(scenarios) + (number < (num_windows - num_nominal) % len(scenarios))
         for number in range(len(scenarios))
     ]
+    if scenarios and nominal_share < 1 and counts[-1] == 0:
+        raise InputError(
+            f"Expected a window for each of {len(scenarios)} scenarios at least. Received: {num_windows} windows, a share of "
+            f"{nominal_share:g} of them nominal. Ask for more windows."
+        )
     seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
     return [Share(*each) for each in zip([None, *scenarios], counts, seeds, strict=True) if each[1]]
 
@@ -129,47 +172,74 @@ def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulato
                 writer.write_table(pa.table(columns, schema=schema))
 
 
-def write_series_labelled(
-    path: str | os.PathLike, simulator: "EnhancedSimulator", num_samples: int, scenario: Degraded | None, seed: int
-) -> None:
-    """Writes one continuous series to a Parquet file: `time_s`, `value`, `scenario`, `severity`, a row a sample.
-
-    Before its onset a scenario's rows are nominal.
+def series_labelled(
+    simulator: "EnhancedSimulator",
+    num_samples: int,
+    scenario: Degraded | None = None,
+    seed: int = 0,
+    start: "str | pd.Timestamp | None" = None,
+) -> "pd.DataFrame":
+    """One continuous series with its labels. Before its onset a scenario's rows are nominal.
 
     Args:
-        path: The file.
         simulator: What makes it.
         num_samples: Its length.
         scenario: A degraded mode, or None.
         seed: Seed of everything drawn.
+        start: When its first sample is taken, such as "2024-01-01"; UTC where it names no zone. None: time is counted from 0.
+
+    Returns:
+        A frame with the columns `value`, `scenario` (categorical) and `severity`, a row a sample. Its index is a `DatetimeIndex` in UTC
+        called `time`, or, without a start, seconds called `time_s`.
+
+    Raises:
+        InputError: If the start is no time.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    import pandas as pd
 
-    values = simulator.generate_series(num_samples, scenario, seed)
     name, severity, onset = _labels(scenario, num_samples)
-    schema = pa.schema({"time_s": pa.float64(), "value": pa.float32(), "scenario": pa.string(), "severity": pa.float32()})
+    seconds = np.arange(num_samples) * simulator.interval_s
+    index = pd.Index(seconds, name="time_s")
+    if start is not None:
+        index = pd.DatetimeIndex(start_of(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"), name="time")
+    late = np.zeros(num_samples, bool) if onset is None else np.arange(num_samples) >= onset
+    columns = {
+        "value": simulator.generate_series(num_samples, scenario, seed),
+        "scenario": pd.Categorical.from_codes(late.astype(np.int8), list(dict.fromkeys([NOMINAL, name]))),
+        "severity": np.where(late, severity, 0).astype(np.float32),
+    }
+    return pd.DataFrame(columns, index=index)
+
+
+def write_series_labelled(
+    path: str | os.PathLike,
+    simulator: "EnhancedSimulator",
+    num_samples: int,
+    scenario: Degraded | None,
+    seed: int,
+    start: "str | pd.Timestamp | None" = None,
+) -> None:
+    """Writes the frame of `series_labelled` to a Parquet file, its index as the first column.
+
+    Args:
+        path: The file.
+        simulator: What makes the series.
+        num_samples: Its length.
+        scenario: A degraded mode, or None.
+        seed: Seed of everything drawn.
+        start: When its first sample is taken, or None.
+    """
     make_folder(Path(path).parent)
-    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
-        for first, stop in _stretches(num_samples):
-            samples = np.arange(first, stop)
-            late = np.zeros(len(samples), bool) if onset is None else samples >= onset
-            columns = [
-                pa.array(samples * simulator.interval_s),
-                pa.array(values[first:stop]),
-                pa.array(np.where(late, name, NOMINAL).tolist()),
-                pa.array(np.where(late, severity, 0).astype(np.float32)),
-            ]
-            writer.write_table(pa.table(columns, schema=schema))
-
-
-def _stretches(num_samples: int) -> Iterator[tuple[int, int]]:
-    for first in range(0, num_samples, _WRITTEN):
-        yield first, min(first + _WRITTEN, num_samples)
+    frame = series_labelled(simulator, num_samples, scenario, seed, start)
+    with replace_file(path) as temporary:
+        frame.reset_index().to_parquet(temporary, compression="zstd", index=False)
 
 
 def _labels(scenario: Degraded | None, num_samples: int) -> tuple[str, float, int | None]:
     """Name, severity and first sample of a scenario; one of severity 0 is nominal."""
     if scenario is None or scenario.severity == 0:
         return NOMINAL, 0.0, None
-    return scenario.mode, scenario.severity, int(round(scenario.onset * num_samples, 6))
+    onset = int(round(scenario.onset * num_samples, 6))  # as `simulator.degrade` counts
+    if onset >= num_samples:
+        raise InputError(f"Expected an onset within {num_samples} samples. Received: {scenario.onset}. Choose an earlier one.")
+    return scenario.mode, scenario.severity, onset

@@ -15,6 +15,7 @@ from enhsim_tf.enhancer import build_enhancer
 from enhsim_tf.files import sha256
 from enhsim_tf.noise import GaussianNoise, extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.pairs import cut_pairs, even_places
 from enhsim_tf.simulator import MODES, Degraded, SquareWave, SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
 
@@ -394,6 +395,85 @@ def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batch
     true = np.std(steps[2_250:])  # of the quarter that the noise is taken from
     assert scales["moving average"] < 0.3 * true
     assert 0.9 * true < scales["enhancer"] < 1.5 * true  # the error of a little trained enhancer comes on top
+
+
+# telemetry that drifts away
+
+
+def drifting(number=4_000):
+    """A sine of 40 samples whose level and amplitude grow for ever: at its end both are far outside what the beginning had."""
+    places = np.arange(number)
+    clean = 100 + 0.005 * places + (1 + places / 1_000) * np.sin(2 * np.pi * places / 40)
+    return Telemetry((clean + 0.02 * np.random.default_rng(0).standard_normal(number)).astype(np.float32))
+
+
+@pytest.fixture(scope="module")
+def followers():
+    """Simulators that follow the telemetry and that do not, fitted to its first half."""
+    coarse, counts = SquareWaveSimulator([SquareWave(40, low=99, high=101)]), {"window": 80, "num_windows": 300, "epochs": 6}
+    settings = {"noise": "convolutional", "extraction": "enhancer", "held_out": 0.0, "decay": True, "num_iterations": 2, "verbose": 0}
+    learnt = drifting().part(0, 2_000)
+    parts = [learnt.part(0, 1_100), learnt.part(1_150, 2_000)]
+    return {follow: EnhancedSimulator.fit(parts, coarse, 0, **counts, **settings, follow=follow) for follow in (True, False)}
+
+
+def test_following_keeps_the_error_small_where_level_and_amplitude_have_left_their_range(followers):
+    later, errors = drifting().part(2_500, 4_000), {}
+    for follow, simulator in followers.items():
+        pairs = cut_pairs([later], simulator.coarse, even_places([later], 80, 50), 80, follow)
+        enhanced = simulator.follow(pairs)
+        errors[follow] = np.median(np.sqrt(np.mean((enhanced - pairs.target) ** 2, axis=1)) / pairs.target.std(axis=1))
+    assert errors[True] < 0.3 and errors[False] > 3  # units of each window's own deviation
+    assert followers[False].levels is None
+    levels = followers[True].levels
+    assert levels.shape == (500, 2) and np.corrcoef(levels[:, 1], np.arange(500))[0, 1] > 0.95  # in the order of time: it grows
+    middle = levels[:, 0] + 100 * levels[:, 1]  # of each window
+    assert middle.min() > 99.5 and middle.max() < 100.5 + 0.005 * 2_000 and np.ptp(middle) > 8
+
+
+def test_generated_windows_have_levels_and_amplitudes_that_were_seen(followers):
+    simulator = followers[True]
+    windows = simulator.generate_coarse(400, seed=1)
+    centre, amplitude = (windows.max(axis=1) + windows.min(axis=1)) / 2, np.ptp(windows, axis=1) / 2
+    shift, gain = simulator.levels.T
+    known_levels = np.stack([shift + 100 * gain, gain], axis=1)  # the coarse simulator's own are 100 and 1
+    nearest = np.abs(known_levels[None] - np.stack([centre, amplitude], axis=1)[:, None]).max(axis=2).min(axis=1)
+    assert nearest.max() < 1e-3
+    assert np.ptp(centre) > 8 and len(np.unique(np.round(amplitude, 4))) > 100
+
+
+def test_levels_come_back_from_the_folder(followers, tmp_path):
+    for follow, simulator in followers.items():
+        simulator.save(tmp_path / str(follow))
+        loaded = EnhancedSimulator.load(tmp_path / str(follow))
+        assert (loaded.levels is None) is (not follow) and loaded.trained["follow"] is follow
+        if follow:
+            assert (loaded.levels == simulator.levels).all()
+        assert (loaded.generate(7, seed=4) == simulator.generate(7, seed=4)).all()
+        assert (loaded.generate_series(500, seed=4) == simulator.generate_series(500, seed=4)).all()
+
+
+def test_a_series_with_levels_has_no_seams():
+    # a coarse signal of one value: each window is a constant, and the series goes from one to the next as the fade does
+    one = SquareWaveSimulator([SquareWave(1e9, low=0.0, high=1.0)])
+    levels = np.random.default_rng(2).normal(0, 1, (7, 2))
+    simulator = EnhancedSimulator(one, identity(60), GaussianNoise(0.0, 60), levels=levels)
+    series = simulator.generate_series(3_000, seed=5).astype(np.float64)
+    constants = levels.sum(axis=1)
+    largest = np.abs(np.diff(constants)).max()  # there and back again: neighbours in time only
+    assert np.abs(np.diff(series)).max() <= largest * np.pi / 60 + 1e-6
+    assert series.min() >= constants.min() - 1e-6 and series.max() <= constants.max() + 1e-6
+    assert np.ptp(series) > 0.9 * np.ptp(constants)  # in 100 half windows every level has its turn
+
+
+def test_a_fitted_series_with_levels_has_no_seams(followers):
+    fitted = followers[True]
+    simulator = EnhancedSimulator(fitted.coarse, fitted.enhancer, GaussianNoise(0.0, 80), 1.0, fitted.offset, fitted.scale, fitted.levels)
+    series = simulator.generate_series(8_000, seed=3)
+    steps, inside = np.abs(np.diff(series)), np.abs(np.diff(simulator.generate(200, seed=3), axis=1))
+    assert steps.max() < 1.2 * inside.max()
+    seams = np.arange(40, 7_960, 40) - 1  # where a window begins or ends
+    assert steps[seams].max() < 1.2 * inside.max() and np.ptp(series) > np.ptp(fitted.levels[:, 1])
 
 
 def test_fit_refuses_what_it_does_not_know(refused):

@@ -4,7 +4,8 @@ import argparse
 import sys
 import time
 from pathlib import Path
-from typing import NoReturn
+
+from enhsim_tf.terminal import Parser, finish
 
 EXAMPLES = """\
 examples:
@@ -25,22 +26,13 @@ exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the in
 NOISES = ("white", "autoregressive", "heteroscedastic", "shot")
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose refusals are those of the whole command: one line, exit code 2."""
-
-    def error(self, message: str) -> NoReturn:
-        from enhsim_tf.errors import InputError
-
-        raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
-
-
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Reads the command line; imports nothing that is slow.
 
     Raises:
         InputError: If an option is unknown or its value is not of its kind.
     """
-    parser = _Parser(
+    parser = Parser(
         prog="python -m enhsim_tf.reproduce",
         description="Reproduces Feldman 2020, 'Training robust anomaly detection using ML-Enhanced simulations', end to end.",
         epilog=EXAMPLES,
@@ -272,16 +264,7 @@ def make_folders(options: argparse.Namespace) -> Path:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; a user's mistake is one line and exit code 2."""
-    from enhsim_tf.errors import InputError
-
-    try:
-        return run(parse(arguments))
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted; finished stages are kept, the next run goes on behind them", file=sys.stderr)
-        return 130
+    return finish(lambda: run(parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them")
 
 
 if __name__ == "__main__":
