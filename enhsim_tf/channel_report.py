@@ -38,8 +38,9 @@ def report_on(
         seed: Seed of everything drawn.
     """
     window = simulator.window
-    pairs = cut_pairs(held_out, simulator.coarse, even_places(held_out, window, _NUM_COMPARED), window, follow=True)
-    enhanced = simulator.follow(pairs)
+    places = even_places(held_out, window, _NUM_COMPARED)
+    pairs = cut_pairs(held_out, simulator.coarse, places, window, follow=True)  # as the coarse signal alone can be set
+    enhanced = simulator.follow(simulator.pairs(held_out, places))
     typical = _typical(enhanced, pairs.target)
     generated = simulator.generate(2 * _NUM_WINDOWS, seed=seed + 1)
     extracted = simulator.residual_windows(learnt, _NUM_WINDOWS, np.random.default_rng([seed, 2]))
@@ -138,7 +139,7 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     for part in whole:
         places += list(before + np.arange(0, len(part) - window + 1, window))
         before += len(part) - window + 1
-    pairs = cut_pairs(whole, simulator.coarse, np.array(places), window, follow=True)
+    pairs = simulator.pairs(whole, np.array(places))
     residual = pairs.target - simulator.follow(pairs)
     pieces = max(1, -(-_NUM_NOISE_WINDOWS // len(residual)))
     short = window // pieces
