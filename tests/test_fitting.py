@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -110,14 +111,14 @@ def test_what_is_held_out_is_in_nothing_that_was_learnt(unmeasured):
 
 @pytest.mark.parametrize(("held_out", "num_learnt", "is_held_out"), [(0.0, 2_000, False), (0.05, 1_900, False), (0.5, 1_000, True)])
 def test_too_little_to_hold_out_is_told(unmeasured, monkeypatch, held_out, num_learnt, is_held_out):
-    monkeypatch.setattr(EnhancedSimulator, "fit", lambda *arguments, **options: None)
+    monkeypatch.setattr(EnhancedSimulator, "fit", lambda *arguments, **options: SimpleNamespace(window=options["window"]))
     _, about = fit_channel([channel()], dataclasses.replace(TINY, held_out=held_out), 0)
     assert sum(map(len, about[1])) == num_learnt and about[3] is is_held_out
     assert (sum(map(len, about[2])) == 2_000 * held_out) or about[2] is about[1] or about[2] == about[1]
 
 
 def test_stretches_shorter_than_a_window_are_not_learnt_from(unmeasured, monkeypatch):
-    monkeypatch.setattr(EnhancedSimulator, "fit", lambda telemetry, *arguments, **options: None)
+    monkeypatch.setattr(EnhancedSimulator, "fit", lambda telemetry, *arguments, **options: SimpleNamespace(window=options["window"]))
     whole = channel()
     _, about = fit_channel([whole.part(0, 63), whole.part(100, 1_000), whole.part(1_010, 2_000)], TINY, 0)
     assert [len(part) for part in about[1]] == [900, pytest.approx(600, abs=5)]
