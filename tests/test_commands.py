@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf import detectors
+from enhsim_tf import channel_report, commands, detectors
 from enhsim_tf.__main__ import main
 from enhsim_tf.commands import DETECTORS, parse
 from enhsim_tf.enhanced_simulator import EnhancedSimulator
@@ -219,6 +219,34 @@ def test_every_channel_that_cannot_be_fitted_has_its_line(told, tmp_path):
     assert code == 2 and [line.split(": ")[1] for line in errors] == ["volts", "amps"] and out == ""
     assert all("Expected something periodic" in line for line in errors)
     assert not list((tmp_path / "models").iterdir())
+
+
+# what the README says
+
+
+def test_the_commands_of_the_readme_can_be_asked():
+    texts = [(ROOT / "README.md").read_text(encoding="utf-8"), commands.EXAMPLES]
+    lines = [line.strip() for text in texts for line in text.splitlines()]
+    asked = [line.split()[3:] for line in lines if line.startswith("python -m enhsim_tf ") and "--help" not in line]
+    assert [words[0] for words in asked] == ["fit", "generate", "score"] * 2
+    for words in asked:
+        assert parse(words).command == words[0]
+
+
+def test_the_python_of_the_readme_does_what_it_says(tmp_path, monkeypatch, capsys):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (snippet,) = [part.partition("```")[0] for part in readme.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
+    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
+        "num_windows=1000", "num_windows=20"
+    )
+    table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(channel_report, "_NUM_WINDOWS", 60)
+    made = {}
+    exec(snippet, made)
+    assert made["windows"].shape == (20, 64) and made["day"].shape == (8_640, 3) and made["scores"].shape == (1_500, 3)
+    assert all(isinstance(made[name].index, pd.DatetimeIndex) for name in ("day", "scores", "series"))
+    assert (tmp_path / "model_dir" / "manifest.json").is_file() and "Anomalies of 4 standard" in capsys.readouterr().out
 
 
 # what is refused
