@@ -36,7 +36,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
         values = [about["nrmse"][method] for about in channels.values()]
         axes.plot(values, -np.arange(len(values)), marker, color=colour, markersize=5, label=method)
     axes.set_yticks(-np.arange(len(channels)), list(channels))
-    axes.set_xlim(0, None)
+    axes.set_xlim(0, 1.08 * max(max(about["nrmse"][name] for name in ("coarse", "ridge", "enhanced")) for about in channels.values()))
     axes.set_xlabel("NRMSE")
     axes.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(-0.05, 1.0), handletextpad=0.2, columnspacing=1.0)
     return figure

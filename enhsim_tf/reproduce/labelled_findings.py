@@ -18,6 +18,8 @@ LARGEST_RATIO = 1.5
 """Of false alarms, trained on generated over trained on real telemetry: fixed before the first run."""
 NEARER = 2 / 3
 """Largest error of the enhanced over the coarse signal that counts as nearer by a third."""
+SATURATED = 0.9
+"""Where both trainings alarm on more than this share of nominal windows, their ratio says nothing."""
 _LABELS = ("arm", "detector", "channel", "class", "method")
 _CONTROLS = ("random score", "largest step", "moving deviation", "oracle")
 
@@ -64,8 +66,14 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     """
     channels = {name: _channel(tables, name) for name in dict.fromkeys(tables["alarms"]["channel"])}
     arms = {arm: _arm(tables, arm) for arm in (*ARMS, DEGRADED_ARM)}
+    both = [
+        min(about["false_alarms"][GENERATED_ARM][detector], about["false_alarms"]["real"][detector])
+        for about in channels.values()
+        for detector in about["ratios"]
+    ]
     return {
         "channels": channels,
+        "pairs": {"number": len(both), "saturated": sum(rate > SATURATED for rate in both), "above": SATURATED},
         "arms": arms,
         "controls": {name: _control(tables, name) for name in _CONTROLS},
         "num_sequences": sum(len(about["sequences"]) for about in channels.values()),
