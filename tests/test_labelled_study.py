@@ -1,6 +1,7 @@
 """The study of labelled telemetry, run as a user does on a small data set whose channels are known."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,10 +12,13 @@ from enhsim_tf.labelled import load_channel
 from enhsim_tf.reproduce.__main__ import main
 from enhsim_tf.reproduce.labelled_figures import FIGURES
 from enhsim_tf.reproduce.labelled_findings import read_tables, summarise
+from enhsim_tf.reproduce.labelled_run import table
 from enhsim_tf.reproduce.labelled_study import ARMS, DEGRADED_ARM, GENERATED_ARM, ChannelStudy, _of_samples
+from enhsim_tf.reproduce.robustness_report import findings_of
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
 
+ROOT = Path(__file__).parents[1]
 SEQUENCES = {"W-1": [[900, 1099]], "W-2": [[400, 459], [1200, 1259]]}
 
 
@@ -106,6 +110,13 @@ def test_findings_are_those_of_the_tables(out, found):
     rates = read_tables(out)["alarms"].query("channel == 'W-1' and arm == @GENERATED_ARM and detector == 'limit check'")
     expected = rates["alarms"].sum() / rates["windows"].sum()
     assert found["channels"]["W-1"]["false_alarms"][GENERATED_ARM]["limit check"] == pytest.approx(expected)
+
+
+def test_the_projects_report_and_readme_are_those_of_its_tables():
+    kept = findings_of(ROOT, "labelled")
+    again = json.loads(json.dumps(summarise(read_tables(ROOT / "figures" / "labelled"))))
+    assert again == {key: kept[key] for key in again} and kept["budget"] == "full"
+    assert table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_figures_are_there(out):

@@ -115,6 +115,30 @@ def draw(found: dict[str, Any], folder: Path, names: Sequence[str] = ()) -> list
     return paths
 
 
+def table(found: dict[str, Any]) -> str:
+    """The README's table, a channel a row."""
+    from enhsim_tf.reproduce.labelled_study import GENERATED_ARM
+
+    rows = [
+        "| channel | NRMSE coarse | ridge | enhanced | false alarms, trained on its past | on generated | sequences found, past | generated |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, about in found["channels"].items():
+        error = about["nrmse"]
+        cells = [f"{error[method]:.3f}" for method in ("coarse", "ridge", "enhanced")]
+        cells += [
+            f"{100 * sum(rates.values()) / len(rates):.0f} %" for rates in (about["false_alarms"][arm] for arm in ("real", GENERATED_ARM))
+        ]
+        for arm in ("real", GENERATED_ARM):
+            finds = [is_found for sequence in about["sequences"] for is_found in sequence["found"][arm].values()]
+            cells.append(f"{100 * sum(finds) / len(finds):.0f} %")
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(rows) + (
+        "\n\nNRMSE: median over nominal test windows. Alarms and finds: means over seven detectors set for 1 %; "
+        f"{found['num_sequences']} labelled sequences. From `figures/labelled/findings.json`."
+    )
+
+
 def lines(found: dict[str, Any]) -> list[str]:
     """What the command says at its end."""
     from enhsim_tf.reproduce.labelled_study import GENERATED_ARM

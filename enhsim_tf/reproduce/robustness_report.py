@@ -97,15 +97,20 @@ def report(found: Findings, root: Path) -> None:
         found: The findings of a full run.
         root: Folder of the project.
     """
+    from enhsim_tf.reproduce import labelled_run
     from enhsim_tf.reproduce.report import fill_parts
 
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
         temporary.write_text(render(found, findings_of(root, "labelled")), encoding="utf-8")
+    labelled = findings_of(root, "labelled")
+    parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
     readme = root / "README.md"
-    if readme.is_file() and "<!-- robustness: generated -->" in (text := readme.read_text(encoding="utf-8")):
+    if readme.is_file():
+        text = readme.read_text(encoding="utf-8")
+        parts = {name: part for name, part in parts.items() if f"<!-- {name}: generated -->" in text}
         with replace_file(readme) as temporary:
-            temporary.write_text(fill_parts(text, {"robustness": table(found)}, readme.name), encoding="utf-8")
+            temporary.write_text(fill_parts(text, parts, readme.name), encoding="utf-8")
 
 
 def table(found: Findings) -> str:
