@@ -79,7 +79,8 @@ def _message(report: ChannelReport) -> str:
         return "no window moves, so nothing can be said of the enhanced signal"
     if ours >= coarse:
         return "the enhanced signal is no nearer to the telemetry than the coarse one"
-    return f"the enhanced signal is {1 - ours / coarse:.0%} nearer to the telemetry than the coarse one"
+    but = "" if ours < report.nrmse["ridge"] else ", but no nearer than ridge regression"
+    return f"the enhanced signal is {1 - ours / coarse:.0%} nearer to the telemetry than the coarse one{but}"
 
 
 def _grid(figure: matplotlib.figure.Figure, down: float) -> list[list[Axes]]:

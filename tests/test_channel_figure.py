@@ -43,6 +43,7 @@ NAN = dict.fromkeys(("coarse", "ridge", "enhanced"), float("nan"))
 CASES = {
     "usual": made_up(),
     "no better": made_up(nrmse={"coarse": 0.5, "ridge": 0.3, "enhanced": 0.6}),
+    "ridge": made_up(nrmse={"coarse": 0.5, "ridge": 0.1, "enhanced": 0.2}),
     "perfect": made_up(nrmse={"coarse": 0.0, "ridge": 0.0, "enhanced": 0.0}),
     "still": made_up(nrmse=NAN, examples=dict.fromkeys(("coarse", "enhanced", "generated", "real"), np.full(200, 7.0))),
     "large": made_up(scale=1e9),
@@ -100,6 +101,10 @@ def test_no_text_lies_in_another_panel(case):
     ("nrmse", "message"),
     [
         ({"coarse": 0.5, "ridge": 0.3, "enhanced": 0.2}, "60% nearer to the telemetry than the coarse one"),
+        (
+            {"coarse": 0.5, "ridge": 0.1, "enhanced": 0.2},
+            "60% nearer to the telemetry than the coarse one, but no nearer than ridge regression",
+        ),
         ({"coarse": 0.2, "ridge": 0.3, "enhanced": 0.2}, "no nearer to the telemetry than the coarse one"),
         ({"coarse": 0.0, "ridge": 0.0, "enhanced": 0.0}, "no nearer to the telemetry than the coarse one"),
         (NAN, "nothing can be said of the enhanced signal"),
