@@ -132,7 +132,7 @@ class EnhancedSimulator:
             )
         by_enhancer, values = extraction == "enhancer", np.concatenate([part.values for part in parts])
         check_values(values, parts[0].name, (8 if by_enhancer else 2) * window)
-        averaged = [] if by_enhancer else _extracted([part for part in parts if len(part) >= window + moving_average - 1], moving_average)
+        averaged = [] if by_enhancer else _extracted(parts, moving_average, window)
         coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
         offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
         rng = np.random.default_rng(seed)
@@ -414,9 +414,15 @@ def _parts_of(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
     return parts
 
 
-def _extracted(parts: Sequence[Telemetry], width: int) -> list[Telemetry]:
-    """The noise that a moving average leaves of each stretch."""
-    return [dataclasses.replace(part, values=extract_noise(part.values, width)[0]) for part in parts]
+def _extracted(parts: Sequence[Telemetry], width: int, window: int) -> list[Telemetry]:
+    """The noise that a moving average leaves of each stretch that is long enough for a window of it."""
+    long_enough = [part for part in parts if len(part) >= window + width - 1]
+    if not long_enough:
+        raise InputError(
+            f"Expected a stretch of {window + width - 1} samples: a window of {window} and what a moving average of width {width} cuts off. "
+            f"Received: {max(map(len, parts))}. Give a longer one."
+        )
+    return [dataclasses.replace(part, values=extract_noise(part.values, width)[0]) for part in long_enough]
 
 
 def _check_counts(**counts: tuple[Any, int]) -> None:

@@ -16,6 +16,8 @@ from enhsim_tf.simulator import SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
 
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # samples of the window that is chosen; the paper's is 500
+FEWEST_SAMPLES = 32  # of a window that is asked for: the discriminator's filters are 20 wide
+_LEAST_EXPLAINED = 0.05  # of the variance, by one square wave that runs free; of white noise the best explains one per cent
 _LEAST_LEARNT = 8  # windows that the networks learn from, at least
 
 
@@ -44,8 +46,8 @@ class FitOptions:
     def __post_init__(self):
         if not 0 <= self.held_out <= 0.5:
             raise InputError(f"Expected held_out from 0 to 0.5. Received: held_out={self.held_out}.")
-        if self.window is not None and self.window < 16:
-            raise InputError(f"Expected a window of at least 16 samples. Received: window={self.window}.")
+        if self.window is not None and self.window < FEWEST_SAMPLES:
+            raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
 
 
 def fit_channel(
@@ -86,7 +88,15 @@ def fit_simulator(parts: Sequence[Telemetry], options: FitOptions, verbose: int 
     Raises:
         InputError: If the telemetry is too short, constant or not periodic.
     """
-    coarse = SquareWaveSimulator.fit(max(parts, key=len))
+    longest = max(parts, key=len)
+    coarse = SquareWaveSimulator.fit(longest)
+    period, samples = coarse.waves[0].period_s / longest.interval_s, len(longest)
+    explained = 1 - np.var(longest.values - coarse(longest.time_s)) / np.var(longest.values, dtype=np.float64)
+    if period > samples / 2 or explained < _LEAST_EXPLAINED:
+        raise InputError(
+            f"Expected something periodic, at least two periods long. Received: {longest.name}, whose best square wave has a period of {period:.0f} "
+            f"of {samples} samples and explains {explained:.1%} of its variance. Give more telemetry or another channel."
+        )
     window = options.window or window_of(coarse, parts[0].interval_s)
     usable = [part for part in parts if len(part) >= window]
     samples = sum(map(len, usable))

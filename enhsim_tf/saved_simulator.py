@@ -31,7 +31,7 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, keras.Model], 
         InputError: If something else than a saved simulator stands there, which is left as it is.
     """
     folder = Path(folder)
-    if folder.exists() and not (folder / "manifest.json").is_file() and not (folder.is_dir() and not any(folder.iterdir())):
+    if folder.exists() and not _is_saved(folder) and not (folder.is_dir() and not any(folder.iterdir())):
         raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which holds something else.")
     with replace_folder(folder) as temporary:
         for name in _NETWORKS:
@@ -39,6 +39,14 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, keras.Model], 
         write_json(temporary / "settings.json", settings)
         checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
         write_json(temporary / "manifest.json", {"format": _FORMAT, "sha256": checksums})
+
+
+def _is_saved(folder: Path) -> bool:
+    """Whether a folder holds a saved simulator, by the format that its manifest names; damaged files do not matter."""
+    try:
+        return json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["format"] == _FORMAT
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, keras.Model], Mapping[str, Any]], Any]) -> Any:

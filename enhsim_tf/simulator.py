@@ -121,7 +121,7 @@ def degrade(
         return signal(time_s)
     severity, (low, high) = scenario.severity, levels
     num_windows, num_samples = time_s.shape
-    onset = int(round(scenario.onset * num_samples, 6))
+    onset = min(int(round(scenario.onset * num_samples, 6)), num_samples - 1)
     time_s, late = time_s.copy(), time_s[:, onset:]
     begin = late[:, :1]
 

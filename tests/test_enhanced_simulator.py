@@ -9,9 +9,10 @@ import keras
 import numpy as np
 import pytest
 
-from enhsim_tf import enhanced_simulator
+from enhsim_tf import enhanced_simulator, enhancer
 from enhsim_tf.enhanced_simulator import EnhancedSimulator
 from enhsim_tf.enhancer import build_enhancer
+from enhsim_tf.errors import InputError
 from enhsim_tf.files import sha256
 from enhsim_tf.noise import GaussianNoise, extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
@@ -532,3 +533,18 @@ def test_bars_of_the_fit_are_for_terminals(small_batches, capsys, monkeypatch, i
 def test_fit_refuses_less_than_two_windows(refused):
     with refused("119", "120 samples", "two windows"):
         EnhancedSimulator.fit(measured(119), window=60, verbose=0)
+
+
+@pytest.mark.parametrize("width", [4, 1, 2_000])
+def test_a_moving_average_of_a_wrong_width_is_refused_before_training(monkeypatch, width):
+    monkeypatch.setattr(enhancer, "fit_windows", lambda *arguments, **options: pytest.fail("trained first"))
+    values = np.sin(np.arange(1_500) / 5).astype(np.float32)
+    with pytest.raises(InputError, match="width|window"):
+        EnhancedSimulator.fit(Telemetry(values), window=60, moving_average=width)
+
+
+def test_saving_leaves_a_folder_with_a_foreign_manifest_alone(tmp_path):
+    (tmp_path / "manifest.json").write_text('{"name": "an extension"}')
+    with pytest.raises(InputError, match="something else"):
+        small().save(tmp_path)
+    assert (tmp_path / "manifest.json").read_text() == '{"name": "an extension"}'

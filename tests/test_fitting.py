@@ -134,6 +134,9 @@ def test_stretches_shorter_than_a_window_are_not_learnt_from(unmeasured, monkeyp
         (np.zeros(2_000), "periodic"),
         (channel(600).values, "8 windows of 64"),  # four fifths of it are 480 samples, seven windows and a half
         (channel(5).values, "periodic"),
+        (np.random.default_rng(0).standard_normal(2_000), "explains"),
+        (np.arange(2_000.0), "explains"),
+        (np.cumsum(np.random.default_rng(0).standard_normal(2_000)), "explains"),
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused(refused, values, word):
@@ -141,7 +144,7 @@ def test_what_cannot_be_learnt_from_is_refused(refused, values, word):
         fit_channel([Telemetry(np.asarray(values, np.float32), name="volts")], TINY, 0)
 
 
-@pytest.mark.parametrize("options", [{"held_out": -0.1}, {"held_out": 0.6}, {"held_out": float("nan")}, {"window": 15}])
+@pytest.mark.parametrize("options", [{"held_out": -0.1}, {"held_out": 0.6}, {"held_out": float("nan")}, {"window": 31}])
 def test_options_that_cannot_be_are_refused(refused, options):
     with refused(next(iter(options))):
         FitOptions(**options)
