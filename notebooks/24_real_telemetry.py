@@ -38,20 +38,11 @@ first, second = channel.part(0, 3_000), channel.part(3_000, 6_000)
 # %%
 from enhsim_tf import EnhancedSimulator
 
-settings = {
-    "num_windows": 600,
-    "epochs": 6,
-    "num_iterations": 0,
-    "window": 194,
-    "extraction": "enhancer",
-    "held_out": 0.0,
-}
-if experiment.settings.budget == "smoke":
-    settings["num_windows"] = 90
-simulators = {
-    name: EnhancedSimulator.fit(first, seed=1, follow=name == "follows", **settings)
-    for name in ("fixed", "follows")
-}
+settings = {"epochs": 6, "num_iterations": 0, "window": 194, "extraction": "enhancer", "held_out": 0.0}
+settings["num_windows"] = 90 if experiment.settings.budget == "smoke" else 600
+simulators = {}
+for name in ("fixed", "follows"):
+    simulators[name] = EnhancedSimulator.fit(first, seed=1, follow=name == "follows", **settings)
 
 # %%
 places = np.arange(0, len(second) - 194, 97)

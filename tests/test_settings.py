@@ -54,6 +54,11 @@ COUNTS = {
     "robustness.max_order",
     "modes.num_windows",
     "modes.windows_per_configuration",
+    "labelled.num_windows",
+    "labelled.epochs",
+    "labelled.num_iterations",
+    "labelled.num_arm_windows",
+    "labelled.max_order",
 }
 
 
