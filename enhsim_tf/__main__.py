@@ -13,7 +13,7 @@ three commands:
   python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   python -m enhsim_tf score models new.csv --out scores.parquet
 
-python -m enhsim_tf fit --help (generate, score) tells each command's options. The paper's reproduction is another
+python -m enhsim_tf fit --help (generate, verify, score) tells each command's options. The paper's reproduction is another
 command: python -m enhsim_tf.reproduce.
 """
 SOURCE = "a .csv, .parquet or .npy file, a store's folder, folder#channel, or influxdb://bucket/measurement/field?tag=value"
@@ -42,7 +42,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES + EXIT,
         **form,
     )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,score}", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score}", required=True)
 
     fit = commands.add_parser(
         "fit",
@@ -73,7 +73,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         **form,
     )
     generate.add_argument("models", type=Path, metavar="MODEL_DIR", help="what `fit` wrote")
-    how_many = generate.add_mutually_exclusive_group(required=True)
+    how_many = generate.add_mutually_exclusive_group()
     how_many.add_argument("--windows", type=int, metavar="N", help="windows in all")
     how_many.add_argument("--continuous", metavar="LENGTH", help="one series instead, such as 1d, 6h, 90min or 5000 (samples)")
     generate.add_argument(
@@ -90,7 +90,19 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     generate.add_argument(
         "--out", type=Path, required=True, metavar="OUT", help="a .parquet file; a folder where there are several channels"
     )
+    large = generate.add_argument_group("large data sets", "with any of these, OUT is a folder of many files (docs/fleet.md)")
+    large.add_argument("--workers", metavar="auto|N", help="processes (default: auto, one a core)")
+    large.add_argument(
+        "--engine", choices=("local", "ray"), help="who runs them: this machine (default), or Ray, on the cluster of RAY_ADDRESS"
+    )
+    large.add_argument(
+        "--scenarios", type=Path, metavar="FILE", help="YAML: scenarios with shares and ranges, several models (docs/scenarios.md)"
+    )
     _add_seed(generate)
+
+    verify = commands.add_parser("verify", help="check a large data set against its manifest", epilog=EXIT, **form)
+    verify.add_argument("folder", type=Path, metavar="FOLDER", help="what `generate --workers` wrote")
+    verify.set_defaults(seed=0)
 
     score = commands.add_parser(
         "score",
@@ -131,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
 
     if not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
-    return {"fit": run_fit, "generate": run_generate, "score": run_score}[options.command](options)
+    return {"fit": run_fit, "generate": run_generate, "verify": run_verify, "score": run_score}[options.command](options)
 
 
 def run_fit(options: argparse.Namespace) -> int:
@@ -164,7 +176,13 @@ def run_generate(options: argparse.Namespace) -> int:
     from enhsim_tf.errors import InputError
     from enhsim_tf.training_sets import num_samples_of, parse_scenario, shares_of, write_series_labelled, write_windows_labelled
 
+    if options.workers or options.engine or options.scenarios:
+        from enhsim_tf.fleet_command import run_fleet
+
+        return run_fleet(options, tell)
     scenarios = [parse_scenario(text) for text in options.scenario]
+    if options.windows is None and options.continuous is None:
+        raise InputError("Expected --windows or --continuous. Received: neither.")
     if options.windows is not None and options.windows < 1:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
     if options.continuous is not None and len(scenarios) > 1:
@@ -185,6 +203,13 @@ def run_generate(options: argparse.Namespace) -> int:
             what = f"{length:,} samples"
         tell(f"{channel}: {what} in {paths[channel]}")
     return 0
+
+
+def run_verify(options: argparse.Namespace) -> int:
+    """Checks a large data set."""
+    from enhsim_tf.fleet import verify
+
+    return verify(options.folder, tell)
 
 
 def run_score(options: argparse.Namespace) -> int:
