@@ -17,6 +17,7 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
@@ -27,6 +28,7 @@ from enhsim_tf.errors import InputError
 ENGINES = {"local": 512, "ray": 10_000}  # and their most workers
 ONE_THREAD = {"TF_NUM_INTRAOP_THREADS": "1", "TF_NUM_INTEROP_THREADS": "1", "OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
 _MOST_DEATHS = 5  # in a row, without anything finished between them
+_ANSWER_S = 10
 _ACTOR_CPUS = 0.4  # of a CPU each: after half of a cluster is lost, its actors still find room on the other half
 
 _work: Callable[[int], Any] | None = None  # of a process of the pool
@@ -184,7 +186,7 @@ def _run_ray(work: Callable[[int], Any], numbers: Iterator[int], workers: int | 
             try:
                 kind, result = ray.get(done)
             except lost as error:
-                deaths.add(" ".join(str(error).split())[:160])
+                deaths.add(_last_line(error))
                 again.extend([] if number is None else [number])
                 ask(make(work), None)
                 continue
@@ -216,12 +218,30 @@ def _cluster() -> Iterator[Any]:
     logging.getLogger("ray").setLevel(logging.ERROR)
     address = os.environ.get("RAY_ADDRESS")
     local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # nothing large travels
+    _check_address(address)
     try:
         ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
     except (ConnectionError, RuntimeError, OSError, ValueError, ray.exceptions.RayError) as error:
-        reason = " ".join(str(error).split())[:160]
-        raise InputError(f"Expected a Ray cluster {f'at {address}' if address else 'that starts here'}. Received: {reason}.") from None
+        where = f"at {address}" if address else "that starts here"
+        raise InputError(f"Expected a Ray cluster {where}. Received: {_last_line(error)}.") from None
     try:
         yield ray
     finally:
         ray.shutdown()
+
+
+def _check_address(address: str | None) -> None:
+    """Refuses an address where nobody answers, which Ray itself would ask for minutes."""
+    host, _, port = (address or "").rpartition(":")
+    if not host or not port.isdecimal() or "/" in host:  # none, or a form that Ray alone understands
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        raise InputError(f"Expected a Ray cluster at {address} (RAY_ADDRESS). Received: {_last_line(error)}.") from None
+
+
+def _last_line(error: Exception) -> str:
+    """The end of an error, where Ray says what it was, in characters that a terminal shows as they are."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~")]
+    return "".join(character for character in (lines or [type(error).__name__])[-1] if character.isprintable())[:160].rstrip(".")

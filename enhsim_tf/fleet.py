@@ -15,7 +15,19 @@ from pathlib import Path
 from enhsim_tf import engines
 from enhsim_tf.errors import InputError
 from enhsim_tf.fleet_plan import Plan
-from enhsim_tf.shard_folder import begin, check_folder, clear, finish, held, is_whole, journal_of, problems_of, read_manifest, read_records
+from enhsim_tf.shard_folder import (
+    MANIFEST,
+    begin,
+    check_folder,
+    clear,
+    finish,
+    held,
+    is_whole,
+    journal_of,
+    problems_of,
+    read_manifest,
+    read_records,
+)
 from enhsim_tf.shards import Record, ShardMaker, file_of
 
 
@@ -72,8 +84,8 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
             before = recorded.get(record.shard, record)
             if before.sha256 != record.sha256 and before.rows == record.rows:
                 raise InputError(
-                    f"Expected {file_of(record.shard)} to become what was recorded of it. Received: other bytes: this machine computes "
-                    f"otherwise than the one that began {out}, or the record is damaged. Begin another folder."
+                    f"Expected {file_of(record.shard)} to become what was recorded of it in {out}. Received: other bytes: this machine "
+                    f"computes otherwise, or the record is damaged. Remove {MANIFEST} and run the same command again: all shards are made again."
                 )
             write(record)
             records[record.shard] = record

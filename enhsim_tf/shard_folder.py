@@ -22,6 +22,7 @@ from enhsim_tf.shards import Record, file_of, schema_of
 MANIFEST, JOURNAL, _LOCK = "manifest.json", "journal.jsonl", ".lock"
 _SHARD = re.compile(r"shard-\d{6,}\.parquet")
 _LEFT = re.compile(r"\.(shard-\d{6,}\.parquet|manifest\.json)\..*")  # a temporary name of `replace_file`
+_SHA256 = re.compile("[0-9a-f]{64}")
 _MOST_BYTES = 1_000_000_000  # of a manifest or journal
 
 
@@ -118,9 +119,13 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def _record_of(number: int, content: Mapping[str, Any]) -> Record:
     record = Record(number, content["rows"], content["sha256"])
-    if type(record.rows) is not int or not isinstance(record.sha256, str) or content["file"] != file_of(number):
+    if not _is_record(record) or content["file"] != file_of(number):
         raise ValueError(f"what is recorded of shard {number}")
     return record
+
+
+def _is_record(record: Record) -> bool:
+    return [type(each) for each in record] == [int, int, str] and _SHA256.fullmatch(record.sha256) is not None
 
 
 def read_records(folder: Path) -> dict[int, Record]:
@@ -134,7 +139,7 @@ def read_records(folder: Path) -> dict[int, Record]:
                 record = Record(*json.loads(line))
             except (ValueError, TypeError, RecursionError):
                 continue
-            if [type(each) for each in record] == [int, int, str]:
+            if _is_record(record):
                 records[record.shard] = record
     return records
 
@@ -216,7 +221,7 @@ def problems_of(folder: str | os.PathLike) -> Iterable[str]:
                 continue
             if num_rows != record.rows:
                 yield f"{path.name}: {num_rows:,} windows, {record.rows:,} recorded"
-            if not found.equals(schema, check_metadata=True):
+            if not found.equals(schema) or found.metadata != schema.metadata:
                 yield f"{path.name}: other columns or settings than the manifest's"
     known = {file_of(record.shard) for record in records}
     for path in sorted(folder.iterdir()):

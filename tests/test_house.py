@@ -21,6 +21,13 @@ FLOORS = {
     "__main__": 3,
     "robustness": 2,
     "fleet": 2,
+    "fleet_command": 2,
+    "fleet_plan": 2,
+    "shard_folder": 2,
+    "shards": 2,
+    "engines": 1,
+    "scenario_file": 2,
+    "checked_yaml": 0,
     "channels": 2,
     "channel_figure": 2,
     "channel_report": 2,
@@ -101,6 +108,9 @@ WITHOUT_TENSORFLOW = [
     "scoring",
     "training_sets",
     "terminal",
+    "fleet",
+    "fleet_command",
+    "engines",
 ]
 
 
@@ -311,6 +321,10 @@ def test_every_room_has_its_tests():
         "saved_simulator": "enhanced_simulator",
         "sheet": "figures",
         "channel_figure": "channels",
+        "fleet_command": "fleet",
+        "fleet_plan": "shards",
+        "shard_folder": "fleet",
+        "checked_yaml": "scenario_file",
         "channel_report": "fitting",
     }
     with_others |= dict.fromkeys(("characteristics", "rows", "sampling", "stamps", "parsing", "repairs"), "cleaning")
