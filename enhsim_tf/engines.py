@@ -116,13 +116,13 @@ def _pool(work: Callable[[int], Any], workers: int) -> Iterator[concurrent.futur
     """A pool of spawned processes (a forked TensorFlow hangs) that ends at once when the block ends in an error."""
     others = set(multiprocessing.active_children())
     pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin, (work,))
+    is_done = False
     try:
         yield pool
-    except BaseException:
-        for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
-        raise
+        is_done = True
     finally:
+        for process in () if is_done else set(multiprocessing.active_children()) - others:
+            process.terminate()
         pool.shutdown(wait=True, cancel_futures=True)
 
 

@@ -172,7 +172,13 @@ def journal_of(folder: Path) -> Iterator[Callable[[Record], None]]:
 
 
 def finish(folder: Path, plan: Plan, records: Mapping[int, Record]) -> None:
-    """Writes the manifest of a finished data set; the journal is needed no more."""
+    """Writes the manifest of a finished data set; the journal is needed no more.
+
+    Args:
+        folder: The data set.
+        plan: What it is.
+        records: What is recorded of each of its shards.
+    """
     shards = [
         {"file": file_of(number), "rows": records[number].rows, "sha256": records[number].sha256} for number in range(plan.num_shards)
     ]
