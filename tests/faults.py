@@ -62,9 +62,10 @@ class Bench:
 def kill_driver(bench, name, rng):
     process = bench.start(name)
     bench.moment(rng)
+    was_running = process.poll() is None
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    return bench.recovered(name)
+    return ("" if was_running else "too late: it had ended; ") + bench.recovered(name)
 
 
 def kill_worker(bench, name, rng):
@@ -74,7 +75,8 @@ def kill_worker(bench, name, rng):
     if workers:
         os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
     err = process.communicate()[1]
-    return bench.recovered(name) if process.returncode == 0 else f"NOT recovered by itself: {err.strip()[-200:]}"
+    missed = "" if workers else "too early or late: no worker was there; "
+    return missed + bench.recovered(name) if process.returncode == 0 else f"NOT recovered by itself: {err.strip()[-200:]}"
 
 
 def interrupt(bench, name, rng):
