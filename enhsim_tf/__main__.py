@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
 
     if not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
-    return {"fit": run_fit, "generate": run_generate, "score": run_score}[options.command](options)
+    return {"fit": run_fit, "generate": run_generate, "verify": run_verify, "score": run_score}[options.command](options)
 
 
 def run_fit(options: argparse.Namespace) -> int:
@@ -49,6 +49,10 @@ def run_fit(options: argparse.Namespace) -> int:
 
 def run_generate(options: argparse.Namespace) -> int:
     """Generates labelled training data from each channel's simulator."""
+    if options.workers or options.engine or options.scenarios:
+        from enhsim_tf.fleet_command import run_fleet
+
+        return run_fleet(options, tell)
     from enhsim_tf.errors import InputError
     from enhsim_tf.training_sets import (
         num_samples_of,
@@ -61,6 +65,8 @@ def run_generate(options: argparse.Namespace) -> int:
     )
 
     scenarios = [parse_scenario(text) for text in options.scenario]
+    if options.windows is None and options.continuous is None:
+        raise InputError("Expected --windows or --continuous. Received: neither.")
     if options.windows is not None and options.windows < 1:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
     if options.continuous is not None and len(scenarios) > 1:
@@ -92,6 +98,13 @@ def run_generate(options: argparse.Namespace) -> int:
         tell(f"{printable(channel)}: {what} in {paths[channel]}")
 
     return for_each(models, write)
+
+
+def run_verify(options: argparse.Namespace) -> int:
+    """Checks a large data set."""
+    from enhsim_tf.fleet import verify
+
+    return verify(options.folder, tell)
 
 
 def run_score(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ three commands:
   python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   python -m enhsim_tf score models new.csv --out scores.parquet
 
-python -m enhsim_tf fit --help (generate, score) tells each command's options. The paper's reproduction is another
+python -m enhsim_tf fit --help (generate, verify, score) tells each command's options. The paper's reproduction is another
 command: python -m enhsim_tf.reproduce.
 """
 SOURCE = "a .csv, .parquet or .npy file, a store's folder, folder#channel, or influxdb://bucket/measurement/field?tag=value"
@@ -41,7 +41,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES + EXIT,
         **form,
     )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,score}", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score}", required=True)
 
     fit = commands.add_parser(
         "fit",
@@ -73,7 +73,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         **form,
     )
     generate.add_argument("models", type=Path, metavar="MODEL_DIR", help="what `fit` wrote")
-    how_many = generate.add_mutually_exclusive_group(required=True)
+    how_many = generate.add_mutually_exclusive_group()
     how_many.add_argument("--windows", type=int, metavar="N", help="windows in all")
     how_many.add_argument("--continuous", metavar="LENGTH", help="one series instead, such as 1d, 6h, 90min or 5000 (samples)")
     generate.add_argument("--start", metavar="TIME", help="when the series begins, such as 2024-01-01 (default: time is counted from 0)")
@@ -91,7 +91,19 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     generate.add_argument(
         "--out", type=Path, required=True, metavar="OUT", help="a .parquet file; a folder where there are several channels"
     )
+    large = generate.add_argument_group("large data sets", "with any of these, OUT is a folder of many files (docs/fleet.md)")
+    large.add_argument("--workers", metavar="auto|N", help="processes (default: auto, one a core)")
+    large.add_argument(
+        "--engine", choices=("local", "ray"), help="who runs them: this machine (default), or Ray, on the cluster of RAY_ADDRESS"
+    )
+    large.add_argument(
+        "--scenarios", type=Path, metavar="FILE", help="YAML: scenarios with shares and ranges, several models (docs/scenarios.md)"
+    )
     _add_seed(generate)
+
+    verify = commands.add_parser("verify", help="check a large data set against its manifest", epilog=EXIT, **form)
+    verify.add_argument("folder", type=Path, metavar="FOLDER", help="what `generate --workers` wrote")
+    verify.set_defaults(seed=0)
 
     score = commands.add_parser(
         "score",

@@ -21,6 +21,13 @@ FLOORS = {
     "__main__": 3,
     "robustness": 2,
     "fleet": 2,
+    "fleet_command": 2,
+    "fleet_plan": 2,
+    "shard_folder": 2,
+    "shards": 2,
+    "engines": 1,
+    "scenario_file": 2,
+    "checked_yaml": 0,
     "channels": 2,
     "channel_figure": 2,
     "channel_report": 2,
@@ -106,6 +113,9 @@ WITHOUT_TENSORFLOW = [
     "terminal",
     "commands",
     "__main__",
+    "fleet",
+    "fleet_command",
+    "engines",
 ]
 
 
@@ -315,6 +325,10 @@ def test_every_room_has_its_tests():
         "influx_server": "influx_store",
         "saved_simulator": "enhanced_simulator",
         "sheet": "figures",
+        "fleet_command": "fleet",
+        "fleet_plan": "shards",
+        "shard_folder": "fleet",
+        "checked_yaml": "scenario_file",
         "channel_report": "fitting",
         "channel_verdict": "fitting",
     }

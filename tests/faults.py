@@ -1,0 +1,222 @@
+"""Faults, tried for real on the command with tiny networks: `python tests/faults.py --out faults.json`.
+
+Each try starts `python -m enhsim_tf generate`, does it some harm at a random moment, runs the same command again until it
+ends well, and compares every byte of the data set with one that was never disturbed. It writes a table: fault, tries,
+outcome. The suite tries the same in small; this takes some minutes.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+from test_fleet import children_of, content_of  # noqa: E402
+
+MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n"
+
+
+class Bench:
+    """A place for tries: models, a mix, and the data set as it is without any fault."""
+
+    def __init__(self, folder):
+        from test_enhanced_simulator import small
+
+        self.folder = folder
+        small(window=60).save(folder / "models" / "volts")
+        (folder / "mix.yaml").write_text(MIX)
+        began = time.monotonic()
+        self.start("undisturbed").communicate()
+        self.seconds = time.monotonic() - began
+        self.expected = content_of(folder / "undisturbed")
+
+    def start(self, name, *options, **how):
+        command = [sys.executable, "-m", "enhsim_tf", "generate", self.folder / "models", "--scenarios", self.folder / "mix.yaml"]
+        command += ["--workers", "2", "--out", self.folder / name, *options]
+        how = {"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True} | how
+        return subprocess.Popen(list(map(str, command)), **how)
+
+    def moment(self, rng):
+        """Waits for a random moment of a run."""
+        time.sleep(rng.uniform(0.05, 0.95) * self.seconds)
+
+    def recovered(self, name):
+        """Whether the same command, again, ends well and in the same bytes."""
+        again = self.start(name)
+        err = again.communicate()[1]
+        same = content_of(self.folder / name) == self.expected
+        shutil.rmtree(self.folder / name)
+        return "recovered, same bytes" if again.returncode == 0 and same else f"NOT recovered: {err.strip()[-200:]}"
+
+
+def kill_driver(bench, name, rng):
+    process = bench.start(name)
+    bench.moment(rng)
+    was_running = process.poll() is None
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    return ("" if was_running else "too late: it had ended; ") + bench.recovered(name)
+
+
+def kill_worker(bench, name, rng):
+    process = bench.start(name)
+    bench.moment(rng)
+    workers = children_of(process)
+    if workers:
+        os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
+    err = process.communicate()[1]
+    missed = "" if workers else "too early or late: no worker was there; "
+    return missed + bench.recovered(name) if process.returncode == 0 else f"NOT recovered by itself: {err.strip()[-200:]}"
+
+
+def interrupt(bench, name, rng):
+    process = bench.start(name)
+    bench.moment(rng)
+    os.killpg(process.pid, signal.SIGINT)
+    err = process.communicate()[1]
+    one_line = process.returncode == 0 or (process.returncode == 130 and len(err.splitlines()) == 1)
+    return bench.recovered(name) if one_line else f"NOT one line: {process.returncode} {err.strip()[-200:]}"
+
+
+def full_disk(bench, name, rng):
+    """A tmpfs too small for the data set, made larger afterwards; where none can be mounted, there is no try."""
+    folder = bench.folder / name
+    folder.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={rng.integers(200, 900)}k", "tmpfs", folder], capture_output=True).returncode:
+        shutil.rmtree(folder)
+        return "not tried: no file system can be mounted here"
+    try:
+        process = bench.start(name)
+        err = process.communicate()[1]
+        if process.returncode != 2 or len(err.splitlines()) != 1:
+            return f"NOT one line: {process.returncode} {err.strip()[-200:]}"
+        subprocess.run(["mount", "-o", "remount,size=100m", folder], check=True)
+        again = bench.start(name)
+        again.communicate()
+        same = again.returncode == 0 and content_of(folder) == bench.expected
+        return "one line; recovered, same bytes" if same else "NOT recovered"
+    finally:
+        subprocess.run(["umount", folder], check=True)
+        shutil.rmtree(folder)
+
+
+def damaged_shard(bench, name, rng):
+    shutil.copytree(bench.folder / "undisturbed", bench.folder / name)
+    shard = sorted((bench.folder / name).glob("shard-*"))[rng.integers(60)]
+    content = bytearray(shard.read_bytes())
+    content[rng.integers(len(content))] ^= 1 << rng.integers(8)
+    shard.write_bytes(content)
+    verified = subprocess.run([sys.executable, "-m", "enhsim_tf", "verify", bench.folder / name], cwd=ROOT, capture_output=True, text=True)
+    found = verified.returncode == 2 and verified.stdout.splitlines() == [f"{shard.name}: its checksum is not the one that was recorded"]
+    return f"named by verify; {bench.recovered(name)}" if found else "NOT found by verify"
+
+
+def damaged_manifest(bench, name, rng):
+    shutil.copytree(bench.folder / "undisturbed", bench.folder / name)
+    manifest = bench.folder / name / "manifest.json"
+    os.truncate(manifest, rng.integers(manifest.stat().st_size - 2))
+    process = bench.start(name)
+    err = process.communicate()[1]
+    if process.returncode != 2 or "Remove it" not in err or len(err.splitlines()) != 1:
+        return f"NOT one line: {process.returncode} {err.strip()[-200:]}"
+    manifest.unlink()
+    return f"one line; {bench.recovered(name)}"
+
+
+def damaged_model(bench, name, rng):
+    model = bench.folder / "models" / "volts" / "enhancer.keras"
+    content = model.read_bytes()
+    model.write_bytes(content[: rng.integers(len(content))])
+    process = bench.start(name)
+    err = process.communicate()[1]
+    model.write_bytes(content)
+    if process.returncode != 2 or len(err.splitlines()) != 1:
+        return f"NOT one line: {process.returncode} {err.strip()[-200:]}"
+    return f"one line; {bench.recovered(name)}"
+
+
+def two_runs(bench, name, rng):
+    first = bench.start(name)
+    bench.moment(rng)
+    second = bench.start(name)
+    err = second.communicate()[1]
+    first.communicate()
+    refused = second.returncode == 2 and len(err.splitlines()) == 1
+    late = second.returncode == 0  # the first had ended
+    return bench.recovered(name) if first.returncode == 0 and (refused or late) else f"NOT refused: {err.strip()[-200:]}"
+
+
+def lost_node(bench, name, rng):
+    """A node of a two-node Ray cluster is removed while both are at work."""
+    try:
+        from ray.cluster_utils import Cluster
+    except ModuleNotFoundError:
+        return "not tried: the optional extra ray is not installed"
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    try:
+        node = cluster.add_node(num_cpus=1)
+        process = bench.start(name, "--engine", "ray", env=os.environ | {"RAY_ADDRESS": cluster.address, "PYTHONPATH": str(ROOT)})
+        while not list((bench.folder / name).glob("shard-*")) and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0, 1))
+        was_running = process.poll() is None
+        cluster.remove_node(node, allow_graceful=False)
+        err = process.communicate()[1]
+        same = process.returncode == 0 and content_of(bench.folder / name) == bench.expected
+        shutil.rmtree(bench.folder / name)
+        return ("went on" if was_running else "had ended before") + ", same bytes" if same else f"NOT recovered: {err.strip()[-300:]}"
+    finally:
+        cluster.shutdown()
+
+
+FAULTS = {
+    "driver killed (SIGKILL)": kill_driver,
+    "worker killed (SIGKILL)": kill_worker,
+    "interrupt by the user (SIGINT)": interrupt,
+    "disk full (a small tmpfs)": full_disk,
+    "damaged shard": damaged_shard,
+    "damaged manifest": damaged_manifest,
+    "damaged model": damaged_model,
+    "two runs into one folder": two_runs,
+    "a node of a Ray cluster removed": lost_node,
+}
+FEW = ("disk full (a small tmpfs)", "damaged shard", "damaged manifest", "damaged model", "two runs into one folder")
+TRIES = {"a node of a Ray cluster removed": 2} | dict.fromkeys(FEW, 5)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Faults, tried for real.")
+    parser.add_argument("--tries", type=int, help="of each fault (default: 20, or 5 of those that no moment matters to, 2 of Ray's)")
+    parser.add_argument("--only", choices=FAULTS, action="append", help="this fault alone; may be repeated")
+    parser.add_argument("--seed", type=int, default=0, help="of the moments and places")
+    parser.add_argument("--out", type=Path, required=True, help="the table, as JSON")
+    options = parser.parse_args()
+    table = []
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(Path(folder))
+        for number, (fault, harm) in enumerate(FAULTS.items()):
+            if options.only and fault not in options.only:
+                continue
+            rng, outcomes = np.random.default_rng([options.seed, number]), {}
+            tries = options.tries or TRIES.get(fault, 20)
+            for attempt in range(tries):
+                outcome = harm(bench, f"try-{number}-{attempt}", rng)
+                outcomes[outcome] = outcomes.get(outcome, 0) + 1
+            table.append({"fault": fault, "tries": tries, "outcomes": outcomes})
+            print(f"{fault:34} {tries:3}  " + "; ".join(f"{count} {outcome}" for outcome, count in outcomes.items()), flush=True)
+            options.out.write_text(json.dumps(table, indent=2) + "\n")
+    return int(any("NOT" in outcome for row in table for outcome in row["outcomes"]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
