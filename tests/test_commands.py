@@ -255,7 +255,7 @@ FIT = ["fit", "WORLD/one.csv", "--out", "models"]
 GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
 SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
 WRONG = {
-    "no command": ([], "{fit,generate,score}"),
+    "no command": ([], "{fit,generate,verify,score}"),
     "unknown command": (["train"], "'train'"),
     "fit without a source": (["fit", "--out", "models"], "SOURCE"),
     "fit without a place": (["fit", "WORLD/one.csv"], "--out"),
