@@ -80,7 +80,7 @@ def run_generate(options: argparse.Namespace) -> int:
     start = None if options.start is None else start_of(options.start)
     if options.continuous is not None:
         parse_length(options.continuous)
-    from enhsim_tf.channels import models_of
+    from enhsim_tf.channels import chosen_of, models_of
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = outputs_of(options.out, models, (".parquet",))
@@ -192,16 +192,6 @@ def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
         max_fill=options.max_fill,
         min_part=min_part,
     )
-
-
-def chosen_of(models: dict[str, Path], channels: list[str] | None) -> dict[str, Path]:
-    """The channels that were named, or all."""
-    from enhsim_tf.errors import InputError
-
-    unknown = [name for name in channels or () if name not in models]
-    if unknown:
-        raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
-    return {name: models[name] for name in channels or models}
 
 
 def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:

@@ -12,6 +12,7 @@ import re
 import shutil
 import socket
 import time
+import urllib.parse
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +31,11 @@ def _temporary(path: Path) -> Path:
 def _host() -> str:
     """This machine's name, short and without dots: a process number means nothing on another."""
     return re.sub(r"[^\w-]", "-", socket.gethostname())[:20] or "host"
+
+
+def encoded(name: str) -> str:
+    """A name as a file name: percent-encoded with its dots, so that none can leave its folder or hide in it."""
+    return urllib.parse.quote(name, safe=" ").replace(".", "%2E")
 
 
 def make_folder(path: str | os.PathLike) -> Path:

@@ -16,7 +16,7 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.influx_server import FIRST_NS, LAST_NS, InfluxServer, escape, quote
-from enhsim_tf.telemetry import Telemetry, check_telemetry
+from enhsim_tf.telemetry import Telemetry, check_telemetry, nanoseconds
 
 SCHEME = "influxdb://"
 _ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions stand in the year 2100, where no bucket's retention ends
@@ -141,7 +141,7 @@ class InfluxStore:
         """
         about = self._about(name)
         telemetry = Telemetry(np.empty(about["num_samples"], np.float32), **{key: about[key] for key in _DESCRIBED})
-        expected, found = _times(telemetry), 0
+        expected, found = nanoseconds(telemetry), 0
         for times, values in self.server.stream(self._of_series(name, about), FIRST_NS, LAST_NS):
             as_expected = expected[found : found + len(times)]
             agree = np.append(times[: len(as_expected)] == as_expected, False).argmin()  # how many at the beginning
@@ -284,25 +284,10 @@ def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
         raise InputError(
             f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which InfluxDB cannot keep. Fill or cut it."
         )
-    times = _times(telemetry)
+    times = nanoseconds(telemetry)
     if (np.diff(times) <= 0).any():
         raise InputError(f"Expected samples at least a nanosecond apart. Received: interval_s={telemetry.interval_s!r}. Check the unit.")
     return times, values
-
-
-def _times(telemetry: Telemetry) -> np.ndarray:
-    """Nanoseconds since 1970 of each sample, int64; counted from 1970 where the source has no time."""
-    begin = (telemetry.start or "1970-01-01").removesuffix("+00:00").removesuffix("Z")
-    try:
-        start_s, start_ns = (np.datetime64(begin, unit).astype(np.int64) for unit in ("s", "ns"))
-    except ValueError:
-        raise InputError(f"Expected start as an ISO 8601 time (UTC). Received: {telemetry.start!r}. Correct it.") from None
-    since_s = telemetry.time_s
-    if not max(abs(float(start_s)), np.abs(since_s).max(), np.abs(start_s + since_s).max()) < LAST_NS // 10**9:
-        raise InputError(
-            f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
-        )
-    return start_ns + np.round(since_s * 1e9).astype(np.int64)
 
 
 def _tags_of(row: Mapping[str, Any]) -> dict[str, str]:

@@ -13,8 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import make_folder, replace_file, replace_folder
-from enhsim_tf.telemetry import Telemetry
+from enhsim_tf.files import encoded, make_folder, replace_file, replace_folder
+from enhsim_tf.telemetry import Telemetry, nanoseconds
 
 _DAY_NS = 86_400 * 10**9
 
@@ -75,9 +75,7 @@ class ParquetStore:
         if not telemetry.name or not len(telemetry):
             raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
         make_folder(self.folder)
-        start = np.datetime64((telemetry.start or "1970-01-01").removesuffix("+00:00"), "ns")
-        since_start = np.round(telemetry.time_s * 1e9).astype(np.int64)
-        times = start + since_start.astype("timedelta64[ns]")
+        times = nanoseconds(telemetry)
         described = {
             "name": telemetry.name,
             "unit": telemetry.unit,
@@ -87,7 +85,7 @@ class ParquetStore:
         }
         table = pa.table({"time": pa.array(times, pa.timestamp("ns", "UTC")), "value": pa.array(telemetry.values, pa.float32())})
         table = table.replace_schema_metadata(described)
-        days = times.astype(np.int64) // _DAY_NS
+        days = times // _DAY_NS
         edges = np.flatnonzero(np.diff(days, prepend=days[0] - 1))
         with replace_folder(self._channel(telemetry.name)) as folder:
             for first, stop in zip(edges, [*edges[1:], len(days)], strict=True):
@@ -126,5 +124,4 @@ class ParquetStore:
         return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
 
     def _channel(self, name: str) -> Path:
-        # percent-encoding with the dot: no channel name can leave the folder or hide in it
-        return self.folder / urllib.parse.quote(name, safe=" ").replace(".", "%2E")
+        return self.folder / encoded(name)

@@ -14,6 +14,8 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 
+_MOST_S = 9_223_372_036  # seconds before and after 1970 that nanoseconds in 64 bits reach
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Telemetry:
@@ -56,6 +58,57 @@ class Telemetry:
     def part(self, start: int, stop: int) -> "Telemetry":
         """The samples from `start` to before `stop`, on the same clock."""
         return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
+
+
+def nanoseconds(telemetry: Telemetry) -> np.ndarray:
+    """When each sample was taken.
+
+    Args:
+        telemetry: The series.
+
+    Returns:
+        Nanoseconds since 1970 (UTC), int64 array of shape `(samples,)`; since the clock's zero where the source has no time.
+
+    Raises:
+        InputError: If its start is no time, or its samples do not lie from 1678 to 2261, the years that such numbers can hold.
+    """
+    import pandas as pd  # it reads every form of ISO 8601, with any zone
+
+    try:
+        text = telemetry.start or "1970-01-01"
+        start = pd.Timestamp(text if text[0].isdigit() else None)  # "now" is no start
+        start = start.tz_localize("UTC") if start.tz is None else start.tz_convert("UTC")
+        start_s, since_s = start.timestamp(), telemetry.time_s
+    except (ValueError, TypeError, AttributeError):
+        raise InputError(f"Expected start as an ISO 8601 time. Received: {telemetry.start!r}. Correct it.") from None
+    if not max(abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < _MOST_S:
+        raise InputError(
+            f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
+        )
+    return start.as_unit("ns").value + np.round(since_s * 1e9).astype(np.int64)
+
+
+def load_array(path: str | os.PathLike) -> np.ndarray:
+    """Reads a `.npy` file of one or two dimensions; nothing in it can run code.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: If it cannot be read, or is something else.
+    """
+    path = Path(path)
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:  # what damaged headers raise
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({reason}). Save it again."
+        ) from None
+    if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or array.dtype.names:
+        shape = "fields" if isinstance(array, np.ndarray) and array.dtype.names else getattr(array, "shape", "an archive")
+        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    return array
 
 
 def check_telemetry(telemetry: Telemetry) -> None:
@@ -151,15 +204,7 @@ def _read_array(path: Path, column: str | None, time: str | None):
         raise InputError(
             f"Expected --time with a table only. Received: --time {time} with {path.name}, an array has no named columns. Leave it out."
         )
-    try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:  # what damaged headers raise
-        raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({(str(error).splitlines() or [type(error).__name__])[0]}). Save it again."
-        ) from None
-    if not isinstance(array, np.ndarray) or array.ndim not in (1, 2):
-        shape = getattr(array, "shape", "an archive")
-        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    array = load_array(path)
     if array.ndim == 1 and column is None:
         return array, None, ""
     columns = 1 if array.ndim == 1 else array.shape[1]
