@@ -78,14 +78,24 @@ def found():
 
 def test_tables_come_back_as_they_were_written(tmp_path):
     written = tables()
-    findings.write_tables(written, tmp_path)
-    for name, table in findings.read_tables(tmp_path).items():
+    findings.KEPT.write(written, tmp_path)
+    for name, table in findings.KEPT.read(tmp_path).items():
         pd.testing.assert_frame_equal(table, written[name], check_dtype=False, rtol=1e-4, check_column_type=False)
+
+
+def test_recall_keeps_three_decimals_and_the_others_four(tmp_path):
+    written, values = tables(), [0.12344, 0.98766]
+    for name in ("recall", "traces"):
+        written[name] = written[name].iloc[:2].assign(auc_pr=values)
+    findings.KEPT.write(written, tmp_path)
+    read = findings.KEPT.read(tmp_path)
+    assert read["recall"]["auc_pr"].tolist() == np.array([0.123, 0.988], np.float32).tolist()
+    assert read["traces"]["auc_pr"].tolist() == np.array([0.1234, 0.9877], np.float32).tolist()
 
 
 def test_a_missing_table_is_named(tmp_path):
     with pytest.raises(InputError, match="alarms.parquet"):
-        findings.read_tables(tmp_path)
+        findings.KEPT.read(tmp_path)
 
 
 def test_rates_gaps_and_recall(found):
@@ -181,7 +191,7 @@ def test_the_report_is_what_the_tables_say():
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
-    again = findings.summarise(findings.read_tables(KEPT))
+    again = findings.summarise(findings.KEPT.read(KEPT))
     assert json.loads(json.dumps(again)) == {key: kept[key] for key in again}
     assert robustness_report.render(kept, robustness_report.findings_of(ROOT, "labelled")) == (ROOT / robustness_report.PATH).read_text(
         encoding="utf-8"

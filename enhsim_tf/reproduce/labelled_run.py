@@ -38,12 +38,12 @@ def run(
     Raises:
         InputError: If the folder is none of this layout, a channel is not in it, or no channel can be used.
     """
-    from enhsim_tf.reproduce.labelled_findings import read_tables, summarise, write_tables
+    from enhsim_tf.reproduce.labelled_findings import KEPT, summarise
 
     folder = make_folder(out)
     tables, skipped = collect(settings, cache, data, channels, fresh, tell)
-    write_tables(tables, folder)
-    found = summarise(read_tables(folder))
+    KEPT.write(tables, folder)
+    found = summarise(KEPT.read(folder))
     found |= {"budget": settings.budget, "skipped": skipped, "versions": VERSIONS}
     write_json(folder / "findings.json", found)
     draw(found, folder)

@@ -32,12 +32,12 @@ def run(
     Returns:
         The findings.
     """
-    from enhsim_tf.reproduce.findings import read_tables, summarise, write_tables
+    from enhsim_tf.reproduce.findings import KEPT, summarise
 
     folder = make_folder(out)
     tables = collect(settings, cache, environments, fresh, tell)
-    write_tables(tables, folder)
-    found = summarise(read_tables(folder))
+    KEPT.write(tables, folder)
+    found = summarise(KEPT.read(folder))
     found |= {"budget": settings.budget, "first_seed": settings.robustness.first_seed, "versions": VERSIONS}
     write_json(folder / "findings.json", found)
     draw(found, folder)

@@ -22,11 +22,19 @@ from IPython.display import Markdown, display
 from PIL import Image
 
 from enhsim_tf.errors import InputError
-from enhsim_tf.reproduce import claims, figures, labelled_figures, labelled_findings, labelled_run, robustness_figures, robustness_run
+from enhsim_tf.reproduce import (
+    claims,
+    figures,
+    findings,
+    labelled_figures,
+    labelled_findings,
+    labelled_run,
+    robustness_figures,
+    robustness_run,
+)
 from enhsim_tf.reproduce.caption import caption_of
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.figure_data import FIGURE_DATA
-from enhsim_tf.reproduce.findings import read_tables
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages, default_cache
 from enhsim_tf.sheet import STYLE
@@ -117,7 +125,7 @@ def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
     print(
         f"{found['num_replicates']} replicates: {len(found['seeds'])} seeds in {len(found['environments'])} environments, kept in figures/."
     )
-    return found, read_tables(_KEPT)
+    return found, findings.KEPT.read(_KEPT)
 
 
 def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
@@ -125,7 +133,7 @@ def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
     folder = _ROOT / "figures" / labelled_run.FOLDER
     found = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
     print(f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in figures/.")
-    return found, labelled_findings.read_tables(folder)
+    return found, labelled_findings.KEPT.read(folder)
 
 
 def show_finding(found: dict, name: str) -> None:
