@@ -12,6 +12,7 @@ from enhsim_tf.detectors import CONTROLS, DETECTORS
 from enhsim_tf.errors import InputError
 from enhsim_tf.injections import INJECTIONS
 from enhsim_tf.reproduce import findings, robustness_figures, robustness_report
+from enhsim_tf.reproduce.caption import caption_of_findings
 from enhsim_tf.reproduce.degraded_modes import METHODS, SCORED
 from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, QUICK_DETECTORS
 from enhsim_tf.simulator import MODES
@@ -158,20 +159,29 @@ def test_c8_by_the_rule_of_the_ledger(found):
 
 
 def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):
-    from enhsim_tf.reproduce import page, robustness_run
+    from enhsim_tf.reproduce import figures, page, robustness_run
 
     whole = {**found, "budget": "full"}
     assert page._experiment(tmp_path) is None
     folder = tmp_path / robustness_run.FOLDER
     folder.mkdir()
     (folder / "findings.json").write_text(json.dumps(whole), encoding="utf-8")
-    assert len(robustness_run.draw(whole, folder)) == 2 * len(robustness_figures.FIGURES)
+    assert len(figures.save_all(robustness_figures.FIGURES, whole, folder, findings.KEPT.command)) == 2 * len(robustness_figures.FIGURES)
     shown = page._experiment(tmp_path)
     assert shown["share"] == (0, 28) and [picture.name for picture in shown["pictures"]] == ["false_alarms", "recall", "degraded_modes"]
     kept = json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))
     text = page.write_page(tmp_path, kept, []).read_text(encoding="utf-8")
     rows = re.findall(r"<tr role=\"row\"><th scope=\"row\" role=\"rowheader\">([^<]+)</th>", text)
     assert rows == list(ARMS) and text.count("60.0 % (60.0 to 60.0)") == len(ENVIRONMENTS)
+
+
+@pytest.mark.parametrize(("seeds", "words", "ran"), [([7], "one seed", "seed 7"), ([7, 8, 9], "3 seeds", "seeds 7 to 9")])
+def test_one_seed_is_no_seeds(found, seeds, words, ran):
+    some = {**found, "seeds": seeds, "modes": {**found["modes"], "seeds": seeds}, "budget": "full"}
+    text = " ".join(robustness_report.render(some).split())
+    assert f"severities and {words};" in text and f"replicates: {words} ({seeds[0]} to {seeds[-1]}) in" in text
+    assert f"interval over {words} (" in robustness_report.table(some)
+    assert caption_of_findings(some, "python -m this") == f"{ran} · full budget · python -m this"
 
 
 def test_findings_are_plain_json(found):
