@@ -13,7 +13,7 @@ from enhsim_tf.reproduce.__main__ import main
 from enhsim_tf.reproduce.labelled_figures import FIGURES
 from enhsim_tf.reproduce.labelled_findings import KEPT, summarise
 from enhsim_tf.reproduce.labelled_run import table
-from enhsim_tf.reproduce.labelled_study import ARMS, DEGRADED_ARM, GENERATED_ARM, ChannelStudy, _of_samples
+from enhsim_tf.reproduce.labelled_study import ARMS, DEGRADED_ARM, GENERATED_ARM, ChannelStudy
 from enhsim_tf.reproduce.robustness_report import findings_of
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
@@ -128,11 +128,6 @@ def test_real_windows_that_train_and_that_set_thresholds_share_no_sample(data, c
     training, held_out = study._real(10_000, True), study._real(10_000, False)
     values = study.channel.train.values
     assert np.isin(training, values[:1_000]).all() and not np.isin(held_out, values[:1_000]).any()
-
-
-def test_a_sample_has_the_mean_score_of_the_windows_it_lies_in():
-    scores = _of_samples(np.array([1.0, 3.0, 8.0]), np.array([0, 2, 4]), 4, 10)
-    assert scores.tolist() == [1, 1, 2, 2, 5.5, 5.5, 8, 8, 8, 8]
 
 
 def test_the_second_run_takes_every_channel_from_the_cache(data, cache, out, tmp_path, capsys):
