@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enhsim_tf.commands import LEAST_WINDOW, parse
-from enhsim_tf.terminal import finish, printable
+from enhsim_tf.terminal import finish, printable, tell
 
 if TYPE_CHECKING:
     from enhsim_tf.cleaning import Cleaning
@@ -233,11 +233,6 @@ def load(folder: Path) -> "EnhancedSimulator":
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
     return EnhancedSimulator.load(folder)
-
-
-def tell(line: str) -> None:
-    """Prints a line at once."""
-    print(line, flush=True)
 
 
 def main(arguments: list[str] | None = None) -> int:

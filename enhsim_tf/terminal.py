@@ -25,6 +25,11 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
+def tell(line: str) -> None:
+    """Prints a line at once, so that whoever waits or reads through a pipe sees it."""
+    print(line, flush=True)
+
+
 def finish(run: Callable[[], int], interrupted: str) -> int:
     """Runs a command and returns its exit code.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from enhsim_tf.files import make_folder, replace_file
+from enhsim_tf.reproduce.caption import in_seeds
 
 Findings = Mapping[str, Any]
 PATH = Path("docs") / "REPORT.md"
@@ -74,7 +75,7 @@ def render(found: Findings, labelled: Findings | None = None, template: str = "r
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"per_cent": per_cent, "interval": interval, "p_value": p_value, "reached": reached}
+    environment.filters |= {"per_cent": per_cent, "interval": interval, "p_value": p_value, "reached": reached, "in_seeds": in_seeds}
     words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
     return environment.get_template(template).render(found=found, labelled=labelled, words=words, c8=share_c8(found))
 
@@ -100,10 +101,10 @@ def report(found: Findings, root: Path) -> None:
     from enhsim_tf.reproduce import labelled_run
     from enhsim_tf.reproduce.report import fill_parts
 
+    labelled = findings_of(root, "labelled")
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
-        temporary.write_text(render(found, findings_of(root, "labelled")), encoding="utf-8")
-    labelled = findings_of(root, "labelled")
+        temporary.write_text(render(found, labelled), encoding="utf-8")
     parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
     readme = root / "README.md"
     if readme.is_file():
@@ -125,10 +126,9 @@ def table(found: Findings) -> str:
         closed = "" if about["gap_closed"] is None else f"{100 * about['gap_closed']:.0f} %"
         lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {closed} |")
     seeds = found["seeds"]
-    number = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
     return "\n".join(lines) + (
         f"\n\nFalse alarms on {found['num_windows']:,} real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over "
-        f"{number} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five severities. "
+        f"{in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five severities. "
         "From `figures/robustness/findings.json`."
     )
 
