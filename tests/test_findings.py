@@ -203,9 +203,9 @@ def test_the_report_is_what_the_tables_say():
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
     again = findings.summarise(findings.KEPT.read(KEPT))
     assert json.loads(json.dumps(again)) == {key: kept[key] for key in again}
-    assert robustness_report.render(kept, robustness_report.findings_of(ROOT, "labelled")) == (ROOT / robustness_report.PATH).read_text(
-        encoding="utf-8"
-    )
+    assert robustness_report.render(kept, robustness_report.findings_of(ROOT, "labelled"), robustness_report.designs_of(ROOT)) == (
+        ROOT / robustness_report.PATH
+    ).read_text(encoding="utf-8")
     assert robustness_report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
     assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000
     assert min(kept["seeds"]) >= 1_000, "development seeds are 100 to 199"

@@ -3,8 +3,9 @@
 No number is written here: each comes from the findings, and a test renders the report again from the tables.
 """
 
+import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -60,12 +61,18 @@ def share_c8(found: Findings) -> tuple[int, int]:
     return kept, total
 
 
-def render(found: Findings, labelled: Findings | None = None, template: str = "robustness_report.md.jinja") -> str:
+def render(
+    found: Findings,
+    labelled: Findings | None = None,
+    designs: Sequence[Mapping[str, str]] = (),
+    template: str = "robustness_report.md.jinja",
+) -> str:
     """The report as Markdown.
 
     Args:
         found: The findings.
         labelled: Those of the study of real telemetry, or None where there was none.
+        designs: Rows of what was tried on the way to the second generator, as `designs_of` reads them.
         template: Its template, beside this module.
     """
     import jinja2
@@ -75,9 +82,16 @@ def render(found: Findings, labelled: Findings | None = None, template: str = "r
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"per_cent": per_cent, "interval": interval, "p_value": p_value, "reached": reached, "in_seeds": in_seeds}
+    environment.filters |= {
+        "per_cent": per_cent,
+        "interval": interval,
+        "p_value": p_value,
+        "reached": reached,
+        "in_seeds": in_seeds,
+        "share": share,
+    }
     words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
-    return environment.get_template(template).render(found=found, labelled=labelled, words=words, c8=share_c8(found))
+    return environment.get_template(template).render(found=found, labelled=labelled, designs=designs, words=words, c8=share_c8(found))
 
 
 def findings_of(root: Path, name: str) -> Findings | None:
@@ -89,6 +103,24 @@ def findings_of(root: Path, name: str) -> Findings | None:
     """
     path = root / "figures" / name / "findings.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def designs_of(root: Path) -> list[dict[str, str]]:
+    """What was tried on the way to the second generator, a row a training; none where the project keeps no such table.
+
+    Args:
+        root: Folder of the project.
+    """
+    path = root / "docs" / "designs.csv"
+    if not path.is_file():
+        return []
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def share(text: str) -> str:
+    """A share of the table of designs in per cent; nothing where it was not measured."""
+    return per_cent(float(text)) if text else ""
 
 
 def report(found: Findings, root: Path) -> None:
@@ -104,7 +136,7 @@ def report(found: Findings, root: Path) -> None:
     labelled = findings_of(root, "labelled")
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
-        temporary.write_text(render(found, labelled), encoding="utf-8")
+        temporary.write_text(render(found, labelled, designs_of(root)), encoding="utf-8")
     parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
     readme = root / "README.md"
     if readme.is_file():
