@@ -123,7 +123,7 @@ def damaged_shard(bench, name, rng):
 
 def damaged_manifest(bench, name, rng):
     shutil.copytree(bench.folder / "undisturbed", bench.folder / name)
-    manifest = bench.folder / name / "manifest.json"
+    manifest = bench.folder / name / "_manifest.json"
     os.truncate(manifest, rng.integers(manifest.stat().st_size - 2))
     process = bench.start(name)
     err = process.communicate()[1]
