@@ -26,6 +26,7 @@ FLOORS = {
     "shard_folder": 2,
     "shards": 2,
     "engines": 1,
+    "ray_engine": 1,
     "scenario_file": 2,
     "checked_yaml": 0,
     "channels": 2,
@@ -116,6 +117,7 @@ WITHOUT_TENSORFLOW = [
     "fleet",
     "fleet_command",
     "engines",
+    "ray_engine",
 ]
 
 
