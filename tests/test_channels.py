@@ -171,6 +171,7 @@ def test_two_processes_of_which_one_is_killed_make_the_same_simulators(in_one_pr
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
 def test_ray_makes_the_same_simulators(in_one_process, tmp_path, monkeypatch):
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setenv("PYTHONPATH", os.path.dirname(os.path.dirname(__file__)))  # where actors find a package that is not installed
     monkeypatch.chdir(tmp_path)  # actors stand elsewhere: the folder has to reach them in full
     failed, told = fit("ray", GIVEN, workers=2, window=32, engine="ray")
     assert list(failed) == ["still"] and "periodic" in failed["still"]
