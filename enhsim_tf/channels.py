@@ -16,6 +16,7 @@ from enhsim_tf import engines
 from enhsim_tf.cleaning import Cleaning, clean
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.local_engine import ProcessesDiedError, num_cpus
 from enhsim_tf.terminal import printable, start_tensorflow
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ def fit_channels(
     out = make_folder(out)
     if (out / MANIFEST).is_file():
         raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
-    verbose = verbose and engine == "local" and min(engines.num_cpus() if workers is None else workers, len(series)) <= 1
+    verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
     here = Path(os.path.abspath(out))
     jobs = [Job(name, each, folder_of(here, name), dict(options), cleaning, verbose) for name, each in series.items()]
     for job in jobs:
@@ -163,14 +164,14 @@ def _fit_in_processes(jobs: Sequence[Job], engine: str, workers: int | None, not
     while waiting:
         try:
             fit(list(waiting.values()), workers)
-        except engines.ProcessesDiedError as died:
+        except ProcessesDiedError as died:
             suspects = [job for job in died.items if job.channel in waiting]
             if not suspects:
                 raise
             for job in suspects:  # one at a time, so that the channel that ends its process is known, and has all the memory
                 try:
                     fit([job], 1)
-                except engines.ProcessesDiedError:
+                except ProcessesDiedError:
                     said = (
                         "Expected a process that fits it. Received: only ones that were killed, perhaps for memory. Give it less telemetry."
                     )

@@ -13,10 +13,11 @@ import socket
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from enhsim_tf.engines import Deaths
 from enhsim_tf.errors import InputError
+from enhsim_tf.local_engine import Deaths
 
 _ANSWER_S = 10
+_REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
 _ACTOR_CPUS = 0.4  # of a CPU each: after half of a cluster is lost, its actors still find room on the other half
 
 
@@ -104,15 +105,26 @@ def _cluster() -> Iterator[Any]:
     address = os.environ.get("RAY_ADDRESS")
     local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # nothing large travels
     _check_address(address)
-    try:
+    with _Starting(f"at {address}" if address else "that starts here", (*_REFUSALS, ray.exceptions.RayError)):
         ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
-    except Exception as error:  # noqa: BLE001  a node that does not come up in time is an Exception of no kind
-        where = f"at {address}" if address else "that starts here"
-        raise InputError(f"Expected a Ray cluster {where}. Received: {_last_line(error)}.") from None
     try:
         yield ray
     finally:
         ray.shutdown()
+
+
+class _Starting:
+    """Makes one line of what Ray raises where there is no cluster; of a node that does not come up in time, an Exception of no kind."""
+
+    def __init__(self, where: str, kinds: tuple[type[Exception], ...]):
+        self.where, self.kinds = where, kinds
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if kind is Exception or isinstance(error, self.kinds):
+            raise InputError(f"Expected a Ray cluster {self.where}. Received: {_last_line(error)}.") from None
 
 
 def _check_address(address: str | None) -> None:

@@ -10,7 +10,8 @@ import sys
 import pytest
 from fleet_works import PlainMaker, die_at_thirteen, plan, refuse, threads_and_square, threads_of
 
-from enhsim_tf import engines
+from enhsim_tf import engines, ray_engine
+from enhsim_tf.local_engine import ProcessesDiedError
 
 with_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
 
@@ -52,7 +53,7 @@ def test_processes_that_die_without_end_are_given_up(refused):
     with refused("died in a row", "--workers"):
         try:
             list(engines.run("local", die_at_thirteen, [13], 1))
-        except engines.ProcessesDiedError as died:
+        except ProcessesDiedError as died:
             assert died.items == (13,)
             raise
 
@@ -105,6 +106,23 @@ def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, re
         (tmp_path / "here").mkdir()
         assert sorted(records) == [PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)]
     assert not ray.is_initialized()
+
+
+@with_ray
+@pytest.mark.parametrize("error", [Exception("The current node\ntimed out"), RuntimeError("timed out"), OSError(28, "timed out")])
+def test_a_cluster_that_does_not_start_is_one_line(error, monkeypatch, refused):
+    import ray
+
+    def init(*arguments, **options):
+        raise error
+
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setattr(ray, "init", init)
+    with refused("that starts here", "timed out"), ray_engine._cluster():
+        pass
+    error = KeyError("a mistake of ours")
+    with pytest.raises(KeyError), ray_engine._cluster():
+        pass
 
 
 @with_ray
