@@ -10,7 +10,7 @@ import argparse
 import dataclasses
 import importlib.util
 import json
-import os
+import pickle
 import resource
 import subprocess
 import sys
@@ -100,10 +100,9 @@ def _largest_actor() -> int:
 
 def measure_parts(options: argparse.Namespace) -> dict:
     """Makes shards in this process, in one thread as a worker does, and says what each part of the work took, a window."""
-    from enhsim_tf.engines import ONE_THREAD
+    from enhsim_tf import local_engine, shards
 
-    os.environ |= ONE_THREAD
-    from enhsim_tf import shards
+    local_engine.begin(pickle.dumps(None), threads=1)
 
     plan = plan_for(options)
     num_shards = min(plan.num_shards - 1, 6)

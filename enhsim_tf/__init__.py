@@ -13,7 +13,7 @@ _ROOMS = {
     "Cleaning": "cleaning",
     "Degraded": "simulator",
     "EnhancedSimulator": "enhanced_simulator",
-    "FitOptions": "fitting",
+    "FitOptions": "fit_options",
     "InputError": "errors",
     "NoiseGAN": "noise_gan",
     "ParquetStore": "store",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.commands import LEAST_WINDOW, parse
+from enhsim_tf.commands import parse
 from enhsim_tf.terminal import finish, printable, tell
 
 if TYPE_CHECKING:
@@ -26,16 +26,10 @@ def run(options: argparse.Namespace) -> int:
 
 def run_fit(options: argparse.Namespace) -> int:
     """Fits a simulator to each channel of the source."""
-    from enhsim_tf.errors import InputError
+    from enhsim_tf.fit_options import FitOptions
 
-    counts = {"num_windows": options.num_windows, "epochs": options.epochs, "num_iterations": options.iterations}
-    if min(counts["num_windows"], counts["epochs"]) < 1 or options.iterations < 0:
-        raise InputError("Expected at least one window and epoch, and no negative number of iterations. Received: less.")
-    if not 0 <= options.held_out <= 0.5 or (options.window is not None and options.window < LEAST_WINDOW):
-        raise InputError(
-            f"Expected --held-out from 0 to 0.5 and --window of at least {LEAST_WINDOW}. "
-            f"Received: {options.held_out} and {options.window or 'no window'}."
-        )
+    counts = (options.num_windows, options.epochs, options.iterations)
+    chosen = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed)
     from enhsim_tf.engines import workers_of
 
     workers = workers_of(options.workers)
@@ -44,7 +38,6 @@ def run_fit(options: argparse.Namespace) -> int:
 
     cleaning = cleaning_of(options, options.window or 64)
     series = read_source(options.source, options.column, options.time, cleaning)
-    chosen = {"window": options.window, "noise": options.noise, "held_out": options.held_out, "seed": options.seed} | counts
     failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, sys.stdout.isatty(), options.engine)
     return tell_failed(failed)
 

@@ -10,12 +10,13 @@ import os
 import urllib.parse
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from enhsim_tf import engines
 from enhsim_tf.cleaning import Cleaning, clean
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import encoded, make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.fit_options import FitOptions
 from enhsim_tf.local_engine import ProcessesDiedError, num_cpus
 from enhsim_tf.saved_simulator import MANIFEST, is_foreign
 from enhsim_tf.terminal import printable, start_tensorflow
@@ -35,7 +36,7 @@ class Job:
         channel: Its name.
         series: Its raw values, as `sources.read_source` reads them.
         folder: Where its simulator goes; absolute, for another process may stand elsewhere.
-        options: `fitting.FitOptions` as a dictionary.
+        options: How it is fitted.
         cleaning: What to do with dirty values.
         verbose: Whether to show progress bars.
     """
@@ -43,7 +44,7 @@ class Job:
     channel: str
     series: "pd.Series"
     folder: Path
-    options: Mapping[str, Any]
+    options: FitOptions
     cleaning: Cleaning
     verbose: bool = False
 
@@ -109,7 +110,7 @@ def refuse_foreign(folder: Path) -> None:
 def fit_channels(
     series: Mapping[str, "pd.Series"],
     out: str | os.PathLike,
-    options: Mapping[str, Any],
+    options: FitOptions,
     cleaning: Cleaning,
     workers: int | None,
     tell: Callable[[str], None],
@@ -121,7 +122,7 @@ def fit_channels(
     Args:
         series: Raw channels by name.
         out: The folder of the models.
-        options: Fields of `fitting.FitOptions`.
+        options: How they are fitted.
         cleaning: What to do with dirty values.
         workers: Channels fitted at a time, each in a process of its own; None: one a CPU. Their number changes no bit of the
             simulators. 0 fits them in this process, with the threads that it has.
@@ -141,7 +142,7 @@ def fit_channels(
         raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
     verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
     here = Path(os.path.abspath(out))
-    jobs = [Job(name, each, folder_of(here, name), dict(options), cleaning, verbose) for name, each in series.items()]
+    jobs = [Job(name, each, folder_of(here, name), options, cleaning, verbose) for name, each in series.items()]
     for job in jobs:
         refuse_foreign(job.folder)
     remove_leftovers(out)
@@ -233,10 +234,10 @@ def fit_job(job: Job) -> list[str]:
     cleaned = clean(job.series, job.cleaning)
     start_tensorflow()
     from enhsim_tf.channel_figure import channel_figure
-    from enhsim_tf.fitting import FitOptions, fit_channel
+    from enhsim_tf.fitting import fit_channel
 
     parts = [dataclasses.replace(part, name=job.channel) for part in cleaned.parts]
-    simulator, report = fit_channel(parts, FitOptions(**job.options), "auto" if job.verbose else 0)
+    simulator, report = fit_channel(parts, job.options, "auto" if job.verbose else 0)
     refuse_foreign(job.folder)  # it has been minutes
     with replace_folder(job.folder) as temporary:
         simulator.save(temporary)

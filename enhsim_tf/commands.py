@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from enhsim_tf.fit_options import FEWEST_SAMPLES
 from enhsim_tf.terminal import Parser
 
 EXAMPLES = """\
@@ -25,7 +26,6 @@ DETECTORS = (
     "convolutional-autoencoder",
 )
 EXIT = "exit code: 0 done, 2 the input or an option cannot be used (with several channels: of one of them), 130 interrupted"
-LEAST_WINDOW = 32  # samples: the networks of the noise look at 20 together
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -53,7 +53,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     _add_source(fit)
     fit.add_argument("--out", type=Path, required=True, metavar="MODEL_DIR", help="where the simulators go, a folder a channel")
-    fit.add_argument("--window", type=int, metavar="N", help="samples of a window, at least 32 (default: two periods, from 64 to 500)")
+    fit.add_argument(
+        "--window", type=int, metavar="N", help=f"samples of a window, at least {FEWEST_SAMPLES} (default: two periods, from 64 to 500)"
+    )
     fit.add_argument(
         "--noise", choices=("convolutional", "paper"), default="convolutional", help="networks of the noise (default: %(default)s)"
     )

@@ -3,7 +3,6 @@
 The end of the telemetry is held out: neither network, nor the levels that windows are drawn at, have seen it.
 """
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,43 +10,14 @@ import numpy as np
 from enhsim_tf.channel_report import ChannelReport, report_on
 from enhsim_tf.enhanced_simulator import EnhancedSimulator
 from enhsim_tf.errors import InputError
+from enhsim_tf.fit_options import FitOptions
 from enhsim_tf.pairs import num_places, split_off
 from enhsim_tf.simulator import SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
 
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # samples of the window that is chosen; the paper's is 500
-FEWEST_SAMPLES = 32  # of a window that is asked for: the discriminator's filters are 20 wide
 _LEAST_EXPLAINED = 0.05  # of the variance, by one square wave that runs free; of white noise the best explains one per cent
 _LEAST_LEARNT = 8  # windows that the networks learn from, at least
-
-
-@dataclasses.dataclass(frozen=True)
-class FitOptions:
-    """How a simulator is fitted to a channel.
-
-    Args:
-        window: Samples of a window. None: two periods, from 64 to 500 samples.
-        num_windows: Training windows, cut at random places.
-        epochs: Passes of the enhancer over them, at a learning rate that falls to zero.
-        num_iterations: Adversarial iterations of the noise.
-        noise: `convolutional`, or the networks of the `paper`.
-        held_out: Share of the telemetry, its end, that is kept for the report; 0 learns from all and reports on the same.
-        seed: Seed of everything drawn.
-    """
-
-    window: int | None = None
-    num_windows: int = 2_500
-    epochs: int = 6
-    num_iterations: int = 1_000
-    noise: str = "convolutional"
-    held_out: float = 0.2
-    seed: int = 0
-
-    def __post_init__(self):
-        if not 0 <= self.held_out <= 0.5:
-            raise InputError(f"Expected held_out from 0 to 0.5. Received: held_out={self.held_out}.")
-        if self.window is not None and self.window < FEWEST_SAMPLES:
-            raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
 
 
 def fit_channel(

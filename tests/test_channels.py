@@ -20,6 +20,7 @@ from enhsim_tf.channels import MANIFEST, fit_channels, fit_job, folder_of, model
 from enhsim_tf.cleaning import Cleaning
 from enhsim_tf.enhanced_simulator import EnhancedSimulator
 from enhsim_tf.enhancer import build_enhancer
+from enhsim_tf.fit_options import FitOptions
 
 TINY = {"window": 64, "num_windows": 30, "epochs": 1, "num_iterations": 2, "seed": 3}
 REPORTS = []  # of the first fit
@@ -55,7 +56,7 @@ def quick(monkeypatch):
 
 def fit(out, given, workers=0, engine="local", **changed):
     told = []
-    return fit_channels(given, out, TINY | changed, Cleaning(max_fill=5), workers, told.append, engine=engine), told
+    return fit_channels(given, out, FitOptions(**(TINY | changed)), Cleaning(max_fill=5), workers, told.append, engine=engine), told
 
 
 # names
@@ -252,7 +253,7 @@ def test_what_a_killed_process_left_is_cleared_away(tmp_path, quick):
 
 
 def test_a_foreign_folder_that_came_meanwhile_is_left_too(tmp_path, quick, refused, monkeypatch):
-    job = channels.Job("volts", series(), tmp_path / "volts", TINY, Cleaning())
+    job = channels.Job("volts", series(), tmp_path / "volts", FitOptions(**TINY), Cleaning())
     (tmp_path / "volts").mkdir()
     (tmp_path / "volts" / "notes.txt").write_text("mine")
     with refused("something else"):

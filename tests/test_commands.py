@@ -273,7 +273,7 @@ WRONG = {
     "seed below zero": ([*FIT, "--seed", "-1"], "--seed -1"),
     "seed too large": ([*GENERATE, "--windows", "5", "--seed", str(2**31)], str(2**31)),
     "window too short": ([*FIT, "--window", "31"], "31"),
-    "window of nothing": ([*FIT, "--window", "0"], "--window"),
+    "window of nothing": ([*FIT, "--window", "0"], "window=0"),
     "no training windows": ([*FIT, "--num-windows", "0"], "window"),
     "no epoch": ([*FIT, "--epochs", "0"], "epoch"),
     "iterations below zero": ([*FIT, "--iterations", "-1"], "iterations"),

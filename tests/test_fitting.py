@@ -11,7 +11,8 @@ from enhsim_tf import channel_report, fitting
 from enhsim_tf.channel_report import levels_of
 from enhsim_tf.channel_verdict import ChannelReport
 from enhsim_tf.enhanced_simulator import EnhancedSimulator
-from enhsim_tf.fitting import FitOptions, fit_channel, window_of
+from enhsim_tf.fit_options import FitOptions
+from enhsim_tf.fitting import fit_channel, window_of
 from enhsim_tf.injections import INJECTIONS
 from enhsim_tf.simulator import SquareWave, SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
@@ -144,7 +145,18 @@ def test_what_cannot_be_learnt_from_is_refused(refused, values, word):
         fit_channel([Telemetry(np.asarray(values, np.float32), name="volts")], TINY, 0)
 
 
-@pytest.mark.parametrize("options", [{"held_out": -0.1}, {"held_out": 0.6}, {"held_out": float("nan")}, {"window": 31}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"held_out": -0.1},
+        {"held_out": 0.6},
+        {"held_out": float("nan")},
+        {"window": 31},
+        {"num_windows": 0},
+        {"epochs": 0},
+        {"num_iterations": -1},
+    ],
+)
 def test_options_that_cannot_be_are_refused(refused, options):
     with refused(next(iter(options))):
         FitOptions(**options)

@@ -34,6 +34,7 @@ FLOORS = {
     "channel_figure": 2,
     "channel_report": 2,
     "channel_verdict": 0,
+    "fit_options": 0,
     "fitting": 2,
     "scoring": 2,
     "training_sets": 2,
@@ -114,6 +115,7 @@ WITHOUT_TENSORFLOW = [
     "training_sets",
     "terminal",
     "commands",
+    "fit_options",
     "__main__",
     "fleet",
     "fleet_command",
@@ -335,6 +337,7 @@ def test_every_room_has_its_tests():
         "fleet_plan": "shards",
         "shard_folder": "fleet",
         "checked_yaml": "scenario_file",
+        "fit_options": "fitting",
         "channel_report": "fitting",
         "channel_verdict": "fitting",
     }

@@ -79,7 +79,8 @@ class ChannelStudy:
 
     def _make_simulator(self, folder: Path) -> None:
         start_tensorflow()
-        from enhsim_tf.fitting import FitOptions, fit_simulator
+        from enhsim_tf.fit_options import FitOptions
+        from enhsim_tf.fitting import fit_simulator
 
         chosen = self.settings.labelled
         options = FitOptions(
