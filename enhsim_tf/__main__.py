@@ -246,8 +246,8 @@ def load(folder: Path) -> "EnhancedSimulator":
 
 
 def tell(line: str) -> None:
-    """Prints a line at once."""
-    print(line, flush=True)
+    """Prints a line, or some, at once; names of channels and folders in them may hold anything."""
+    print("\n".join(printable(each) for each in line.split("\n")), flush=True)
 
 
 def main(arguments: list[str] | None = None) -> int:

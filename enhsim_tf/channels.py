@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.cleaning import Cleaning, clean
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.files import file_name_of, make_folder, remove_leftovers, replace_folder, write_json
 from enhsim_tf.terminal import printable, start_tensorflow
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 MANIFEST = "manifest.json"  # by it a folder is known as a saved simulator
 _OURS = '"enhsim_tf.EnhancedSimulator/'  # and by this in it as one of ours
 _THREADS = 2  # of TensorFlow for each channel: how it adds up depends on their number, so that must not depend on the workers
-_MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,18 +52,12 @@ class Job:
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """The folder of a channel: its name, percent-encoded so that no name can leave the folder or hide in it.
+    """The folder of a channel, `files.file_name_of` its name.
 
     Raises:
-        InputError: If the name is empty, or too long for a file.
+        InputError: If no file can have the name.
     """
-    encoded = urllib.parse.quote(channel, safe=" ").replace(".", "%2E")
-    if not 1 <= len(encoded) <= _MOST_LETTERS:
-        raise InputError(
-            f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
-            f"Received: {printable(channel)[:60]!r} with {len(encoded)}. Rename it, or name the other channels."
-        )
-    return Path(models) / encoded
+    return Path(models) / file_name_of(channel)
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:

@@ -12,6 +12,7 @@ import re
 import shutil
 import socket
 import time
+import urllib.parse
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,8 @@ from typing import Any
 from enhsim_tf.errors import InputError
 
 _LEFT = re.compile(r"\..*?\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}\.tmp")
+_MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
+_KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
 _OLD_S = 24 * 3600  # no process writes nothing for so long
 
 
@@ -30,6 +33,31 @@ def _temporary(path: Path) -> Path:
 def _host() -> str:
     """This machine's name, short and without dots: a process number means nothing on another."""
     return re.sub(r"[^\w-]", "-", socket.gethostname())[:20] or "host"
+
+
+def file_name_of(channel: str) -> str:
+    """A channel's name as that of a file or folder; `urllib.parse.unquote` turns it back.
+
+    It is percent-encoded: no name can leave a folder, hide in it, or be one that a system keeps for itself.
+
+    Raises:
+        InputError: If the name is empty, too long for a file, or no Unicode.
+    """
+    try:
+        encoded = urllib.parse.quote(channel, safe=" ").replace(".", "%2E")
+    except UnicodeEncodeError:
+        raise InputError(f"Expected a channel name of Unicode characters. Received: {channel[:60]!r}. Rename it.") from None
+    inner = encoded.strip(" ")
+    left = len(encoded) - len(encoded.lstrip(" "))
+    if _KEPT.fullmatch(inner):
+        inner = f"%{ord(inner[0]):02X}{inner[1:]}"
+    encoded = "%20" * left + inner + "%20" * (len(encoded) - left - len(encoded.strip(" "))) if inner else "%20" * len(encoded)
+    if not 1 <= len(encoded) <= _MOST_LETTERS:
+        raise InputError(
+            f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
+            f"Received: {channel[:60]!r} with {len(encoded)}. Rename it, or name the other channels."
+        )
+    return encoded
 
 
 def make_folder(path: str | os.PathLike) -> Path:

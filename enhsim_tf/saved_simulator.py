@@ -1,22 +1,24 @@
 """A trained simulator at rest: a folder of three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
 
-It knows files and checksums, and what Keras' safe mode refuses; not what the networks are for.
+It knows files and checksums, and that Keras opens them in safe mode; not what the networks are for.
 """
 
-import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import keras
+import tensorflow as tf
 
+from enhsim_tf.declared_sizes import DAMAGES, read_json
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_folder, sha256, write_json
+from enhsim_tf.saved_network import check_network
 
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
+_MOST_BYTES = 50_000_000  # of a JSON file
 
 
 def write_saved(folder: str | os.PathLike, networks: Mapping[str, keras.Model], settings: Mapping[str, Any]) -> None:
@@ -44,7 +46,7 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, keras.Model], 
 def _is_saved(folder: Path) -> bool:
     """Whether a folder holds a saved simulator, by the format that its manifest names; damaged files do not matter."""
     try:
-        return json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["format"] == _FORMAT
+        return read_json(folder / "manifest.json", _MOST_BYTES)["format"] == _FORMAT
     except (OSError, ValueError, KeyError, TypeError):
         return False
 
@@ -64,7 +66,7 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, keras.Mod
     """
     folder = Path(folder)
     try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        manifest = read_json(folder / "manifest.json", _MOST_BYTES)
         known, checksums = manifest["format"] == _FORMAT, manifest["sha256"]
         complete = set(checksums) == {"settings.json", *(f"{name}.keras" for name in _NETWORKS)} and len(manifest) == 2
         checksums = dict(checksums)
@@ -76,9 +78,11 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, keras.Mod
         if not (folder / name).is_file() or sha256(folder / name) != expected:
             raise InputError(f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again.")
     try:
-        settings = json.loads((folder / "settings.json").read_text(encoding="utf-8"))
+        settings = read_json(folder / "settings.json", _MOST_BYTES)
+        for name in _NETWORKS:
+            check_network(folder / f"{name}.keras")
         networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
         return make(networks, settings)
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+    except (*DAMAGES, tf.errors.OpError) as error:
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

@@ -5,7 +5,6 @@ business. What reading itself noticed stands in `series.attrs["findings"]` and b
 """
 
 import os
-import tokenize
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.cleaning import Cleaning, clean
+from enhsim_tf.declared_sizes import MOST_COLUMNS, load_array
 from enhsim_tf.errors import InputError
 from enhsim_tf.repairs import Finding
 from enhsim_tf.stamps import stamps_of
@@ -113,16 +113,18 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None, options
     if time not in (None, NO_TIME):
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:  # what damaged headers raise
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        array = load_array(path)
+        array = array.astype(object) if array.dtype.kind == "U" else array  # not all that this can be is text to Arrow
+    except ValueError as error:
         raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({reason}). Save it again."
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
         ) from None
-    if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or array.dtype.names:
-        shape = "fields" if isinstance(array, np.ndarray) and array.dtype.names else getattr(array, "shape", "an archive")
+    if array.ndim not in (1, 2) or array.dtype.names:
+        shape = "fields" if array.dtype.names else array.shape
         raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
+    if columns is None and array.shape[1] > MOST_COLUMNS:
+        raise InputError(f"Expected at most {MOST_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
     known = [str(number) for number in range(array.shape[1])]
     for column in columns or ():
         if column not in known:
@@ -130,7 +132,8 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None, options
                 f"Expected a column of {path.name}, a number from 0 to {len(known) - 1}. Received: {column!r}. Name one of these."
             )
     names = {column: path.stem if len(known) == 1 else f"{path.stem}.{column}" for column in known}
-    return {names[column]: pd.Series(array[:, int(column)], name=names[column]) for column in columns or known}
+    kind = object if array.dtype == object else None
+    return {names[column]: pd.Series(array[:, int(column)], name=names[column], dtype=kind) for column in columns or known}
 
 
 def _read_table(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:

@@ -4,6 +4,7 @@ A cell that says nothing is missing; one that cannot be understood is refused by
 """
 
 import datetime
+import re
 from typing import Any
 
 import numpy as np
@@ -151,7 +152,10 @@ def _stamps_of_text(
     leap[of_text] = words.str.contains(r":\d\d:60")
     zoned[of_text] = words.str.contains(r"(?:Z|[+-]\d\d:?\d\d)$")
     text[of_text] = words.str.replace(r"(:\d\d):60", r"\1:59", regex=True)
-    stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
+    try:
+        stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # a format that is none
+        raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
     bad = (stamps.isna() & ~missing).to_numpy(bool)
     if bad.any() and not drop:
         _refuse_time(cells, bad, what, f"Give time_format (such as {'%d.%m.%y %H:%M:%S'!r}) or name another time column")

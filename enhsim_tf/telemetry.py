@@ -6,12 +6,12 @@ that its caller does not own, and it never interprets values: a series is what i
 
 import dataclasses
 import os
-import tokenize
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.declared_sizes import DAMAGES, check_parquet, load_array, reason_of
 from enhsim_tf.errors import InputError
 
 
@@ -152,14 +152,15 @@ def _read_array(path: Path, column: str | None, time: str | None):
             f"Expected --time with a table only. Received: --time {time} with {path.name}, an array has no named columns. Leave it out."
         )
     try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:  # what damaged headers raise
+        array = load_array(path)
+    except ValueError as error:
         raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({(str(error).splitlines() or [type(error).__name__])[0]}). Save it again."
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
         ) from None
-    if not isinstance(array, np.ndarray) or array.ndim not in (1, 2):
-        shape = getattr(array, "shape", "an archive")
-        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    if array.ndim not in (1, 2):
+        raise InputError(
+            f"Expected an array of shape (samples,) or (samples, columns). Received: {array.shape} in {path.name}. Reshape it."
+        )
     if array.ndim == 1 and column is None:
         return array, None, ""
     columns = 1 if array.ndim == 1 else array.shape[1]
@@ -181,10 +182,11 @@ def _read_table(path: Path, column: str | None, time: str | None):
             header = pd.read_csv(path, header=None, nrows=1, dtype=str, keep_default_na=False)  # before pandas makes names differ
             table, names = pd.read_csv(path), header.iloc[0].tolist()
         else:
+            check_parquet(path)
             table = pd.read_parquet(path)
             names = table.columns.tolist()
-    except (ValueError, OSError) as error:  # pandas' and Arrow's parser errors are ValueErrors
-        reason = (str(error).splitlines() or ["no reason given"])[0]
+    except DAMAGES as error:  # pandas' and Arrow's parser errors are ValueErrors
+        reason = reason_of(error)
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
     twice = [name for name in dict.fromkeys(names) if name != "" and names.count(name) > 1 and (column is None or name in (column, time))]
     if twice:

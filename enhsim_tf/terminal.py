@@ -6,7 +6,9 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-from enhsim_tf.errors import InputError
+from enhsim_tf.errors import InputError, printable
+
+__all__ = ["Parser", "finish", "printable", "start_tensorflow"]
 
 
 class Parser(argparse.ArgumentParser):
@@ -18,11 +20,6 @@ class Parser(argparse.ArgumentParser):
         if missing:
             raise InputError(f"Expected {missing}. Received: no such argument. See {self.prog} --help.")
         raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
-
-
-def printable(text: str) -> str:
-    """Text for one line of a terminal: what cannot be printed, such as a line's end, becomes a question mark."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def finish(run: Callable[[], int], interrupted: str) -> int:
@@ -46,7 +43,8 @@ def finish(run: Callable[[], int], interrupted: str) -> int:
     except (OSError, MemoryError) as error:
         reason = " ".join(str(error).splitlines()) or "more than there is"
         print(
-            f"error: Expected files and memory as they are needed. Received: {reason[:300]}. Make room, or ask for less.", file=sys.stderr
+            f"error: Expected files and memory as they are needed. Received: {printable(reason)[:300]}. Make room, or ask for less.",
+            file=sys.stderr,
         )
         return 2
     except KeyboardInterrupt:
