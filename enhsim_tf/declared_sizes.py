@@ -56,7 +56,12 @@ def load_array(path: str | os.PathLike) -> np.ndarray:
         raise ValueError("an archive")
     if mapped.dtype.itemsize == 0:
         raise ValueError(f"dtype {mapped.dtype}, which holds nothing")
-    return np.array(mapped)
+    array = np.array(mapped)
+    if array.dtype.kind == "U":
+        letters = np.ravel(array).view(np.dtype("u4").newbyteorder(array.dtype.byteorder))
+        if (letters > 0x10FFFF).any() or ((letters >= 0xD800) & (letters < 0xE000)).any():
+            raise ValueError("text that is no Unicode")
+    return array
 
 
 def load_arrays(path: str | os.PathLike, most_bytes: int) -> dict[str, np.ndarray]:

@@ -81,6 +81,7 @@ def _description_of(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
     if sum(member.file_size for member in members) > size:
         raise ValueError("an archive whose files share their bytes")
     description = json.loads(archive.read("config.json"))
+    description.pop("compile_config", None)  # how it was trained: nothing of it is loaded
     num_layers = 0
     for part in _parts_of(description):
         module, kind = part.get("module"), part["class_name"]
@@ -88,6 +89,8 @@ def _description_of(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
             raise ValueError(f"a part of the kind {str(module)[:40]}.{str(kind)[:40]}, of which no network of ours is made")
         if part.get("registered_name") not in (None, kind):
             raise ValueError(f"a part registered as {str(part['registered_name'])[:40]!r}")
+        if part.get("compile_config") is not None:
+            raise ValueError("a network inside another that is to be trained")
         settings = part.get("config")
         if isinstance(settings, dict) and any(settings.get(name) is not None for name in _UNUSED):
             raise ValueError(f"one of the settings {', '.join(_UNUSED)}")

@@ -114,7 +114,6 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None, options
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     try:
         array = load_array(path)
-        array = array.astype(object) if array.dtype.kind == "U" else array  # not all that this can be is text to Arrow
     except ValueError as error:
         raise InputError(
             f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
@@ -132,8 +131,7 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None, options
                 f"Expected a column of {path.name}, a number from 0 to {len(known) - 1}. Received: {column!r}. Name one of these."
             )
     names = {column: path.stem if len(known) == 1 else f"{path.stem}.{column}" for column in known}
-    kind = object if array.dtype == object else None
-    return {names[column]: pd.Series(array[:, int(column)], name=names[column], dtype=kind) for column in columns or known}
+    return {names[column]: pd.Series(array[:, int(column)], name=names[column]) for column in columns or known}
 
 
 def _read_table(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:

@@ -49,6 +49,7 @@ def judge(run: Callable[[bytes, Path], None], data: bytes, folder: Path) -> Outc
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
+    before = os.getcwd()
     os.chdir(folder)
     signal.signal(signal.SIGALRM, _interrupt)
     signal.setitimer(signal.ITIMER_REAL, MOST_SECONDS)
@@ -70,6 +71,7 @@ def judge(run: Callable[[bytes, Path], None], data: bytes, folder: Path) -> Outc
         verdict, why = "failed", "".join(traceback.format_exception(error)[-12:])
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
+        os.chdir(before)
     seconds = time.perf_counter() - began
     if seconds > MOST_SECONDS:
         verdict, why = "failed", f"{seconds:.1f} s"
