@@ -94,7 +94,7 @@ def _description_of(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
         settings = part.get("config")
         if isinstance(settings, dict) and any(settings.get(name) is not None for name in _UNUSED):
             raise ValueError(f"one of the settings {', '.join(_UNUSED)}")
-        num_layers += module != "keras.initializers" and "name" in part
+        num_layers += module == "keras.layers" or str(module).startswith("keras.src.ops.")
     if num_layers > _MOST_LAYERS:
         raise ValueError(f"{num_layers:,} layers")
     return description

@@ -41,11 +41,9 @@ def finish(run: Callable[[], int], interrupted: str) -> int:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it once more at its end
         return 141
     except (OSError, MemoryError) as error:
-        reason = " ".join(str(error).splitlines()) or "more than there is"
-        print(
-            f"error: Expected files and memory as they are needed. Received: {printable(reason)[:300]}. Make room, or ask for less.",
-            file=sys.stderr,
-        )
+        reason = " ".join(str(error).splitlines())[:300] or "more than there is"
+        line = InputError(f"Expected files and memory as they are needed. Received: {reason}. Make room, or ask for less.")
+        print(f"error: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(interrupted, file=sys.stderr)

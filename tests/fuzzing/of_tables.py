@@ -228,8 +228,8 @@ def _saved_score_seeds() -> list[bytes]:
 
 
 TARGETS = {
-    "csv table": Target(_file("x.csv"), _csv_seeds, "text", 2),
-    "parquet table": Target(_file("x.parquet"), _parquet_seeds, "bytes", 2),
+    "csv table": Target(_file("x.csv"), _csv_seeds, "text", 3),
+    "parquet table": Target(_file("x.parquet"), _parquet_seeds, "bytes", 3),
     "what pandas says of a parquet table": Target(_parquet_about, _parquet_about_seeds, "json", 1),
     "npy array": Target(_file("x.npy"), _npy_seeds, "bytes", 3),
     "header of an npy array": Target(_npy_header, _npy_header_seeds, "text", 3),
