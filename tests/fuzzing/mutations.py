@@ -1,5 +1,6 @@
 """Changes to inputs: of bytes, of text, and of JSON by its structure. The same generator makes the same changes."""
 
+import copy
 import json
 import random
 
@@ -79,7 +80,7 @@ def change_json(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
         parent, key = rng.choice(places[: rng.choice((3, 30, len(places)))])
         kind = rng.randrange(8)
         if kind <= 3:
-            parent[key] = rng.choice(NASTY_JSON)
+            parent[key] = copy.deepcopy(rng.choice(NASTY_JSON))
         elif kind == 4:
             other, elsewhere = rng.choice(places)
             parent[key] = json.loads(json.dumps(other[elsewhere]))
@@ -90,7 +91,7 @@ def change_json(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
             if isinstance(value, list):
                 value += value[: rng.choice((1, 2, 50))]
             elif isinstance(value, dict):
-                value[rng.choice(NASTY_TEXT)] = rng.choice(NASTY_JSON)
+                value[rng.choice(NASTY_TEXT)] = copy.deepcopy(rng.choice(NASTY_JSON))
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 parent[key] = value * rng.choice((-1, 2, 10, 1e3, 1e9))
             else:

@@ -90,6 +90,7 @@ def _column_options(data: bytes, folder: Path) -> None:
 
 def _source_name(data: bytes, folder: Path) -> None:
     text = text_of(data).replace("/", ":")  # not out of this folder
+    (folder / "x.csv").write_text("value\n1\n2\n3\n")
     all_of(lambda: read_source(text), lambda: read_source(f"store#{text}"), lambda: read_telemetry(text), lambda: read_mix(text))
 
 
