@@ -9,6 +9,7 @@ import math
 import os
 import struct
 import tokenize
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
@@ -48,7 +49,9 @@ def load_array(path: str | os.PathLike) -> np.ndarray:
         ValueError: If it cannot be read; the message says why.
     """
     try:
-        mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a map beyond the file's end is refused
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that a header was written by Python 2
+            mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a map beyond the file's end is refused
     except DAMAGES as error:
         raise ValueError(reason_of(error)) from None
     if not isinstance(mapped, np.ndarray):
@@ -75,7 +78,8 @@ def load_arrays(path: str | os.PathLike, most_bytes: int) -> dict[str, np.ndarra
         ValueError: If it cannot be read, or is larger; the message says why.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(path) as archive, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
             members = archive.infolist()
             if sum(member.file_size for member in members) > most_bytes:
                 raise ValueError("larger than such a file is")

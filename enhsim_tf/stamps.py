@@ -77,8 +77,12 @@ def stamps_of(
 
 def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> None:
     row = int(np.argmax(bad))
+    try:
+        received = shown(cells.iloc[row])
+    except (NotImplementedError, OverflowError, ValueError):  # a time so far off that its zone cannot tell it
+        received = "a time that is far off"
     raise InputError(
-        f"Expected times as ISO 8601 date-times or seconds. Received: {shown(cells.iloc[row])} at row {row} of {what}, and "
+        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at row {row} of {what}, and "
         f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop'."
     )
 

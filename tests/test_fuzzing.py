@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -100,6 +101,7 @@ FOUND = [
     ("header of an npy array", b"{'descr' '<U5', 'fortran_order': False, 'shape':,), }\n0"),
     ("header of an npy array", b"{'descr': '<f8', 0.5: False, 'shape': (60,), }\n"),
     ("header of an npy array", b"{'descr': '<U2', 'fortran_order': False, 'shape': (60,), }\n"),
+    ("header of an npy array", b"{'descr': '<f8', 'fortran_order': False, 'shape': (60L,), }\n"),
     ("npy array", b"\x93NUMPY\x02\x00\x42\x00\x00\x00{'descr': '<U1', 'fortran_order': False, 'shape': (3,), }         \n" + b"\xff\xd8\xff\x00" * 3),
     ("labelled array", b"PK\x03\x04-\x00\x00\x00"),
     ("labelled array", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (60,), }" + b" " * 20 + b"("),
@@ -221,3 +223,14 @@ def test_the_numbers_of_the_promise_are_those_of_the_record():
     assert len(named) >= 10
     for file, test in named:
         assert f"def {test or 'test_'}" in (ROOT / file).read_text(), (file, test)
+
+
+def test_a_time_so_far_off_that_its_zone_cannot_tell_it_is_refused(tmp_path, refused):
+    import pandas as pd
+
+    from enhsim_tf.sources import read_source
+
+    times = pd.DatetimeIndex(np.array([0, 60, 10**12]).view("datetime64[s]")).tz_localize("UTC").tz_convert("Europe/Berlin")
+    pd.DataFrame({"time": times, "value": [1.0, 2.0, 3.0]}).to_parquet(tmp_path / "x.parquet")
+    with refused("far off", "row 2"):
+        read_source(tmp_path / "x.parquet")

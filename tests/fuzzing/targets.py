@@ -3,4 +3,4 @@
 from tests.fuzzing import of_folders, of_tables, of_texts
 from tests.fuzzing.target import Target
 
-TARGETS: dict[str, Target] = of_texts.TARGETS | of_tables.TARGETS | of_folders.TARGETS
+TARGETS: dict[str, Target] = of_folders.TARGETS | of_tables.TARGETS | of_texts.TARGETS
