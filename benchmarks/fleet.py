@@ -1,50 +1,63 @@
-"""Speed of large data sets: `python -m benchmarks.fleet MODEL_DIR --out fleet.json`.
+"""Speed of large data sets: `python -m benchmarks.fleet MODEL_DIR`.
 
 Windows a second of `local` with one and two workers and of `ray` with two, each as a whole (processes starting included)
-and from the first shard on; bytes a window in the files; and the memory of the driver and of its largest worker. The rows
-differ in nothing but who works: their checksums are compared.
+and from the first shard on; bytes a window in the files; the memory of the driver and of its largest worker; where a
+worker's time goes; and how many shards a second a driver could hand out. The rows differ in nothing but who works: their
+checksums are compared. `benchmarks.sizing` draws and projects from the file this writes.
 """
 
 import argparse
 import dataclasses
 import importlib.util
+import json
+import os
 import resource
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 ROWS = {"local, 1 worker": ("local", 1), "local, 2 workers": ("local", 2), "ray, 2 workers": ("ray", 2)}
+PARTS, IDLE = "where the time goes", {"a driver alone, local": ("local", 2), "a driver alone, ray": ("ray", 2)}
+_NUM_IDLE = 5_000  # numbers that are handed out and come back, with no work between
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fleet", description="Speed of large data sets.")
     parser.add_argument("models", type=Path, metavar="MODEL_DIR", help="a saved simulator")
-    parser.add_argument("--windows", type=int, default=100_000, metavar="N", help="windows of each row (default: 100000)")
-    parser.add_argument("--repetitions", type=int, default=3, metavar="N", help="of each row, in turn (default: 3)")
+    parser.add_argument("--windows", type=int, default=1_000_000, metavar="N", help="windows of each row (default: 1000000)")
+    parser.add_argument("--repetitions", type=int, default=2, metavar="N", help="of each row, in turn (default: 2)")
     parser.add_argument("--nominal-share", type=float, default=0.5, metavar="SHARE", help="the others are stuck or drift (default: 0.5)")
-    parser.add_argument("--out", type=Path, required=True, help="the results")
-    parser.add_argument("--one", choices=ROWS, help=argparse.SUPPRESS)  # a row in a process of its own, whose memory is its own
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "fleet.json", help="the results (default: %(default)s)")
+    parser.add_argument("--one", choices=[*ROWS, PARTS, *IDLE], help=argparse.SUPPRESS)  # in a process whose memory is its own
     return parser.parse_args(arguments)
 
 
-def measure_one(options: argparse.Namespace) -> dict:
-    """Makes one data set and says what that took."""
-    from enhsim_tf import engines, fleet
+def plan_for(options: argparse.Namespace):
+    """The data set of every row."""
     from enhsim_tf.fleet_plan import plan_of
     from enhsim_tf.scenario_file import mix_of
     from enhsim_tf.simulator import Degraded
 
-    engine, workers = ROWS[options.one]
     mix = mix_of([Degraded("stuck", 0.5), Degraded("drift", 0.3)], options.nominal_share)
-    plan = plan_of(dataclasses.replace(mix, shard=min(8_192, max(1, options.windows // 8))), options.models, 0, options.windows)
-    finished, run = [], engines.run
+    mix = dataclasses.replace(mix, shard=min(8_192, max(1, options.windows // 8)))
+    return plan_of(mix, options.models, 0, options.windows)
+
+
+def measure_row(options: argparse.Namespace) -> dict:
+    """Makes one data set and says what that took."""
+    from enhsim_tf import engines, fleet
+
+    engine, workers = ROWS[options.one]
+    plan, run, finished, actor_bytes = plan_for(options), engines.run, [], []
 
     def timed(*arguments):
         for record in run(*arguments):
             finished.append((time.perf_counter(), record.rows))
+            actor_bytes.append(_largest_actor())
             yield record
 
     engines.run = timed
@@ -52,48 +65,145 @@ def measure_one(options: argparse.Namespace) -> dict:
         began = time.perf_counter()
         fleet.generate_fleet(Path(folder) / "set", plan, workers, engine, tell=lambda line: None)
         seconds = time.perf_counter() - began
-        files = list((Path(folder) / "set").glob("shard-*.parquet"))
-        num_bytes = sum(file.stat().st_size for file in files)
+        num_bytes = sum(file.stat().st_size for file in (Path(folder) / "set").glob("shard-*.parquet"))
         checksums = fleet.read_manifest(Path(folder) / "set")["shards"]
     later = sum(rows for _, rows in finished[workers:])
+    children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
     return {
         "windows": options.windows,
         "samples": plan.window,
+        "shard": plan.shard,
         "seconds": seconds,
         "windows_a_second": options.windows / seconds,
+        "first_shard_s": finished[0][0] - began,
         # the workers' first shards wait for TensorFlow and for the networks to be built
         "windows_a_second_once_running": later / (finished[-1][0] - finished[workers - 1][0]) if later else None,
         "bytes_a_window": num_bytes / options.windows,
         "driver_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
-        # of processes that have ended: with Ray those of its own making are none of ours
-        "largest_worker_bytes": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 if engine == "local" else None,
+        "largest_worker_bytes": children if engine == "local" else max(actor_bytes),
         "sha256": [record.sha256 for record in checksums],
     }
 
 
+def _largest_actor() -> int:
+    """Peak memory of the largest Ray actor of this machine, in bytes; they are nobody's children."""
+    most = 0
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if (process / "cmdline").read_bytes().startswith(b"ray::_Actor"):
+                lines = (process / "status").read_text().splitlines()
+                most = max(most, *(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")))
+        except OSError:  # it has ended
+            continue
+    return most
+
+
+def measure_parts(options: argparse.Namespace) -> dict:
+    """Makes shards in this process, in one thread as a worker does, and says what each part of the work took, a window."""
+    from enhsim_tf.engines import ONE_THREAD
+
+    os.environ |= ONE_THREAD
+    from enhsim_tf import shards
+
+    plan = plan_for(options)
+    num_shards = min(plan.num_shards - 1, 6)
+    spent: dict[str, float] = {}
+
+    def timed(name: str, call: Callable) -> Callable:
+        def wrapped(*arguments, **named):
+            began = time.perf_counter()
+            try:
+                return call(*arguments, **named)
+            finally:
+                spent[name] = spent.get(name, 0.0) + time.perf_counter() - began
+
+        return wrapped
+
+    with tempfile.TemporaryDirectory() as folder:
+        maker = shards.ShardMaker(plan, folder)
+        maker(num_shards)  # builds the networks
+        (simulator,) = maker.simulators
+        object.__setattr__(simulator.coarse, "simulate", timed("coarse simulator", simulator.coarse.simulate))
+        simulator.enhance = timed("enhancer", simulator.enhance)
+        simulator.noise.generate = timed("noise", simulator.noise.generate)
+        shards.make_windows = timed("windows", shards.make_windows)
+        began = time.perf_counter()
+        for number in range(num_shards):
+            maker(number)
+        whole = time.perf_counter() - began
+    rows = num_shards * plan.shard
+    networks = {name: spent[name] for name in ("coarse simulator", "enhancer", "noise")}
+    others = {"draws and levels": spent["windows"] - sum(networks.values()), "Parquet and checksum": whole - spent["windows"]}
+    product_s, flop = _matrix_product()
+    work = simulator.enhancer.count_params() * 2  # a multiplication and an addition for each weight
+    return {
+        "windows": rows,
+        "noise": type(simulator.noise).__name__,
+        "seconds_a_window": {name: value / rows for name, value in (networks | others).items()},
+        "enhancer_parameters": simulator.enhancer.count_params(),
+        "enhancer_flop_a_second": work * rows / networks["enhancer"],
+        "matrix_product_flop_a_second": flop / product_s,
+    }
+
+
+def _matrix_product() -> tuple[float, float]:
+    """Seconds and operations of the best of some matrix products of the enhancer's size, in this process' one thread."""
+    import tensorflow as tf
+
+    first, second = (tf.random.stateless_uniform(shape, (1, 2)) for shape in ((1_024, 3_200), (3_200, 3_200)))
+    product, times = tf.function(tf.matmul), []
+    for _ in range(8):
+        began = time.perf_counter()
+        product(first, second).numpy()
+        times.append(time.perf_counter() - began)
+    return min(times), 2 * 1_024 * 3_200 * 3_200
+
+
+def same(number: int) -> int:
+    """No work at all."""
+    return number
+
+
+def measure_idle(options: argparse.Namespace) -> dict:
+    """How many numbers a second an engine hands out and gets back."""
+    from enhsim_tf import engines
+
+    engine, workers = IDLE[options.one]
+    times = [time.perf_counter() for _ in engines.run(engine, same, range(_NUM_IDLE), workers)]
+    return {"shards_a_second": (len(times) - 500) / (times[-1] - times[499])}
+
+
+def measured(options: argparse.Namespace, name: str) -> dict:
+    """What a process of its own measured."""
+    given = [str(options.models), "--windows", str(options.windows), "--nominal-share", str(options.nominal_share), "--one", name]
+    ended = subprocess.run([sys.executable, "-m", "benchmarks.fleet", *given], capture_output=True, text=True)
+    if ended.returncode:
+        raise SystemExit(f"{name}: {(ended.stderr.strip().splitlines() or ['no word'])[-1]}")
+    return json.loads(ended.stdout.splitlines()[-1])
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Measures every row and writes the results."""
-    import json
-
-    from enhsim_tf.files import write_json
-
     options = parse(arguments)
     if options.one:
-        print(json.dumps(measure_one(options)))
+        measure = measure_row if options.one in ROWS else measure_idle if options.one in IDLE else measure_parts
+        print(json.dumps(measure(options)))
         return 0
-    names = [name for name in ROWS if "ray" not in name or importlib.util.find_spec("ray")]
+    from benchmarks.__main__ import machine
+    from enhsim_tf.files import write_json
+
+    has_ray = importlib.util.find_spec("ray") is not None
+    names = [name for name in ROWS if "ray" not in name or has_ray]
+    made = {"machine": machine(), "nominal_share": options.nominal_share, PARTS: measured(options, PARTS)}
+    made["driver"] = {IDLE[name][0]: measured(options, name) for name in IDLE if "ray" not in name or has_ray}
     found: dict[str, list[dict]] = {name: [] for name in names}
     for _ in range(options.repetitions):
         for name in names:  # in turn: what else the machine does meets all rows alike
-            given = [str(options.models), "--windows", str(options.windows), "--nominal-share", str(options.nominal_share), "--out", "-"]
-            ended = subprocess.run([sys.executable, "-m", "benchmarks.fleet", *given, "--one", name], capture_output=True, text=True)
-            if ended.returncode:
-                raise SystemExit(f"{name}: {ended.stderr.strip().splitlines()[-1]}")
-            found[name].append(json.loads(ended.stdout.splitlines()[-1]))
+            found[name].append(measured(options, name))
             print(f"{name:18} {found[name][-1]['windows_a_second']:10,.0f} windows a second", flush=True)
-    same = len({json.dumps(row.pop("sha256")) for rows in found.values() for row in rows}) == 1
-    write_json(options.out, {"same_bytes": same, "rows": found})
-    return 0 if same else 1
+    equal = len({json.dumps(row.pop("sha256")) for rows in found.values() for row in rows}) == 1
+    write_json(options.out, made | {"same_bytes": equal, "rows": found})
+    return 0 if equal else 1
 
 
 if __name__ == "__main__":

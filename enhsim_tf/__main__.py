@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enhsim_tf.commands import LEAST_WINDOW, parse
-from enhsim_tf.terminal import finish, printable
+from enhsim_tf.terminal import finish, printable, tell
 
 if TYPE_CHECKING:
     from enhsim_tf.cleaning import Cleaning
@@ -80,7 +80,7 @@ def run_generate(options: argparse.Namespace) -> int:
     start = None if options.start is None else start_of(options.start)
     if options.continuous is not None:
         parse_length(options.continuous)
-    from enhsim_tf.channels import models_of
+    from enhsim_tf.channels import chosen_of, models_of
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = outputs_of(options.out, models, (".parquet",))
@@ -194,16 +194,6 @@ def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
     )
 
 
-def chosen_of(models: dict[str, Path], channels: list[str] | None) -> dict[str, Path]:
-    """The channels that were named, or all."""
-    from enhsim_tf.errors import InputError
-
-    unknown = [name for name in channels or () if name not in models]
-    if unknown:
-        raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
-    return {name: models[name] for name in channels or models}
-
-
 def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
     """A file for each channel: the one that was named, or one a channel in the folder that was named.
 
@@ -243,11 +233,6 @@ def load(folder: Path) -> "EnhancedSimulator":
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
     return EnhancedSimulator.load(folder)
-
-
-def tell(line: str) -> None:
-    """Prints a line, or some, at once; names of channels and folders in them may hold anything."""
-    print("\n".join(printable(each) for each in line.split("\n")), flush=True)
 
 
 def main(arguments: list[str] | None = None) -> int:

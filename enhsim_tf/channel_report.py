@@ -12,8 +12,8 @@ import numpy as np
 from enhsim_tf import realism, robustness
 from enhsim_tf.channel_verdict import SEVERITY, ChannelReport
 from enhsim_tf.detectors import DETECTORS
-from enhsim_tf.pairs import at_level, cut_pairs, cut_parts, even_places
-from enhsim_tf.telemetry import Telemetry
+from enhsim_tf.pairs import cut_pairs, even_places, ridge, window_errors
+from enhsim_tf.telemetry import Telemetry, disjoint_offsets
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
@@ -46,7 +46,9 @@ def report_on(
     extracted = simulator.residual_windows(learnt, _NUM_WINDOWS, np.random.default_rng([seed, 2]))
     noise_sd = float(np.std(extracted, dtype=np.float64))
     noise_window, rows = _compare_noise(simulator, [*learnt, *held_out] if is_held_out else list(learnt), seed)
-    real = cut_parts(learnt, even_places(learnt, window, 2 * _NUM_WINDOWS), window)[0]
+    places = even_places(learnt, window, 2 * _NUM_WINDOWS)
+    training = cut_pairs(learnt, simulator.coarse, places, window, follow=True)
+    real = training.target
     trial = robustness.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
     trial = dataclasses.replace(trial, anomalous={key: value for key, value in trial.anomalous.items() if key[1] == SEVERITY})
     quick = {name: DETECTORS[name] for name in QUICK}
@@ -66,7 +68,7 @@ def report_on(
         min(len(pairs), sum(len(part) // window for part in held_out)),
         {
             "coarse": _nrmse(pairs.coarse_at_level, pairs.target),
-            "ridge": _nrmse(_ridge(simulator, learnt, pairs), pairs.target),
+            "ridge": _nrmse(ridge(training, pairs), pairs.target),
             "enhanced": _nrmse(enhanced, pairs.target),
         },
         rows,
@@ -102,33 +104,16 @@ def levels_of(values: np.ndarray) -> dict[str, float]:
     return {"count": len(often), "step": step} if is_even else {}
 
 
-def _errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Error of each window in units of its own standard deviation; NaN where it is flat, which says nothing."""
-    deviation = target.std(axis=1, dtype=np.float64)
-    error = np.sqrt(np.mean((windows - target) ** 2, axis=1, dtype=np.float64))
-    return error / np.where(deviation > 0, deviation, np.nan)
-
-
 def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
     """Median of the errors over windows that are not flat, NaN where all are."""
-    errors = _errors(windows, target)
+    errors = window_errors(windows, target)
     return float(np.nanmedian(errors)) if np.isfinite(errors).any() else float("nan")
 
 
 def _typical(windows: np.ndarray, target: np.ndarray) -> int:
     """The window whose error is nearest to the median."""
-    apart = np.abs(_errors(windows, target) - _nrmse(windows, target))
+    apart = np.abs(window_errors(windows, target) - _nrmse(windows, target))
     return int(np.argmin(np.where(np.isnan(apart), np.inf, apart)))
-
-
-def _ridge(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], pairs: Any) -> np.ndarray:
-    """Ridge regression from the same coarse windows to the same targets, at the level of each window."""
-    from sklearn.linear_model import Ridge
-
-    places = even_places(learnt, simulator.window, 2 * _NUM_WINDOWS)
-    training = cut_pairs(learnt, simulator.coarse, places, simulator.window, follow=True).clear()
-    ridge = Ridge().fit(training.coarse, training.target_in_unit)
-    return at_level(ridge.predict(pairs.coarse).astype(np.float32), pairs.shift, pairs.gain)
 
 
 def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], seed: int) -> tuple[int, list[dict[str, Any]]]:
@@ -137,7 +122,7 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     whole = [part for part in parts if len(part) >= window]
     places, before = [], 0
     for part in whole:
-        places += list(before + np.arange(0, len(part) - window + 1, window))
+        places += list(before + disjoint_offsets(len(part), window))
         before += len(part) - window + 1
     pairs = simulator.pairs(whole, np.array(places))
     residual = pairs.target - simulator.follow(pairs)

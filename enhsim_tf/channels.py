@@ -12,21 +12,20 @@ import os
 import signal
 import threading
 import urllib.parse
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.cleaning import Cleaning, clean
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import file_name_of, make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.files import encoded, make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.saved_simulator import MANIFEST, is_foreign
 from enhsim_tf.terminal import printable, start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MANIFEST = "manifest.json"  # by it a folder is known as a saved simulator
-_OURS = '"enhsim_tf.EnhancedSimulator/'  # and by this in it as one of ours
 _THREADS = 2  # of TensorFlow for each channel: how it adds up depends on their number, so that must not depend on the workers
 
 
@@ -52,12 +51,12 @@ class Job:
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """The folder of a channel, `files.file_name_of` its name.
+    """The folder of a channel: its name, encoded.
 
     Raises:
         InputError: If no file can have the name.
     """
-    return Path(models) / file_name_of(channel)
+    return Path(models) / encoded(channel)
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:
@@ -77,15 +76,29 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
     return {urllib.parse.unquote(folder.parent.name): folder.parent for folder in folders}
 
 
+def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:
+    """The fitted channels that were named, or all.
+
+    Args:
+        models: Those of `models_of`.
+        channels: Names, or None.
+
+    Raises:
+        InputError: If one of them is not there.
+    """
+    unknown = [name for name in channels or () if name not in models]
+    if unknown:
+        raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
+    return {name: models[name] for name in channels or models}
+
+
 def refuse_foreign(folder: Path) -> None:
-    """Refuses a folder that holds something else than a saved simulator; an empty one is as good as none.
+    """Refuses a folder that holds something else than a saved simulator.
 
     Raises:
         InputError: If it does.
     """
-    manifest, is_empty = folder / MANIFEST, folder.is_dir() and not any(folder.iterdir())
-    is_ours = manifest.is_file() and _OURS in manifest.read_text(encoding="utf-8", errors="replace")  # others have manifests too
-    if os.path.lexists(folder) and not (is_ours or is_empty):
+    if is_foreign(folder):
         raise InputError(f"Expected a folder for models. Received: {folder}, which holds something else. Name another --out.")
 
 

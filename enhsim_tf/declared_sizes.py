@@ -42,7 +42,7 @@ DAMAGES = (  # what damaged headers and archives raise
 )
 
 
-def load_array(path: str | os.PathLike) -> np.ndarray:
+def whole_array(path: str | os.PathLike) -> np.ndarray:
     """The array of a `.npy` file, without pickle; its file has to be as long as its header says.
 
     Raises:
@@ -67,7 +67,7 @@ def load_array(path: str | os.PathLike) -> np.ndarray:
     return array
 
 
-def load_arrays(path: str | os.PathLike, most_bytes: int) -> dict[str, np.ndarray]:
+def whole_arrays(path: str | os.PathLike, most_bytes: int) -> dict[str, np.ndarray]:
     """The arrays of a `.npz` file, without pickle.
 
     Args:

@@ -35,8 +35,8 @@ def _host() -> str:
     return re.sub(r"[^\w-]", "-", socket.gethostname())[:20] or "host"
 
 
-def file_name_of(channel: str) -> str:
-    """A channel's name as that of a file or folder; `urllib.parse.unquote` turns it back.
+def encoded(name: str) -> str:
+    """A name, such as a channel's, as that of a file or folder; `urllib.parse.unquote` turns it back.
 
     It is percent-encoded: no name can leave a folder, hide in it, or be one that a system keeps for itself.
 
@@ -44,20 +44,18 @@ def file_name_of(channel: str) -> str:
         InputError: If the name is empty, too long for a file, or no Unicode.
     """
     try:
-        encoded = urllib.parse.quote(channel, safe=" ").replace(".", "%2E")
+        found = urllib.parse.quote(name, safe=" ").replace(".", "%2E")
     except UnicodeEncodeError:
-        raise InputError(f"Expected a channel name of Unicode characters. Received: {channel[:60]!r}. Rename it.") from None
-    inner = encoded.strip(" ")
-    left = len(encoded) - len(encoded.lstrip(" "))
-    if _KEPT.fullmatch(inner):
-        inner = f"%{ord(inner[0]):02X}{inner[1:]}"
-    encoded = "%20" * left + inner + "%20" * (len(encoded) - left - len(encoded.strip(" "))) if inner else "%20" * len(encoded)
-    if not 1 <= len(encoded) <= _MOST_LETTERS:
+        raise InputError(f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it.") from None
+    found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # which Windows takes away
+    if _KEPT.fullmatch(found):
+        found = f"%{ord(found[0]):02X}{found[1:]}"
+    if not 1 <= len(found) <= _MOST_LETTERS:
         raise InputError(
             f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
-            f"Received: {channel[:60]!r} with {len(encoded)}. Rename it, or name the other channels."
+            f"Received: {name[:60]!r} with {len(found)}. Rename it, or name the other channels."
         )
-    return encoded
+    return found
 
 
 def make_folder(path: str | os.PathLike) -> Path:

@@ -5,7 +5,7 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
-from enhsim_tf.channels import folder_of, models_of
+from enhsim_tf.channels import chosen_of, folder_of, models_of
 from enhsim_tf.errors import InputError
 from enhsim_tf.fleet import generate_fleet
 from enhsim_tf.fleet_plan import Plan, plan_of
@@ -52,7 +52,7 @@ def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
         if options.channel:
             raise InputError("Expected models in one place. Received: --channel, and a scenario file that names models.")
         return {options.out: plan_of(mix, options.models, seed, num_windows)}
-    models = _chosen(models_of(options.models), options.channel)
+    models = chosen_of(models_of(options.models), options.channel)
     plans = {}
     for name, folder in models.items():
         out = options.out if len(models) == 1 else folder_of(options.out, name)
@@ -68,13 +68,6 @@ def _one(what: str, in_file: int | None, given: int | None, default: int | None 
     if found is None and default is None:
         raise InputError(f"Expected how many {what}. Received: neither --{what} nor {what} in a scenario file.")
     return default if found is None else found
-
-
-def _chosen(models: dict[str, Path], channels: list[str] | None) -> dict[str, Path]:
-    unknown = [name for name in channels or () if name not in models]
-    if unknown:
-        raise InputError(f"Expected --channel, one of: {', '.join(list(models)[:8])}. Received: {unknown[0]!r}.")
-    return {name: models[name] for name in channels or models}
 
 
 def _named(mix: Mix, name: str) -> Mix:

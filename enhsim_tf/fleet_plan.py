@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from enhsim_tf.declared_sizes import read_json
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import sha256
 from enhsim_tf.saved_network import read_description
+from enhsim_tf.saved_simulator import MANIFEST, check_saved, settings_of
 from enhsim_tf.scenario_file import MOST_MODELS, MOST_WINDOWS, Mix, ModelShare
 
 FORMAT = "enhsim_tf.fleet/1"
@@ -23,7 +23,6 @@ _SHARD = 8_192  # windows a shard, where they have up to 512 samples
 _SHARD_VALUES = 2**22  # values a shard, where the windows are longer
 MOST_VALUES = 2**26  # values of a shard: 256 MiB, which a worker holds at once
 _MOST_SHARDS = 2_000_000
-_MOST_SETTINGS = 50_000_000  # bytes of a JSON file of a model
 _VERSIONS = ("tensorflow", "keras", "numpy", "pyarrow")
 
 
@@ -149,19 +148,11 @@ def plan_of(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) ->
 
 def _model_of(share: ModelShare, folder: Path) -> Model:
     """Looks at a saved simulator without loading it: its checksums, its window, its interval."""
-    manifest = _json_of(folder, "manifest.json")
-    checksums = manifest.get("sha256")
-    if not isinstance(checksums, dict) or not {"enhancer.keras", "settings.json"} <= set(checksums):
-        raise InputError(f"Expected a folder written by EnhancedSimulator.save. Received: {folder}. Make one with `fit`.")
-    for name, expected in checksums.items():
-        if Path(name).name != name or not (folder / name).is_file() or sha256(folder / name) != expected:
-            raise InputError(
-                f"Expected {name!r} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again."
-            )
-    interval_s = _json_of(folder, "settings.json").get("interval_s")
+    check_saved(folder)
+    interval_s = settings_of(folder).get("interval_s")
     if type(interval_s) not in (int, float) or not 0 < interval_s < float("inf"):
         raise InputError(f"Expected interval_s above 0 in settings.json. Received: {interval_s!r} in {folder}.")
-    return Model(share.name, folder, share.share, sha256(folder / "manifest.json"), _window_of(folder), float(interval_s))
+    return Model(share.name, folder, share.share, sha256(folder / MANIFEST), _window_of(folder), float(interval_s))
 
 
 def _window_of(folder: Path) -> int:
@@ -174,15 +165,3 @@ def _window_of(folder: Path) -> int:
     except (ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"Expected an enhancer whose input has one width. Received: {folder} ({' '.join(str(error).split())}).") from None
     return window
-
-
-def _json_of(folder: Path, name: str) -> dict[str, Any]:
-    try:
-        content = read_json(folder / name, _MOST_SETTINGS)
-        if not isinstance(content, dict):
-            raise ValueError("no object")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
-        ) from None
-    return content

@@ -16,8 +16,7 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.influx_server import FIRST_NS, LAST_NS, InfluxServer, escape, quote
-from enhsim_tf.store import is_time
-from enhsim_tf.telemetry import Telemetry, check_telemetry
+from enhsim_tf.telemetry import Telemetry, check_telemetry, nanoseconds
 
 SCHEME = "influxdb://"
 _ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions stand in the year 2100, where no bucket's retention ends
@@ -146,7 +145,7 @@ class InfluxStore:
         described = Telemetry(np.empty(0, np.float32), **{key: about[key] for key in _DESCRIBED})
         found, pieces, num_samples = 0, [described.values], about["num_samples"]
         for times, values in self.server.stream(self._of_series(name, about), FIRST_NS, LAST_NS):
-            as_expected = _times(described, found, min(found + len(times), num_samples))
+            as_expected = nanoseconds(described, found, min(found + len(times), num_samples))
             agree = np.append(times[: len(as_expected)] == as_expected, False).argmin()  # how many at the beginning
             with np.errstate(over="ignore"):  # those of others may be beyond float32
                 pieces.append(values[:agree].astype(np.float32))
@@ -288,7 +287,7 @@ def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
         raise InputError(
             f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which InfluxDB cannot keep. Fill or cut it."
         )
-    times = _times(telemetry, 0, len(telemetry))
+    times = nanoseconds(telemetry)
     if (np.diff(times) <= 0).any():
         raise InputError(f"Expected samples at least a nanosecond apart. Received: interval_s={telemetry.interval_s!r}. Check the unit.")
     return times, values
@@ -302,37 +301,14 @@ def _description(text: Any) -> dict[str, Any]:
     """
     try:
         about = json.loads(text)
-        begin = about["start"], about["offset_s"]
-        is_good = all(isinstance(about[key], str) for key in ("name", "unit", _VERSION)) and isinstance(begin[0], str | None)
+        is_good = all(isinstance(about[key], str) for key in ("name", "unit", _VERSION)) and isinstance(about["start"], str | None)
         is_good = is_good and all(type(about[key]) is float and np.isfinite(about[key]) for key in ("interval_s", "offset_s"))
         is_good = is_good and type(about["num_samples"]) is int and 1 <= about["num_samples"] < 2**53
-        is_good = is_good and is_time(begin[0] or "", begin[1])
     except (ValueError, TypeError, KeyError, RecursionError):
         is_good = False
     if not is_good:
         raise InputError(f"Expected descriptions of series as they were written. Received: {str(text)[:80]!r}. Write the series again.")
     return about
-
-
-def _times(telemetry: Telemetry, first: int, stop: int) -> np.ndarray:
-    """Nanoseconds since 1970 of samples, int64; counted from 1970 where the source has no time.
-
-    Args:
-        telemetry: The series, or one of another length on its clock.
-        first: The first sample.
-        stop: The one behind the last.
-    """
-    begin = (telemetry.start or "1970-01-01").removesuffix("+00:00").removesuffix("Z")
-    try:
-        start_s, start_ns = (np.datetime64(begin, unit).astype(np.int64) for unit in ("s", "ns"))
-    except ValueError:
-        raise InputError(f"Expected start as an ISO 8601 time (UTC). Received: {telemetry.start!r}. Correct it.") from None
-    since_s = telemetry.offset_s + telemetry.interval_s * np.arange(first, stop)
-    if not max(abs(float(start_s)), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < LAST_NS // 10**9:
-        raise InputError(
-            f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
-        )
-    return start_ns + np.round(since_s * 1e9).astype(np.int64)
 
 
 def _tags_of(row: Mapping[str, Any]) -> dict[str, str]:

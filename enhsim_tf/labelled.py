@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.declared_sizes import load_array
+from enhsim_tf.declared_sizes import whole_array
 from enhsim_tf.errors import InputError
 from enhsim_tf.telemetry import Telemetry
 
@@ -203,7 +203,7 @@ def _load(folder: Path, labels: Labels) -> LabelledChannel:
 def _read(folder: Path, channel: str) -> tuple[Telemetry, np.ndarray]:
     path = folder / f"{channel}.npy"
     try:
-        array = load_array(path)
+        array = whole_array(path)
     except ValueError as error:
         raise InputError(f"Expected the array {folder.name}/{path.name}. Received: {error} in {folder}. Complete the data set.") from None
     if array.ndim == 1:

@@ -9,7 +9,7 @@ import os
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.declared_sizes import load_arrays
+from enhsim_tf.declared_sizes import whole_arrays
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
 
@@ -121,7 +121,7 @@ class OutOfRange:
             InputError: If `save` did not write the file.
         """
         try:
-            kept = load_arrays(path, _MOST_BYTES)
+            kept = whole_arrays(path, _MOST_BYTES)
             loaded = cls(float(kept["explained"]), float(kept["weight"]))
             for name in _FITTED:
                 setattr(loaded, f"_{name}", kept[name])

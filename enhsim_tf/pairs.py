@@ -200,6 +200,35 @@ def set_by_shape(pairs: Pairs, coarse: np.ndarray, shapes: np.ndarray) -> Pairs:
     return Pairs(coarse[best], pairs.target, *_least_squares(shapes[best], pairs.target), pairs.time_s)
 
 
+def ridge(learnt: Pairs, pairs: Pairs) -> np.ndarray:
+    """Ridge regression from coarse windows to the telemetry, at the level of each window: the linear rival of the enhancer.
+
+    Args:
+        learnt: What it learns from; windows without the simulator's motion are left out.
+        pairs: Whose coarse windows it takes.
+
+    Returns:
+        Its windows of the telemetry, float32 of shape `(windows, samples)`.
+    """
+    from sklearn.linear_model import Ridge
+
+    learnt = learnt.clear()
+    predicted = Ridge().fit(learnt.coarse, learnt.target_in_unit).predict(pairs.coarse)
+    return at_level(predicted, pairs.shift, pairs.gain)
+
+
+def window_errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Root-mean-square error of each window in units of its target's standard deviation; NaN where that is flat, which says nothing.
+
+    Args:
+        windows: What should follow the target, shape `(windows, samples)`.
+        target: The telemetry, same shape.
+    """
+    deviation = target.std(axis=1, dtype=np.float64)
+    error = np.sqrt(np.mean((windows - target) ** 2, axis=1, dtype=np.float64))
+    return error / np.where(deviation > 0, deviation, np.nan)
+
+
 def _least_squares(coarse: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shift and gain of each coarse window that bring it nearest to its target; a window without an edge gets gain 0."""
     coarse_mean, target_mean = (each.mean(axis=1, dtype=np.float64) for each in (coarse, target))

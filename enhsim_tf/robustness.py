@@ -158,13 +158,28 @@ def score_trace(detector: Detector, trace: np.ndarray, window: int, stride: int)
     if len(trace) < window:
         raise InputError(f"Expected a trace of at least a window of {window} samples. Received: {len(trace)} samples.")
     begins = np.unique(np.append(np.arange(0, len(trace) - window + 1, stride), len(trace) - window))
-    scores = detector.score(cut_windows(trace, begins, window))
-    steps = np.zeros((2, len(trace) + 1))
+    return mean_over_windows(detector.score(cut_windows(trace, begins, window)), begins, window, len(trace))
+
+
+def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
+    """A score for each sample: the mean over the windows that it lies in; samples behind the last window take its score.
+
+    Args:
+        scores: Score of each window, shape `(windows,)`.
+        begins: First sample of each, rising from 0 in steps of a window at most.
+        window: Samples of a window.
+        num_samples: Length of the series.
+
+    Returns:
+        Scores of shape `(num_samples,)`.
+    """
+    steps = np.zeros((2, num_samples + 1))
     for sign, places in ((1, begins), (-1, begins + window)):
         np.add.at(steps[0], places, sign * scores)
         np.add.at(steps[1], places, sign)
-    total, number = np.cumsum(steps[:, :-1], axis=1)
-    return total / number
+    end = begins[-1] + window
+    total, number = np.cumsum(steps[:, :end], axis=1)
+    return np.append(total / number, np.full(num_samples - end, scores[-1]))
 
 
 def mixed(simulated: np.ndarray, real: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:

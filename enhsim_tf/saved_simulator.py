@@ -6,22 +6,24 @@ It knows files and checksums, and that Keras opens them in safe mode; not what t
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
-
-import keras
-import tensorflow as tf
+from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.declared_sizes import DAMAGES, read_json
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.saved_network import check_network
 
+if TYPE_CHECKING:
+    import keras
+
+MANIFEST, SETTINGS = "manifest.json", "settings.json"
+MOST_SETTINGS = 50_000_000  # bytes of a JSON file; ours have some ten thousand
+_OURS = '"enhsim_tf.EnhancedSimulator/'  # stands in the manifest of every version
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
-_MOST_BYTES = 50_000_000  # of a JSON file
 
 
-def write_saved(folder: str | os.PathLike, networks: Mapping[str, keras.Model], settings: Mapping[str, Any]) -> None:
+def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"], settings: Mapping[str, Any]) -> None:
     """Writes the folder, whole or not at all.
 
     Args:
@@ -33,25 +35,70 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, keras.Model], 
         InputError: If something else than a saved simulator stands there, which is left as it is.
     """
     folder = Path(folder)
-    if folder.exists() and not _is_saved(folder) and not (folder.is_dir() and not any(folder.iterdir())):
+    if is_foreign(folder):
         raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which holds something else.")
     with replace_folder(folder) as temporary:
         for name in _NETWORKS:
             networks[name].save(temporary / f"{name}.keras", include_optimizer=False)
-        write_json(temporary / "settings.json", settings)
+        write_json(temporary / SETTINGS, settings)
         checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
-        write_json(temporary / "manifest.json", {"format": _FORMAT, "sha256": checksums})
+        write_json(temporary / MANIFEST, {"format": _FORMAT, "sha256": checksums})
 
 
-def _is_saved(folder: Path) -> bool:
-    """Whether a folder holds a saved simulator, by the format that its manifest names; damaged files do not matter."""
+def is_foreign(folder: Path) -> bool:
+    """Whether something else than a saved simulator stands there; a damaged one is one, and an empty folder is as good as none."""
+    manifest = folder / MANIFEST
+    is_ours = manifest.is_file() and _OURS in manifest.read_text(encoding="utf-8", errors="replace")  # others have manifests too
+    is_empty = folder.is_dir() and not any(folder.iterdir())
+    return os.path.lexists(folder) and not (is_ours or is_empty)
+
+
+def check_saved(folder: str | os.PathLike) -> None:
+    """Checks that a saved simulator is whole, by its checksums; loads no network.
+
+    Args:
+        folder: The folder.
+
+    Raises:
+        InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
+    """
+    folder = Path(folder)
+    manifest = _json_of(folder, MANIFEST)
+    if manifest.get("format") != _FORMAT or set(manifest) != {"format", "sha256"} or not _is_complete(manifest["sha256"]):
+        raise InputError(
+            f"Expected the format {_FORMAT}. Received: {str(manifest.get('format'))[:80]!r} in {folder}. Save the simulator with this version."
+        )
+    for name, expected in manifest["sha256"].items():
+        if not (folder / name).is_file() or sha256(folder / name) != expected:
+            raise InputError(f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again.")
+
+
+def _is_complete(checksums: Any) -> bool:
+    return isinstance(checksums, dict) and set(checksums) == {SETTINGS, *(f"{name}.keras" for name in _NETWORKS)}
+
+
+def settings_of(folder: str | os.PathLike) -> dict[str, Any]:
+    """The settings that were saved, as they stand there.
+
+    Raises:
+        InputError: If they cannot be read.
+    """
+    return _json_of(Path(folder), SETTINGS)
+
+
+def _json_of(folder: Path, name: str) -> dict[str, Any]:
     try:
-        return read_json(folder / "manifest.json", _MOST_BYTES)["format"] == _FORMAT
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+        content = read_json(folder / name, MOST_SETTINGS)
+        if not isinstance(content, dict):
+            raise ValueError("no object")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
+        ) from None
+    return content
 
 
-def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, keras.Model], Mapping[str, Any]], Any]) -> Any:
+def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Model"], Mapping[str, Any]], Any]) -> Any:
     """Reads what `write_saved` wrote, in Keras' safe mode.
 
     Args:
@@ -64,21 +111,13 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, keras.Mod
     Raises:
         InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
     """
+    import keras  # here: what only looks at a folder should not wait for it
+    import tensorflow as tf
+
     folder = Path(folder)
+    check_saved(folder)
+    settings = settings_of(folder)
     try:
-        manifest = read_json(folder / "manifest.json", _MOST_BYTES)
-        known, checksums = manifest["format"] == _FORMAT, manifest["sha256"]
-        complete = set(checksums) == {"settings.json", *(f"{name}.keras" for name in _NETWORKS)} and len(manifest) == 2
-        checksums = dict(checksums)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__}).") from None
-    if not (known and complete):
-        raise InputError(f"Expected the format {_FORMAT}. Received: {str(manifest['format'])[:80]!r} in {folder}.")
-    for name, expected in checksums.items():
-        if not (folder / name).is_file() or sha256(folder / name) != expected:
-            raise InputError(f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again.")
-    try:
-        settings = read_json(folder / "settings.json", _MOST_BYTES)
         for name in _NETWORKS:
             check_network(folder / f"{name}.keras")
         networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}

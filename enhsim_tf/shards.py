@@ -19,9 +19,10 @@ from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file, sha256
 from enhsim_tf.fleet_plan import FORMAT, Plan
 from enhsim_tf.pairs import at_level
+from enhsim_tf.saved_simulator import MANIFEST
 from enhsim_tf.simulator import Degraded
 from enhsim_tf.terminal import start_tensorflow
-from enhsim_tf.training_sets import NOMINAL
+from enhsim_tf.training_sets import NOMINAL, columns_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -138,12 +139,7 @@ def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
     """
     import pyarrow as pa
 
-    columns = {
-        "window": pa.list_(pa.float32(), settings["window"]),
-        "scenario": pa.string(),
-        "severity": pa.float32(),
-        "onset": pa.int32(),
-    }
+    columns = columns_of(settings["window"])
     if len(settings["models"]) > 1:
         columns["model"] = pa.string()
     return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})
@@ -177,7 +173,7 @@ class ShardMaker:
         simulators = []
         for model in self.plan.models:
             simulators.append(EnhancedSimulator.load(model.folder))
-            if sha256(model.folder / "manifest.json") != model.sha256 or simulators[-1].window != model.window:
+            if sha256(model.folder / MANIFEST) != model.sha256 or simulators[-1].window != model.window:
                 raise InputError(f"Expected the model that the data set was begun with. Received: another one in {model.folder}.")
         return simulators
 

@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.cleaning import Cleaning, clean
-from enhsim_tf.declared_sizes import MOST_COLUMNS, load_array
+from enhsim_tf.declared_sizes import MOST_COLUMNS
 from enhsim_tf.errors import InputError
 from enhsim_tf.repairs import Finding
 from enhsim_tf.stamps import stamps_of
 from enhsim_tf.store import ParquetStore
 from enhsim_tf.tables import NO_TIME, numeric_columns, read_table, time_column
-from enhsim_tf.telemetry import Telemetry, check_telemetry
+from enhsim_tf.telemetry import Telemetry, check_telemetry, load_array, nanoseconds
 
 INFLUX = "influxdb://"
 _HINT = "Give a .csv, .parquet or .npy file, a store's folder (or folder#channel), or influxdb://bucket/measurement/field"
@@ -112,15 +112,7 @@ def _read_store(folder: Path, columns: list[str] | None, time: str | None) -> di
 def _read_array(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
     if time not in (None, NO_TIME):
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
-    try:
-        array = load_array(path)
-    except ValueError as error:
-        raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
-        ) from None
-    if array.ndim not in (1, 2) or array.dtype.names:
-        shape = "fields" if array.dtype.names else array.shape
-        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    array = load_array(path)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MOST_COLUMNS:
         raise InputError(f"Expected at most {MOST_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
@@ -173,11 +165,7 @@ def to_series(telemetry: Telemetry) -> pd.Series:
     """A pandas Series of telemetry: a `DatetimeIndex` in UTC where there is time, a `RangeIndex` of samples where not."""
     check_telemetry(telemetry)
     if telemetry.has_time:
-        start = pd.Timestamp(telemetry.start)
-        start = start.tz_localize("UTC") if start.tz is None else start.tz_convert("UTC")
-        index = pd.DatetimeIndex(
-            start.as_unit("ns") + pd.to_timedelta(np.round(telemetry.time_s * 1e9).astype(np.int64), unit="ns"), name="time"
-        )
+        index = pd.DatetimeIndex(nanoseconds(telemetry).astype("datetime64[ns]"), tz="UTC", name="time")
     else:
         first = round(telemetry.offset_s)
         index = pd.RangeIndex(first, first + len(telemetry), name="sample")

@@ -5,7 +5,6 @@ unit and name as they are and interprets none of them.
 """
 
 import os
-import re
 import urllib.parse
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,12 +14,10 @@ import numpy as np
 
 from enhsim_tf.declared_sizes import check_parquet, reason_of
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import file_name_of, make_folder, replace_file, replace_folder
-from enhsim_tf.telemetry import Telemetry
+from enhsim_tf.files import encoded, make_folder, replace_file, replace_folder
+from enhsim_tf.telemetry import Telemetry, nanoseconds
 
 _DAY_NS = 86_400 * 10**9
-_LAST_S = 9.2e9  # seconds from 1970 that nanoseconds hold
-_TIME = re.compile(r"\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?)?(\+00:00|Z)?")
 
 
 class TelemetryStore(Protocol):
@@ -80,9 +77,7 @@ class ParquetStore:
             raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
         channel = self._channel(telemetry.name)
         make_folder(self.folder)
-        start = np.datetime64((telemetry.start or "1970-01-01").removesuffix("+00:00"), "ns")
-        since_start = np.round(telemetry.time_s * 1e9).astype(np.int64)
-        times = start + since_start.astype("timedelta64[ns]")
+        times = nanoseconds(telemetry)
         described = {
             "name": telemetry.name,
             "unit": telemetry.unit,
@@ -92,7 +87,7 @@ class ParquetStore:
         }
         table = pa.table({"time": pa.array(times, pa.timestamp("ns", "UTC")), "value": pa.array(telemetry.values, pa.float32())})
         table = table.replace_schema_metadata(described)
-        days = times.astype(np.int64) // _DAY_NS
+        days = times // _DAY_NS
         edges = np.flatnonzero(np.diff(days, prepend=days[0] - 1))
         with replace_folder(channel) as folder:
             for first, stop in zip(edges, [*edges[1:], len(days)], strict=True):
@@ -118,8 +113,8 @@ class ParquetStore:
             about = {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
             name, unit, start = about["name"], about["unit"], about["start"]
             interval_s, offset_s = float(about["interval_s"]), float(about["offset_s"])
-            if not (len(table) and 0 < interval_s < _LAST_S and is_time(start, offset_s)):
-                raise ValueError("a start, an offset or an interval that no series has")
+            if not (len(table) and 0 < interval_s < np.inf and np.isfinite(offset_s)):
+                raise ValueError("an offset or an interval that no series has")
             values = table["value"].to_numpy().astype(np.float32)
             times = table["time"].cast(pa.int64()).to_numpy()
         except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
@@ -128,7 +123,9 @@ class ParquetStore:
             ) from None
         if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 1e-3 * interval_s * 1e9:
             raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
-        return Telemetry(values, interval_s, offset_s, start or None, name, unit)
+        telemetry = Telemetry(values, interval_s, offset_s, start or None, name, unit)
+        nanoseconds(telemetry)  # refuses a start that is none
+        return telemetry
 
     def names(self) -> list[str]:
         """The names of the series kept here, sorted."""
@@ -136,17 +133,4 @@ class ParquetStore:
         return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
 
     def _channel(self, name: str) -> Path:
-        return self.folder / file_name_of(name)
-
-
-def is_time(start: str, offset_s: float) -> bool:
-    """Whether a series can begin there.
-
-    Args:
-        start: An ISO 8601 time (UTC); empty where the source has none.
-        offset_s: Seconds after it, or after 1970.
-    """
-    if start and not _TIME.fullmatch(start):
-        return False
-    begin_s = np.datetime64(start.removesuffix("+00:00").removesuffix("Z") or "1970-01-01", "s").astype(np.int64)
-    return max(abs(float(begin_s)), abs(offset_s), abs(begin_s + offset_s)) < _LAST_S  # not so where it is no number
+        return self.folder / encoded(name)

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.declared_sizes import DAMAGES, check_parquet, load_array, reason_of
+from enhsim_tf.declared_sizes import DAMAGES, check_parquet, reason_of, whole_array
 from enhsim_tf.errors import InputError
+
+_MOST_S = 9_223_372_036  # seconds before and after 1970 that nanoseconds in 64 bits reach
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -56,6 +58,59 @@ class Telemetry:
     def part(self, start: int, stop: int) -> "Telemetry":
         """The samples from `start` to before `stop`, on the same clock."""
         return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
+
+
+def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -> np.ndarray:
+    """When each sample was taken.
+
+    Args:
+        telemetry: The series, or one of another length on its clock.
+        first: The first sample that is asked for.
+        stop: The one behind the last; None: behind the series' last.
+
+    Returns:
+        Nanoseconds since 1970 (UTC), int64 array of shape `(samples,)`; since the clock's zero where the source has no time.
+
+    Raises:
+        InputError: If its start is no time, or its samples do not lie from 1678 to 2261, the years that such numbers can hold.
+    """
+    import pandas as pd  # it reads every form of ISO 8601, with any zone
+
+    try:
+        text = telemetry.start or "1970-01-01"
+        start = pd.Timestamp(text if text[0].isdigit() else None)  # "now" is no start
+        start = start.tz_localize("UTC") if start.tz is None else start.tz_convert("UTC")
+        samples = np.arange(first, len(telemetry) if stop is None else stop)
+        start_s, since_s = start.timestamp(), telemetry.offset_s + telemetry.interval_s * samples
+    except (ValueError, TypeError, AttributeError, OverflowError):
+        raise InputError(f"Expected start as an ISO 8601 time. Received: {telemetry.start!r}. Correct it.") from None
+    if not max(abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < _MOST_S:
+        raise InputError(
+            f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
+        )
+    return start.as_unit("ns").value + np.round(since_s * 1e9).astype(np.int64)
+
+
+def load_array(path: str | os.PathLike) -> np.ndarray:
+    """Reads a `.npy` file of one or two dimensions; nothing in it can run code.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: If it cannot be read, or is something else.
+    """
+    path = Path(path)
+    try:
+        array = whole_array(path)
+    except ValueError as error:
+        raise InputError(
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
+        ) from None
+    if array.ndim not in (1, 2) or array.dtype.names:
+        shape = "fields" if array.dtype.names else array.shape
+        raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
+    return array
 
 
 def check_telemetry(telemetry: Telemetry) -> None:
@@ -151,16 +206,7 @@ def _read_array(path: Path, column: str | None, time: str | None):
         raise InputError(
             f"Expected --time with a table only. Received: --time {time} with {path.name}, an array has no named columns. Leave it out."
         )
-    try:
-        array = load_array(path)
-    except ValueError as error:
-        raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
-        ) from None
-    if array.ndim not in (1, 2):
-        raise InputError(
-            f"Expected an array of shape (samples,) or (samples, columns). Received: {array.shape} in {path.name}. Reshape it."
-        )
+    array = load_array(path)
     if array.ndim == 1 and column is None:
         return array, None, ""
     columns = 1 if array.ndim == 1 else array.shape[1]

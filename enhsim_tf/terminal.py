@@ -8,7 +8,7 @@ from typing import NoReturn
 
 from enhsim_tf.errors import InputError, printable
 
-__all__ = ["Parser", "finish", "printable", "start_tensorflow"]
+__all__ = ["Parser", "finish", "printable", "start_tensorflow", "tell"]
 
 
 class Parser(argparse.ArgumentParser):
@@ -20,6 +20,15 @@ class Parser(argparse.ArgumentParser):
         if missing:
             raise InputError(f"Expected {missing}. Received: no such argument. See {self.prog} --help.")
         raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
+
+
+def tell(line: str) -> None:
+    """Prints a line, or some, at once, so that whoever waits or reads through a pipe sees it.
+
+    Args:
+        line: Names of channels and folders in it may hold anything.
+    """
+    print("\n".join(printable(each) for each in line.split("\n")), flush=True)
 
 
 def finish(run: Callable[[], int], interrupted: str) -> int:

@@ -19,6 +19,7 @@ from enhsim_tf.simulator import MODES, Degraded
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
@@ -137,6 +138,17 @@ def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: fl
     return [Share(*each) for each in zip([None, *scenarios], counts, seeds, strict=True) if each[1]]
 
 
+def columns_of(window: int) -> dict[str, "pa.DataType"]:
+    """The columns of labelled windows and their types.
+
+    Args:
+        window: Samples of a window.
+    """
+    import pyarrow as pa
+
+    return {"window": pa.list_(pa.float32(), window), "scenario": pa.string(), "severity": pa.float32(), "onset": pa.int32()}
+
+
 def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> None:
     """Writes labelled windows to one Parquet file, as they are made; the file appears when it is complete.
 
@@ -150,14 +162,9 @@ def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulato
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = pa.schema(
-        {
-            "window": pa.list_(pa.float32(), simulator.window),
-            "scenario": pa.string(),
-            "severity": pa.float32(),
-            "onset": pa.int32(),
-        }
-    ).with_metadata({"interval_s": repr(simulator.interval_s), "channel": str(simulator.trained.get("telemetry", ""))})
+    schema = pa.schema(columns_of(simulator.window)).with_metadata(
+        {"interval_s": repr(simulator.interval_s), "channel": str(simulator.trained.get("telemetry", ""))}
+    )
     make_folder(Path(path).parent)
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
         for share in shares:

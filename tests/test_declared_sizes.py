@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from enhsim_tf.declared_sizes import MOST_COLUMNS, check_parquet, load_array, load_arrays, read_json
+from enhsim_tf.declared_sizes import MOST_COLUMNS, check_parquet, read_json, whole_array, whole_arrays
 
 ROOT = Path(__file__).parents[1]
 
@@ -31,10 +31,10 @@ def npy(path, descr, shape, content=b"", version=2):
 )
 def test_an_array_is_read_as_it_was_written(tmp_path, array):
     np.save(tmp_path / "x.npy", array)
-    found = load_array(tmp_path / "x.npy")
+    found = whole_array(tmp_path / "x.npy")
     assert type(found) is np.ndarray and found.dtype == array.dtype and found.shape == array.shape and (found == array).all()
     np.savez_compressed(tmp_path / "x.npz", first=array, second=array)
-    kept = load_arrays(tmp_path / "x.npz", 10_000)
+    kept = whole_arrays(tmp_path / "x.npz", 10_000)
     assert list(kept) == ["first", "second"] and (kept["second"] == array).all() and kept["second"].shape == array.shape
 
 
@@ -54,7 +54,7 @@ def test_an_array_is_read_as_it_was_written(tmp_path, array):
 )
 def test_an_array_that_is_not_what_it_says_is_refused(tmp_path, descr, shape, word):
     with pytest.raises(ValueError, match=word):
-        load_array(npy(tmp_path / "x.npy", descr, shape, b"\xff" * 480))
+        whole_array(npy(tmp_path / "x.npy", descr, shape, b"\xff" * 480))
 
 
 def zipped(path, compression=zipfile.ZIP_DEFLATED, **members):
@@ -70,21 +70,21 @@ def test_an_archive_of_arrays_that_unpacks_without_end_is_refused(tmp_path):
     path = zipped(tmp_path / "x.npz", value=bomb.getvalue())
     assert path.stat().st_size < 10**6
     with pytest.raises(ValueError, match="larger than"):
-        load_arrays(path, 10**6)
+        whole_arrays(path, 10**6)
 
 
 @pytest.mark.parametrize("shape", [(10**12,), (10**6,), (0,), (3,)])
 def test_an_array_in_an_archive_has_to_be_as_long_as_it_says(tmp_path, shape):
     content = npy(tmp_path / "x.npy", "<f8", shape, bytes(32)).read_bytes()
     with pytest.raises(ValueError, match="another size"):
-        load_arrays(zipped(tmp_path / "x.npz", value=content), 10**6)
+        whole_arrays(zipped(tmp_path / "x.npz", value=content), 10**6)
 
 
 def repeated(num_rows, word=None):
     """A small file of many equal rows, which Parquet writes as one and a count."""
     cells = pa.DictionaryArray.from_arrays(pa.array(np.zeros(num_rows, np.int32)), pa.array([1.5 if word is None else word]))
     sink = io.BytesIO()
-    pq.write_table(pa.table({"value": cells.cast(cells.type.value_type) if word is None else cells}), sink, compression="zstd")
+    pq.write_table(pa.table({"value": cells.cast(cells.type.value_type) if word is None else cells}), sink, compression="zstd", store_schema=False)
     return sink.getvalue()
 
 

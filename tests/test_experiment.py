@@ -10,7 +10,7 @@ from PIL import Image
 
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.degraded_modes import METHODS, SEVERITIES
-from enhsim_tf.reproduce.findings import TABLES, read_tables
+from enhsim_tf.reproduce.findings import KEPT, TABLES
 from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, MIXED, QUICK_DETECTORS, SCALED, SCALES, SHARES
 from enhsim_tf.reproduce.robustness_figures import FIGURES
 from enhsim_tf.simulator import MODES
@@ -31,7 +31,7 @@ def done(tmp_path_factory):
 
 
 def test_every_table_has_every_row(done):
-    tables = read_tables(done[0] / "out" / "robustness")
+    tables = KEPT.read(done[0] / "out" / "robustness")
     assert set(tables) == set(TABLES)
     alarms, recall = tables["alarms"], tables["recall"]
     assert list(dict.fromkeys(alarms["arm"])) == list(ARMS) and set(alarms["environment"]) == {"shot"} and set(alarms["seed"]) == {2_000}
@@ -43,7 +43,7 @@ def test_every_table_has_every_row(done):
 
 
 def test_what_must_be_so_whatever_the_networks_learnt(done):
-    tables = read_tables(done[0] / "out" / "robustness")
+    tables = KEPT.read(done[0] / "out" / "robustness")
     errors = tables["degraded"].set_index(["method", "mode", "severity"])["nrmse"]
     # of two sines of amplitudes a the square waves miss sqrt(1.5 - 4 / pi) a, each on its own; the signal is a / sqrt(2)
     missed = np.sqrt(1.5 - 4 / np.pi) * np.sqrt(2)

@@ -12,6 +12,7 @@ from enhsim_tf.detectors import CONTROLS, DETECTORS
 from enhsim_tf.errors import InputError
 from enhsim_tf.injections import INJECTIONS
 from enhsim_tf.reproduce import findings, robustness_figures, robustness_report
+from enhsim_tf.reproduce.caption import caption_of_findings
 from enhsim_tf.reproduce.degraded_modes import METHODS, SCORED
 from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, QUICK_DETECTORS
 from enhsim_tf.simulator import MODES
@@ -78,14 +79,24 @@ def found():
 
 def test_tables_come_back_as_they_were_written(tmp_path):
     written = tables()
-    findings.write_tables(written, tmp_path)
-    for name, table in findings.read_tables(tmp_path).items():
+    findings.KEPT.write(written, tmp_path)
+    for name, table in findings.KEPT.read(tmp_path).items():
         pd.testing.assert_frame_equal(table, written[name], check_dtype=False, rtol=1e-4, check_column_type=False)
+
+
+def test_recall_keeps_three_decimals_and_the_others_four(tmp_path):
+    written, values = tables(), [0.12344, 0.98766]
+    for name in ("recall", "traces"):
+        written[name] = written[name].iloc[:2].assign(auc_pr=values)
+    findings.KEPT.write(written, tmp_path)
+    read = findings.KEPT.read(tmp_path)
+    assert read["recall"]["auc_pr"].tolist() == np.array([0.123, 0.988], np.float32).tolist()
+    assert read["traces"]["auc_pr"].tolist() == np.array([0.1234, 0.9877], np.float32).tolist()
 
 
 def test_a_missing_table_is_named(tmp_path):
     with pytest.raises(InputError, match="alarms.parquet"):
-        findings.read_tables(tmp_path)
+        findings.KEPT.read(tmp_path)
 
 
 def test_rates_gaps_and_recall(found):
@@ -148,20 +159,29 @@ def test_c8_by_the_rule_of_the_ledger(found):
 
 
 def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):
-    from enhsim_tf.reproduce import page, robustness_run
+    from enhsim_tf.reproduce import figures, page, robustness_run
 
     whole = {**found, "budget": "full"}
     assert page._experiment(tmp_path) is None
     folder = tmp_path / robustness_run.FOLDER
     folder.mkdir()
     (folder / "findings.json").write_text(json.dumps(whole), encoding="utf-8")
-    assert len(robustness_run.draw(whole, folder)) == 2 * len(robustness_figures.FIGURES)
+    assert len(figures.save_all(robustness_figures.FIGURES, whole, folder, findings.KEPT.command)) == 2 * len(robustness_figures.FIGURES)
     shown = page._experiment(tmp_path)
     assert shown["share"] == (0, 28) and [picture.name for picture in shown["pictures"]] == ["false_alarms", "recall", "degraded_modes"]
     kept = json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))
     text = page.write_page(tmp_path, kept, []).read_text(encoding="utf-8")
     rows = re.findall(r"<tr role=\"row\"><th scope=\"row\" role=\"rowheader\">([^<]+)</th>", text)
     assert rows == list(ARMS) and text.count("60.0 % (60.0 to 60.0)") == len(ENVIRONMENTS)
+
+
+@pytest.mark.parametrize(("seeds", "words", "ran"), [([7], "one seed", "seed 7"), ([7, 8, 9], "3 seeds", "seeds 7 to 9")])
+def test_one_seed_is_no_seeds(found, seeds, words, ran):
+    some = {**found, "seeds": seeds, "modes": {**found["modes"], "seeds": seeds}, "budget": "full"}
+    text = " ".join(robustness_report.render(some).split())
+    assert f"severities and {words};" in text and f"replicates: {words} ({seeds[0]} to {seeds[-1]}) in" in text
+    assert f"interval over {words} (" in robustness_report.table(some)
+    assert caption_of_findings(some, "python -m this") == f"{ran} · full budget · python -m this"
 
 
 def test_findings_are_plain_json(found):
@@ -181,11 +201,11 @@ def test_the_report_is_what_the_tables_say():
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
-    again = findings.summarise(findings.read_tables(KEPT))
+    again = findings.summarise(findings.KEPT.read(KEPT))
     assert json.loads(json.dumps(again)) == {key: kept[key] for key in again}
-    assert robustness_report.render(kept, robustness_report.findings_of(ROOT, "labelled")) == (ROOT / robustness_report.PATH).read_text(
-        encoding="utf-8"
-    )
+    assert robustness_report.render(kept, robustness_report.findings_of(ROOT, "labelled"), robustness_report.designs_of(ROOT)) == (
+        ROOT / robustness_report.PATH
+    ).read_text(encoding="utf-8")
     assert robustness_report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
     assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000
     assert min(kept["seeds"]) >= 1_000, "development seeds are 100 to 199"

@@ -342,6 +342,12 @@ def test_every_room_has_its_tests():
     assert {f"test_{with_others.get(room, room)}.py" for room in rooms} <= {path.name for path in (ROOT / "tests").iterdir()}
 
 
+def test_a_line_is_told_at_once():
+    script = "import os\nfrom enhsim_tf.terminal import tell\ntell('a line')\nos._exit(0)"  # which throws away what is not yet written
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert ended.stdout == "a line\n"
+
+
 def test_tensorflow_starts_without_notes_and_standard_error_is_given_back():
     script = (
         "import sys\nfrom enhsim_tf.terminal import start_tensorflow\nstart_tensorflow()\n"

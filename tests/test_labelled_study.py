@@ -11,9 +11,9 @@ from enhsim_tf.errors import InputError
 from enhsim_tf.labelled import load_channel
 from enhsim_tf.reproduce.__main__ import main
 from enhsim_tf.reproduce.labelled_figures import FIGURES
-from enhsim_tf.reproduce.labelled_findings import read_tables, summarise
+from enhsim_tf.reproduce.labelled_findings import KEPT, summarise
 from enhsim_tf.reproduce.labelled_run import table
-from enhsim_tf.reproduce.labelled_study import ARMS, DEGRADED_ARM, GENERATED_ARM, ChannelStudy, _of_samples
+from enhsim_tf.reproduce.labelled_study import ARMS, DEGRADED_ARM, GENERATED_ARM, ChannelStudy
 from enhsim_tf.reproduce.robustness_report import findings_of
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
@@ -66,7 +66,7 @@ def found(out):
 
 
 def test_every_table_has_every_row(out):
-    tables = read_tables(out)
+    tables = KEPT.read(out)
     arms = tables["alarms"].groupby("channel")["arm"].unique()
     assert all(set(each) == {*ARMS, DEGRADED_ARM} for each in arms)
     assert set(tables["alarms"]["channel"]) == set(SEQUENCES)
@@ -76,7 +76,7 @@ def test_every_table_has_every_row(out):
 
 
 def test_no_window_with_a_labelled_sample_counts_as_nominal(out, data):
-    tables = read_tables(out)
+    tables = KEPT.read(out)
     for name, sequences in SEQUENCES.items():
         about = tables["enhancement"][tables["enhancement"]["channel"] == name].iloc[0]
         window, stride = int(about["window"]), int(about["window"]) // 8
@@ -88,14 +88,14 @@ def test_no_window_with_a_labelled_sample_counts_as_nominal(out, data):
 
 
 def test_a_value_far_outside_is_found_by_the_limit_check_at_its_first_window(out):
-    rows = read_tables(out)["sequences"].query("arm == 'real' and detector == 'limit check'")
+    rows = KEPT.read(out)["sequences"].query("arm == 'real' and detector == 'limit check'")
     assert rows["found"].all()
     assert (rows["delay"] <= 100 // 8 + 1).all(), "a window is scored every eighth of its length"
 
 
 def test_a_perfect_score_is_perfect_and_a_random_one_alarms_at_its_rate(out, found):
     assert found["controls"]["oracle"]["auc_pr"] == pytest.approx(1.0) and found["controls"]["oracle"]["vus_pr"] == pytest.approx(1.0)
-    rows = read_tables(out)["alarms"].query("detector == 'random score'")
+    rows = KEPT.read(out)["alarms"].query("detector == 'random score'")
     # set for 1 % on 200 windows: of some 240 windows more than 14 would be less likely than one in ten thousand
     assert rows["windows"].sum() > 200 and rows["alarms"].sum() <= 14
 
@@ -105,16 +105,16 @@ def test_a_channel_that_cannot_be_used_is_left_out_and_said_so(found):
 
 
 def test_findings_are_those_of_the_tables(out, found):
-    again = json.loads(json.dumps(summarise(read_tables(out))))
+    again = json.loads(json.dumps(summarise(KEPT.read(out))))
     assert again == {key: found[key] for key in again}
-    rates = read_tables(out)["alarms"].query("channel == 'W-1' and arm == @GENERATED_ARM and detector == 'limit check'")
+    rates = KEPT.read(out)["alarms"].query("channel == 'W-1' and arm == @GENERATED_ARM and detector == 'limit check'")
     expected = rates["alarms"].sum() / rates["windows"].sum()
     assert found["channels"]["W-1"]["false_alarms"][GENERATED_ARM]["limit check"] == pytest.approx(expected)
 
 
 def test_the_projects_report_and_readme_are_those_of_its_tables():
     kept = findings_of(ROOT, "labelled")
-    again = json.loads(json.dumps(summarise(read_tables(ROOT / "figures" / "labelled"))))
+    again = json.loads(json.dumps(summarise(KEPT.read(ROOT / "figures" / "labelled"))))
     assert again == {key: kept[key] for key in again} and kept["budget"] == "full"
     assert table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -130,18 +130,13 @@ def test_real_windows_that_train_and_that_set_thresholds_share_no_sample(data, c
     assert np.isin(training, values[:1_000]).all() and not np.isin(held_out, values[:1_000]).any()
 
 
-def test_a_sample_has_the_mean_score_of_the_windows_it_lies_in():
-    scores = _of_samples(np.array([1.0, 3.0, 8.0]), np.array([0, 2, 4]), 4, 10)
-    assert scores.tolist() == [1, 1, 2, 2, 5.5, 5.5, 8, 8, 8, 8]
-
-
 def test_the_second_run_takes_every_channel_from_the_cache(data, cache, out, tmp_path, capsys):
     command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(tmp_path), "--cache", str(cache)]
     assert main([*command, "--channels", "W-2"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if line.endswith("...")] == [] and sum("(from the cache)" in line for line in lines) == 2
-    kept = read_tables(out)["ranking"].query("channel == 'W-2'").reset_index(drop=True)
-    pd.testing.assert_frame_equal(read_tables(tmp_path / "labelled")["ranking"], kept)
+    kept = KEPT.read(out)["ranking"].query("channel == 'W-2'").reset_index(drop=True)
+    pd.testing.assert_frame_equal(KEPT.read(tmp_path / "labelled")["ranking"], kept)
 
 
 @pytest.mark.parametrize(
@@ -169,4 +164,4 @@ def test_an_unknown_channel_is_refused(data, cache, tmp_path, capsys):
 
 def test_missing_tables_are_refused(tmp_path):
     with pytest.raises(InputError, match="enhancement.parquet"):
-        read_tables(tmp_path)
+        KEPT.read(tmp_path)

@@ -6,7 +6,7 @@ import pytest
 from enhsim_tf import detection, robustness
 from enhsim_tf.detectors import LargestStep, PCAResidual
 from enhsim_tf.injections import INJECTIONS, SEVERITIES
-from enhsim_tf.robustness import judge_arm, make_trial, mixed, score_trace, summary
+from enhsim_tf.robustness import judge_arm, make_trial, mean_over_windows, mixed, score_trace, summary
 
 WINDOW = 300
 
@@ -106,6 +106,11 @@ def test_a_score_for_each_sample_is_the_mean_over_its_windows():
     found = score_trace(Largest(), trace, window=10, stride=4)
     expected = [np.mean([trace[begin : begin + 10].max() for begin in begins if begin <= place < begin + 10]) for place in range(47)]
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_samples_behind_the_last_window_take_its_score():
+    scores = mean_over_windows(np.array([1.0, 3.0, 8.0]), np.array([0, 2, 4]), 4, 10)
+    assert scores.tolist() == [1, 1, 2, 2, 5.5, 5.5, 8, 8, 8, 8]
 
 
 def test_a_trace_shorter_than_a_window_is_refused(refused):

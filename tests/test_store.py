@@ -3,42 +3,29 @@
 import numpy as np
 import pandas as pd
 import pytest
+from round_trips import BEYOND, ROUND_TRIPS, same, series
 
 from enhsim_tf.store import ParquetStore
-from enhsim_tf.telemetry import Telemetry
 
 
-def series(number=1_000, seed=0, **about):
-    return Telemetry(np.random.default_rng(seed).normal(size=number).astype(np.float32), **about)
-
-
-def same(first, second):
-    return (first.values.tobytes(), first.interval_s, first.offset_s, first.start, first.name, first.unit) == (
-        second.values.tobytes(),
-        second.interval_s,
-        second.offset_s,
-        second.start,
-        second.name,
-        second.unit,
-    )
-
-
-@pytest.mark.parametrize(
-    "about",
-    [
-        {},
-        {"interval_s": 0.1, "name": "attitude", "unit": "deg"},
-        {"interval_s": 1 / 3, "offset_s": 12.7, "start": "2020-03-01T23:59:00.250000+00:00"},
-        {"interval_s": 3_600.0, "offset_s": -7_200.0, "start": "2020-02-28T00:00:00+00:00", "unit": "µm"},
-        {"interval_s": 0.1, "offset_s": 1e8 + 0.1, "start": "2020-03-01"},
-    ],
-    ids=["counted", "tenths", "thirds", "hours, before the clock's zero", "years after the clock's zero"],
-)
+@pytest.mark.parametrize("about", ROUND_TRIPS.values(), ids=ROUND_TRIPS)
 def test_round_trip_to_the_bit(tmp_path, about):
     kept = series(**about)
     ParquetStore(tmp_path / "store").write(kept)
     read = ParquetStore(tmp_path / "store").read(kept.name)
     assert same(kept, read) and read.values.dtype == np.float32
+
+
+@pytest.mark.parametrize("about", BEYOND, ids=str)
+def test_times_that_no_file_can_hold_are_refused(tmp_path, about, refused):
+    with refused("time"):
+        ParquetStore(tmp_path).write(series(**about))
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_zone_of_a_start_counts(tmp_path):
+    ParquetStore(tmp_path).write(series(3, start="2020-03-01T00:00:00+02:00", name="wheel"))
+    assert pd.read_parquet(tmp_path / "wheel")["time"].iloc[0] == pd.Timestamp("2020-02-29T22:00:00Z")
 
 
 def test_one_file_a_day_that_pandas_reads(tmp_path):

@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from enhsim_tf.terminal import Parser, finish
+from enhsim_tf.terminal import Parser, finish, tell
 
 EXAMPLES = """\
 examples:
@@ -87,9 +87,6 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
 
-    def tell(line: str) -> None:
-        print(line, flush=True)
-
     def experiment_of(seed: int) -> Experiment:
         stages = Stages(options.cache or default_cache(), options.fresh, tell)
         given = make_settings(options.budget, seed), stages, source, int(sys.stdout.isatty())
@@ -145,9 +142,6 @@ def run_experiment(options: argparse.Namespace, folder: Path) -> int:
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import default_cache
 
-    def tell(line: str) -> None:
-        print(line, flush=True)
-
     turned = {} if options.seeds is None else {"robustness__num_seeds": options.seeds}
     settings = make_settings(options.budget, **turned)
     environments = NOISES if options.environment is None else (options.environment,)
@@ -166,9 +160,6 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     from enhsim_tf.reproduce.robustness_report import findings_of, report
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import default_cache
-
-    def tell(line: str) -> None:
-        print(line, flush=True)
 
     out = folder / FOLDER
     chosen = None if options.channels is None else [name.strip() for name in options.channels.split(",")]

@@ -1,9 +1,10 @@
-"""The small print of a figure of the paper: what ran, and the command that draws the figure again."""
+"""The small print of a figure: what ran, and the command that draws the figure again."""
 
 import os
 import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.reproduce.settings import LOCATION
 
@@ -29,6 +30,18 @@ def caption_of(name: str, experiment: "Experiment") -> str:
     options += ["--seed", str(settings.seed)] if settings.seed else []
     options += ["--only", name.split("_")[0]]
     return f"seed {settings.seed} · {settings.budget} budget · {shlex.join(['python', '-m', 'enhsim_tf.reproduce', *options])}"
+
+
+def caption_of_findings(found: Mapping[str, Any], command: str) -> str:
+    """The caption line of an experiment's figures: its `seeds`, its `budget` and the command that runs it."""
+    seeds = found["seeds"]
+    ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+    return f"{ran} · {found['budget']} budget · {command}"
+
+
+def in_seeds(seeds: Sequence[int]) -> str:
+    """How many seeds, in words."""
+    return "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
 
 
 def _as_typed(path: Path) -> str:

@@ -9,6 +9,7 @@ import os
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib.figure
 import matplotlib.style
@@ -16,6 +17,7 @@ import numpy as np
 
 from enhsim_tf.files import replace_file
 from enhsim_tf.reproduce import curves, diagrams
+from enhsim_tf.reproduce.caption import caption_of_findings
 from enhsim_tf.sheet import EDGE, GENERATED, QUIET, STYLE
 
 WATERMARK = "SMOKE BUDGET"
@@ -189,6 +191,25 @@ def save(
             with replace_file(path) as temporary:
                 figure.savefig(temporary, metadata={"Title": about.title, "Description": about.alt} | undated)
     return paths
+
+
+def save_all(
+    figures: Mapping[str, Figure], found: Mapping[str, Any], folder: str | os.PathLike, command: str, names: Sequence[str] = ()
+) -> list[Path]:
+    """Draws the figures of an experiment from its findings and writes them, as `save` does.
+
+    Args:
+        figures: The experiment's figures by name.
+        found: Its findings.
+        folder: An existing folder.
+        command: What runs it, for the captions.
+        names: Which; none for all.
+
+    Returns:
+        The paths of the files.
+    """
+    caption = caption_of_findings(found, command)
+    return [path for name in names or figures for path in save(name, found, folder, caption, found["budget"] == "smoke", figures=figures)]
 
 
 def _shape(words: np.ndarray) -> str:

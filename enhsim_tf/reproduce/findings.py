@@ -5,14 +5,12 @@ The tables are what is committed; `summarise` needs nothing else, so whoever dou
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enhsim_tf import inference
-from enhsim_tf.errors import InputError
-from enhsim_tf.files import replace_file
+from enhsim_tf.reproduce.kept_tables import KeptTables
 from enhsim_tf.reproduce.replicates import ARMS
 
 if TYPE_CHECKING:
@@ -27,46 +25,14 @@ KINDS_OF_NOISE = {"Gaussian": ("white", "autoregressive"), "not Gaussian": ("het
 BARS = {"white": (0.01, 0.02), "autoregressive": (0.01, 0.02), "heteroscedastic": (0.01, 0.02), "shot": (0.03, None)}
 """Largest excess of the second generator's false-alarm rate over the real-trained arm's, and of its upper 95 % bound."""
 LARGEST_RECALL_LOSS, LARGEST_RATIO, LARGEST_TIME = 0.02, 2.0, 2.0
-_LABELS = ("environment", "arm", "detector", "kind", "noise", "measure", "section", "method", "mode")
-
-
-def write_tables(tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
-    """Writes each table as Parquet, labels as dictionaries and shares with the digits that their counts support.
-
-    Args:
-        tables: By name.
-        folder: An existing folder.
-    """
-    for name, table in tables.items():
-        compact = table.reset_index(drop=True)
-        for column in compact.columns:
-            if column in _LABELS:
-                compact[column] = compact[column].astype("category")
-            elif compact[column].dtype == np.float64:
-                compact[column] = compact[column].round(4).astype(np.float32)
-        with replace_file(folder / f"{name}.parquet") as temporary:
-            compact.to_parquet(temporary, compression="zstd", index=False)
-
-
-def read_tables(folder: Path) -> "dict[str, pd.DataFrame]":
-    """The tables that `write_tables` wrote.
-
-    Raises:
-        InputError: If one is missing.
-    """
-    import pandas as pd
-
-    missing = [name for name in TABLES if not (folder / f"{name}.parquet").is_file()]
-    if missing:
-        raise InputError(
-            f"Expected the tables of the experiment in {folder}. Received: no {missing[0]}.parquet. "
-            "Run python -m enhsim_tf.reproduce --experiment robustness."
-        )
-    tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
-    for table in tables.values():
-        for column in set(_LABELS) & set(table.columns):
-            table[column] = table[column].astype(str)  # plain labels again
-    return tables
+KEPT = KeptTables(
+    TABLES,
+    labels=("environment", "arm", "detector", "kind", "noise", "measure", "section", "method", "mode"),
+    digits=4,
+    kind="experiment",
+    command="python -m enhsim_tf.reproduce --experiment robustness",
+    digits_of={"recall": 3},  # shares of 150 windows, in by far the largest table
+)
 
 
 def rates(alarms: "pd.DataFrame") -> "pd.DataFrame":
@@ -91,7 +57,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     """Every number that the report, the README and the page state about the experiment.
 
     Args:
-        tables: As `read_tables` gives them.
+        tables: As `KEPT.read` gives them.
 
     Returns:
         Plain JSON types: what ran, `arms`, `contrasts`, `bars`, `measures`, `variations`, `modes`, `iterations`.

@@ -1,14 +1,12 @@
 """What the study of real telemetry found: every number that figures and report state, from the tables of its channels."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enhsim_tf import inference
-from enhsim_tf.errors import InputError
-from enhsim_tf.files import replace_file
+from enhsim_tf.reproduce.kept_tables import KeptTables
 from enhsim_tf.reproduce.labelled_study import ARMS, DEGRADED_ARM, GENERATED_ARM, TABLES
 
 if TYPE_CHECKING:
@@ -20,49 +18,21 @@ NEARER = 2 / 3
 """Largest error of the enhanced over the coarse signal that counts as nearer by a third."""
 SATURATED = 0.9
 """Where both trainings alarm on more than this share of nominal windows, their ratio says nothing."""
-_LABELS = ("arm", "detector", "channel", "class", "method")
 _CONTROLS = ("random score", "largest step", "moving deviation", "oracle")
-
-
-def write_tables(tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
-    """Writes each table as Parquet, its labels as dictionaries."""
-    for name, table in tables.items():
-        compact = table.reset_index(drop=True)
-        for column in compact.columns:
-            if column in _LABELS:
-                compact[column] = compact[column].astype("category")
-            elif compact[column].dtype == np.float64:
-                compact[column] = compact[column].round(5).astype(np.float32)
-        with replace_file(folder / f"{name}.parquet") as temporary:
-            compact.to_parquet(temporary, compression="zstd", index=False)
-
-
-def read_tables(folder: Path) -> "dict[str, pd.DataFrame]":
-    """The tables that `write_tables` wrote.
-
-    Raises:
-        InputError: If one is missing.
-    """
-    import pandas as pd
-
-    missing = [name for name in TABLES if not (folder / f"{name}.parquet").is_file()]
-    if missing:
-        raise InputError(
-            f"Expected the tables of the study in {folder}. Received: no {missing[0]}.parquet. "
-            "Run python -m enhsim_tf.reproduce --experiment labelled --data FOLDER."
-        )
-    tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
-    for table in tables.values():
-        for column in set(_LABELS) & set(table.columns):
-            table[column] = table[column].astype(str)
-    return tables
+KEPT = KeptTables(
+    TABLES,
+    labels=("arm", "detector", "channel", "class", "method"),
+    digits=5,
+    kind="study",
+    command="python -m enhsim_tf.reproduce --experiment labelled --data FOLDER",
+)
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     """Every number of the study.
 
     Args:
-        tables: As `read_tables` returns them.
+        tables: As `KEPT.read` returns them.
     """
     channels = {name: _channel(tables, name) for name in dict.fromkeys(tables["alarms"]["channel"])}
     arms = {arm: _arm(tables, arm) for arm in (*ARMS, DEGRADED_ARM)}
@@ -163,12 +133,12 @@ def _interval(table: "pd.DataFrame", value: str, levels: list[str]) -> dict[str,
 def _bars(channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Which of the aims that were set before the first run are reached, channel by channel."""
     errors = {name: about["nrmse"] for name, about in channels.items()}
-    long_stuck = {name: [_found_by(sequence) for sequence in about["sequences"]] for name, about in channels.items()}
+    found_by = {name: [_found_by(sequence) for sequence in about["sequences"]] for name, about in channels.items()}
     return {
         "best_of_three": {name: each["enhanced"] < min(each["coarse"], each["ridge"]) for name, each in errors.items()},
         "nearer_by_a_third": {name: each["enhanced"] <= NEARER * each["coarse"] for name, each in errors.items()},
         "false_alarms": {name: about["median_ratio"] <= LARGEST_RATIO for name, about in channels.items()},
-        "found": long_stuck,
+        "found": found_by,
     }
 
 

@@ -38,15 +38,17 @@ def run(
     Raises:
         InputError: If the folder is none of this layout, a channel is not in it, or no channel can be used.
     """
-    from enhsim_tf.reproduce.labelled_findings import read_tables, summarise, write_tables
+    from enhsim_tf.reproduce.figures import save_all
+    from enhsim_tf.reproduce.labelled_figures import FIGURES
+    from enhsim_tf.reproduce.labelled_findings import KEPT, summarise
 
     folder = make_folder(out)
     tables, skipped = collect(settings, cache, data, channels, fresh, tell)
-    write_tables(tables, folder)
-    found = summarise(read_tables(folder))
+    KEPT.write(tables, folder)
+    found = summarise(KEPT.read(folder))
     found |= {"budget": settings.budget, "skipped": skipped, "versions": VERSIONS}
     write_json(folder / "findings.json", found)
-    draw(found, folder)
+    save_all(FIGURES, found, folder, KEPT.command)
     return found
 
 
@@ -92,27 +94,6 @@ def collect(
     if not parts:
         raise InputError(f"Expected a channel that can be used. Received: none of {len(chosen)} in {data}. The first: {skipped[chosen[0]]}")
     return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}, skipped
-
-
-def draw(found: dict[str, Any], folder: Path, names: Sequence[str] = ()) -> list[Path]:
-    """Draws figures of the study from its findings.
-
-    Args:
-        found: The findings.
-        folder: Where to.
-        names: Which; none for all.
-
-    Returns:
-        The paths of the files.
-    """
-    from enhsim_tf.reproduce.figures import save
-    from enhsim_tf.reproduce.labelled_figures import FIGURES
-
-    caption = f"seed {found['seeds'][0]} · {found['budget']} budget · python -m enhsim_tf.reproduce --experiment labelled --data FOLDER"
-    paths = []
-    for name in names or FIGURES:
-        paths += save(name, found, folder, caption, found["budget"] == "smoke", figures=FIGURES)
-    return paths
 
 
 def table(found: dict[str, Any]) -> str:

@@ -16,11 +16,11 @@ from enhsim_tf import detection, robustness
 from enhsim_tf.detectors import CONTROLS, DETECTORS
 from enhsim_tf.labelled import LabelledChannel
 from enhsim_tf.noise import BlockBootstrap, GaussianAutoregression, GaussianNoise, noise_unit
-from enhsim_tf.pairs import at_level, cut_pairs, cut_parts, even_places
+from enhsim_tf.pairs import cut_pairs, cut_parts, even_places, ridge, window_errors
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.simulator import MODES, Degraded
-from enhsim_tf.telemetry import Telemetry
+from enhsim_tf.telemetry import disjoint_offsets
 from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
@@ -177,8 +177,12 @@ class ChannelStudy:
         """First samples of the scored windows of the test part, the windows, and which of them hold no labelled sample."""
         window, values = self.simulator.window, self.channel.test.values
         begins = np.arange(0, len(values) - window + 1, max(1, window // _STRIDES))
+        return begins, cut_parts([self.channel.test], begins, window)[0], self._is_nominal(begins)
+
+    def _is_nominal(self, begins: np.ndarray) -> np.ndarray:
+        """Which windows of the test part hold no labelled sample, by their first samples."""
         touched = np.concatenate([[0], np.cumsum(self.channel.is_anomalous)])
-        return begins, cut_parts([self.channel.test], begins, window)[0], touched[begins + window] == touched[begins]
+        return touched[begins + self.simulator.window] == touched[begins]
 
     def _judge(
         self,
@@ -205,7 +209,7 @@ class ChannelStudy:
             rows["sequences"].append(
                 about | {"sequence": number, "class": kind, "length": stop - start, "found": bool(len(first)), "delay": delay}
             )
-        rows["ranking"].append(self._ranking(arm, name, labels, _of_samples(scores, begins, window, len(labels))))
+        rows["ranking"].append(self._ranking(arm, name, labels, robustness.mean_over_windows(scores, begins, window, len(labels))))
 
     def _ranking(self, arm: str, name: str, labels: np.ndarray, scores: np.ndarray) -> dict[str, Any]:
         from sklearn.metrics import average_precision_score
@@ -218,59 +222,31 @@ class ChannelStudy:
             "auc_pr": float(average_precision_score(labels, scores)),
         }
 
-    def _ridge_on_the_same_clock(self, begins: np.ndarray) -> np.ndarray:
-        """Ridge regression on windows whose clock and level the enhanced shape has set: what the network itself is worth."""
-        from sklearn.linear_model import Ridge
-
-        simulator, train = self.simulator, self.channel.train
-        learnt = simulator.pairs(train, even_places([train], simulator.window, len(train))).clear()
-        test = simulator.pairs(self.channel.test, begins)
-        return at_level(Ridge().fit(learnt.coarse, learnt.target_in_unit).predict(test.coarse), test.shift, test.gain)
-
     @property
     def _period(self) -> float:
         """Period of the channel in samples."""
         return max(wave.period_s for wave in self.simulator.coarse.waves) / self.channel.train.interval_s
 
     def enhancement(self) -> list[dict]:
-        """Median error over nominal test windows that share no sample, of the coarse signal, ridge regression and the enhancer."""
-        from sklearn.linear_model import Ridge
-
-        window, simulator = self.simulator.window, self.simulator
-        begins = np.arange(0, len(self.channel.test) - window + 1, window)
-        touched = np.concatenate([[0], np.cumsum(self.channel.is_anomalous)])
-        begins = begins[touched[begins + window] == touched[begins]]
-        pairs = cut_pairs([self.channel.test], simulator.coarse, begins, window, follow=True)
-        train: list[Telemetry] = [self.channel.train]
-        learnt = cut_pairs(train, simulator.coarse, even_places(train, window, len(self.channel.train)), window, follow=True).clear()
-        ridge = Ridge().fit(learnt.coarse, learnt.target_in_unit)
-        errors = {
-            "coarse": pairs.coarse_at_level,
-            "ridge": at_level(ridge.predict(pairs.coarse), pairs.shift, pairs.gain),
-            "ridge, same clock": self._ridge_on_the_same_clock(begins),
-            "enhanced": simulator.follow(simulator.pairs(self.channel.test, begins)),
+        """Error over nominal test windows that share no sample, of the coarse signal, ridge regression and the enhancer: quartiles."""
+        window, simulator, train, test = self.simulator.window, self.simulator, self.channel.train, self.channel.test
+        begins, places = disjoint_offsets(len(test), window), even_places([train], window, len(train))
+        begins = begins[self._is_nominal(begins)]
+        by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
+        by_shape = simulator.pairs(test, begins)  # set to the clock and level by the enhanced shape
+        windows = {
+            "coarse": by_edges.coarse_at_level,
+            "ridge": ridge(cut_pairs([train], simulator.coarse, places, window, follow=True), by_edges),
+            "ridge, same clock": ridge(simulator.pairs(train, places), by_shape),  # what the network itself is worth
+            "enhanced": simulator.follow(by_shape),
         }
-        deviation = pairs.target.std(axis=1, dtype=np.float64)
-        moves = deviation > 0
         found = []
-        for method, windows in errors.items():
-            nrmse = np.sqrt(np.mean((windows - pairs.target) ** 2, axis=1, dtype=np.float64))[moves] / deviation[moves]
-            quartiles = dict(zip(("lower", "nrmse", "upper"), np.quantile(nrmse, [0.25, 0.5, 0.75]).tolist(), strict=True))
-            found.append({"method": method, **quartiles, "windows": len(nrmse), "window": window, "period": self._period})
+        for method, estimate in windows.items():
+            errors = window_errors(estimate, by_edges.target)
+            errors = errors[~np.isnan(errors)]
+            quartiles = dict(zip(("lower", "nrmse", "upper"), np.quantile(errors, [0.25, 0.5, 0.75]).tolist(), strict=True))
+            found.append({"method": method, **quartiles, "windows": len(errors), "window": window, "period": self._period})
         return found
-
-
-def _of_samples(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
-    """A score for each sample: the mean over the scored windows that it lies in; the last samples take the last window's."""
-    total, number = np.zeros((2, num_samples + 1))
-    for place, sign in ((begins, 1), (begins + window, -1)):
-        np.add.at(total, place, sign * scores)
-        np.add.at(number, place, sign)
-    total, number = np.cumsum(total)[:-1], np.cumsum(number)[:-1]
-    covered = number > 0
-    total[covered] /= number[covered]
-    total[~covered] = scores[-1]
-    return total
 
 
 def _classifier(nominal: np.ndarray, degraded: np.ndarray, seed: int) -> Callable[[np.ndarray], np.ndarray]:

@@ -7,6 +7,7 @@ import matplotlib.figure
 import numpy as np
 from matplotlib.axes import Axes
 
+from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.degraded_modes import LARGEST_TRAINED, SCORED
 from enhsim_tf.reproduce.figures import Figure
 from enhsim_tf.reproduce.replicates import ARMS
@@ -34,11 +35,7 @@ def _per_cent(axes: Axes, ticks: Sequence[float]) -> None:
 
 
 def _scope(found: Findings) -> str:
-    return f"{_seeds(found['seeds'])}, {found['num_windows']:,} real nominal windows each"
-
-
-def _seeds(seeds: Sequence[int]) -> str:
-    return "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
+    return f"{in_seeds(found['seeds'])}, {found['num_windows']:,} real nominal windows each"
 
 
 def false_alarms(found: Findings) -> matplotlib.figure.Figure:
@@ -206,7 +203,7 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
         f"Beyond nominal operation the paper's enhancer errs by {errors['paper']['inside']:.2f}; trained over randomised configurations it errs by "
         f"{errors['randomised']['inside']:.2f} inside the range it saw and {errors['randomised']['outside']:.2f} outside",
         f"Root mean square error of the enhanced signal against the true degraded one, in units of the nominal signal's standard deviation; grey: severities "
-        f"that the randomised enhancer was trained on; {_seeds(found['modes']['seeds'])}.",
+        f"that the randomised enhancer was trained on; {in_seeds(found['modes']['seeds'])}.",
     )
     grid = panels(figure, down + 0.22, 2, 3, right=1.15, gap=(0.42, 0.36), sharex=True)
     for axes, mode in zip(grid.ravel(), modes, strict=True):

@@ -3,12 +3,14 @@
 No number is written here: each comes from the findings, and a test renders the report again from the tables.
 """
 
+import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from enhsim_tf.files import make_folder, replace_file
+from enhsim_tf.reproduce.caption import in_seeds
 
 Findings = Mapping[str, Any]
 PATH = Path("docs") / "REPORT.md"
@@ -59,12 +61,18 @@ def share_c8(found: Findings) -> tuple[int, int]:
     return kept, total
 
 
-def render(found: Findings, labelled: Findings | None = None, template: str = "robustness_report.md.jinja") -> str:
+def render(
+    found: Findings,
+    labelled: Findings | None = None,
+    designs: Sequence[Mapping[str, str]] = (),
+    template: str = "robustness_report.md.jinja",
+) -> str:
     """The report as Markdown.
 
     Args:
         found: The findings.
         labelled: Those of the study of real telemetry, or None where there was none.
+        designs: Rows of what was tried on the way to the second generator, as `designs_of` reads them.
         template: Its template, beside this module.
     """
     import jinja2
@@ -74,9 +82,16 @@ def render(found: Findings, labelled: Findings | None = None, template: str = "r
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"per_cent": per_cent, "interval": interval, "p_value": p_value, "reached": reached}
+    environment.filters |= {
+        "per_cent": per_cent,
+        "interval": interval,
+        "p_value": p_value,
+        "reached": reached,
+        "in_seeds": in_seeds,
+        "share": share,
+    }
     words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
-    return environment.get_template(template).render(found=found, labelled=labelled, words=words, c8=share_c8(found))
+    return environment.get_template(template).render(found=found, labelled=labelled, designs=designs, words=words, c8=share_c8(found))
 
 
 def findings_of(root: Path, name: str) -> Findings | None:
@@ -90,6 +105,24 @@ def findings_of(root: Path, name: str) -> Findings | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
+def designs_of(root: Path) -> list[dict[str, str]]:
+    """What was tried on the way to the second generator, a row a training; none where the project keeps no such table.
+
+    Args:
+        root: Folder of the project.
+    """
+    path = root / "docs" / "designs.csv"
+    if not path.is_file():
+        return []
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def share(text: str) -> str:
+    """A share of the table of designs in per cent; nothing where it was not measured."""
+    return per_cent(float(text)) if text else ""
+
+
 def report(found: Findings, root: Path) -> None:
     """Writes the report and the README's part on the experiment; each only where it exists or may be made.
 
@@ -100,10 +133,10 @@ def report(found: Findings, root: Path) -> None:
     from enhsim_tf.reproduce import labelled_run
     from enhsim_tf.reproduce.report import fill_parts
 
+    labelled = findings_of(root, "labelled")
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
-        temporary.write_text(render(found, findings_of(root, "labelled")), encoding="utf-8")
-    labelled = findings_of(root, "labelled")
+        temporary.write_text(render(found, labelled, designs_of(root)), encoding="utf-8")
     parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
     readme = root / "README.md"
     if readme.is_file():
@@ -125,10 +158,9 @@ def table(found: Findings) -> str:
         closed = "" if about["gap_closed"] is None else f"{100 * about['gap_closed']:.0f} %"
         lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {closed} |")
     seeds = found["seeds"]
-    number = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
     return "\n".join(lines) + (
         f"\n\nFalse alarms on {found['num_windows']:,} real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over "
-        f"{number} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five severities. "
+        f"{in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five severities. "
         "From `figures/robustness/findings.json`."
     )
 

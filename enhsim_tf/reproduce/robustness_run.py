@@ -32,15 +32,17 @@ def run(
     Returns:
         The findings.
     """
-    from enhsim_tf.reproduce.findings import read_tables, summarise, write_tables
+    from enhsim_tf.reproduce.figures import save_all
+    from enhsim_tf.reproduce.findings import KEPT, summarise
+    from enhsim_tf.reproduce.robustness_figures import FIGURES
 
     folder = make_folder(out)
     tables = collect(settings, cache, environments, fresh, tell)
-    write_tables(tables, folder)
-    found = summarise(read_tables(folder))
+    KEPT.write(tables, folder)
+    found = summarise(KEPT.read(folder))
     found |= {"budget": settings.budget, "first_seed": settings.robustness.first_seed, "versions": VERSIONS}
     write_json(folder / "findings.json", found)
-    draw(found, folder)
+    save_all(FIGURES, found, folder, KEPT.command)
     return found
 
 
@@ -79,25 +81,3 @@ def collect(
 
             keras.backend.clear_session()  # hundreds of networks would fill the memory
     return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}
-
-
-def draw(found: dict[str, Any], folder: Path, names: Sequence[str] = ()) -> list[Path]:
-    """Draws figures of the experiment from its findings.
-
-    Args:
-        found: The findings.
-        folder: Where to.
-        names: Which; none for all.
-
-    Returns:
-        The paths of the files.
-    """
-    from enhsim_tf.reproduce.figures import save
-    from enhsim_tf.reproduce.robustness_figures import FIGURES
-
-    seeds = found["seeds"]
-    caption = f"seeds {seeds[0]} to {seeds[-1]} · {found['budget']} budget · python -m enhsim_tf.reproduce --experiment robustness"
-    paths = []
-    for name in names or FIGURES:
-        paths += save(name, found, folder, caption, found["budget"] == "smoke", figures=FIGURES)
-    return paths

@@ -22,11 +22,19 @@ from IPython.display import Markdown, display
 from PIL import Image
 
 from enhsim_tf.errors import InputError
-from enhsim_tf.reproduce import claims, figures, labelled_figures, labelled_findings, labelled_run, robustness_figures, robustness_run
-from enhsim_tf.reproduce.caption import caption_of
+from enhsim_tf.reproduce import (
+    claims,
+    figures,
+    findings,
+    labelled_figures,
+    labelled_findings,
+    labelled_run,
+    robustness_figures,
+    robustness_run,
+)
+from enhsim_tf.reproduce.caption import caption_of, in_seeds
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.figure_data import FIGURE_DATA
-from enhsim_tf.reproduce.findings import read_tables
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages, default_cache
 from enhsim_tf.sheet import STYLE
@@ -115,9 +123,9 @@ def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
     """The experiment on robustness as it was run and kept: its findings, and the tables they come from."""
     found = json.loads((_KEPT / "findings.json").read_text(encoding="utf-8"))
     print(
-        f"{found['num_replicates']} replicates: {len(found['seeds'])} seeds in {len(found['environments'])} environments, kept in figures/."
+        f"{found['num_replicates']} replicates: {in_seeds(found['seeds'])} in {len(found['environments'])} environments, kept in figures/."
     )
-    return found, read_tables(_KEPT)
+    return found, findings.KEPT.read(_KEPT)
 
 
 def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
@@ -125,14 +133,15 @@ def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
     folder = _ROOT / "figures" / labelled_run.FOLDER
     found = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
     print(f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in figures/.")
-    return found, labelled_findings.read_tables(folder)
+    return found, labelled_findings.KEPT.read(folder)
 
 
 def show_finding(found: dict, name: str) -> None:
     """Shows a figure of an experiment from its findings: one of `robustness_figures.FIGURES` or `labelled_figures.FIGURES`."""
-    room, drawn = (labelled_run, labelled_figures) if name in labelled_figures.FIGURES else (robustness_run, robustness_figures)
+    of_labelled = name in labelled_figures.FIGURES
+    drawn, kept = (labelled_figures, labelled_findings.KEPT) if of_labelled else (robustness_figures, findings.KEPT)
     with tempfile.TemporaryDirectory() as folder:
-        path = next(path for path in room.draw(found, Path(folder), (name,)) if path.suffix == ".png")
+        path = next(path for path in figures.save_all(drawn.FIGURES, found, folder, kept.command, (name,)) if path.suffix == ".png")
         _show_picture(path.read_bytes(), drawn.FIGURES[name].alt)
 
 
