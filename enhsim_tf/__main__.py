@@ -29,21 +29,23 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.errors import InputError
 
     counts = {"num_windows": options.num_windows, "epochs": options.epochs, "num_iterations": options.iterations}
-    if min(counts["num_windows"], counts["epochs"]) < 1 or options.iterations < 0 or (options.workers is not None and options.workers < 1):
-        raise InputError("Expected at least one window, epoch and worker, and no negative number of iterations. Received: less.")
+    if min(counts["num_windows"], counts["epochs"]) < 1 or options.iterations < 0:
+        raise InputError("Expected at least one window and epoch, and no negative number of iterations. Received: less.")
     if not 0 <= options.held_out <= 0.5 or (options.window is not None and options.window < LEAST_WINDOW):
         raise InputError(
             f"Expected --held-out from 0 to 0.5 and --window of at least {LEAST_WINDOW}. "
             f"Received: {options.held_out} and {options.window or 'no window'}."
         )
+    from enhsim_tf.engines import workers_of
+
+    workers = workers_of(options.workers)
     from enhsim_tf.channels import fit_channels  # pandas takes a while
     from enhsim_tf.sources import read_source
 
     cleaning = cleaning_of(options, options.window or 64)
     series = read_source(options.source, options.column, options.time, cleaning)
     chosen = {"window": options.window, "noise": options.noise, "held_out": options.held_out, "seed": options.seed} | counts
-    workers = options.workers or min(len(series), os.cpu_count() or 1)
-    failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, sys.stdout.isatty())
+    failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, sys.stdout.isatty(), options.engine)
     return tell_failed(failed)
 
 

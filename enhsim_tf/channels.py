@@ -1,32 +1,29 @@
-"""Many channels at once: a folder of fitted simulators, one folder a channel, each fitted in a process of its own.
+"""Many channels at once: a folder of fitted simulators, one folder a channel, fitted by the processes of an engine.
 
 MODEL_DIR/volts/        what `EnhancedSimulator.save` writes, and
 MODEL_DIR/volts/report.json, report.png
 """
 
-import concurrent.futures
 import contextlib
 import dataclasses
-import multiprocessing
 import os
-import signal
-import threading
 import urllib.parse
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enhsim_tf import engines
 from enhsim_tf.cleaning import Cleaning, clean
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import encoded, make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.local_engine import ProcessesDiedError, num_cpus
 from enhsim_tf.saved_simulator import MANIFEST, is_foreign
 from enhsim_tf.terminal import printable, start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_THREADS = 2  # of TensorFlow for each channel: how it adds up depends on their number, so that must not depend on the workers
+THREADS = 2  # for each channel: how sums are rounded depends on their number, so that must not depend on the workers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Job:
     Args:
         channel: Its name.
         series: Its raw values, as `sources.read_source` reads them.
-        folder: Where its simulator goes.
+        folder: Where its simulator goes; absolute, for another process may stand elsewhere.
         options: `fitting.FitOptions` as a dictionary.
         cleaning: What to do with dirty values.
         verbose: Whether to show progress bars.
@@ -107,9 +104,10 @@ def fit_channels(
     out: str | os.PathLike,
     options: Mapping[str, Any],
     cleaning: Cleaning,
-    workers: int,
+    workers: int | None,
     tell: Callable[[str], None],
     verbose: bool = False,
+    engine: str = "local",
 ) -> dict[str, str]:
     """Fits a simulator to each channel, writes it with its report, and tells what was found.
 
@@ -118,77 +116,105 @@ def fit_channels(
         out: The folder of the models.
         options: Fields of `fitting.FitOptions`.
         cleaning: What to do with dirty values.
-        workers: Channels fitted at a time, each in a process of its own. Their number changes no bit of the simulators.
-            0 fits them in this process, with the threads that it has.
+        workers: Channels fitted at a time, each in a process of its own; None: one a CPU. Their number changes no bit of the
+            simulators. 0 fits them in this process, with the threads that it has.
         tell: Called with each line.
         verbose: Whether to show progress bars, where one channel is fitted at a time.
+        engine: Who runs the processes: `local` or `ray`. It changes no bit either.
 
     Returns:
         For each channel that could not be fitted, why.
 
     Raises:
-        InputError: If a channel has no usable name, or something else stands where a simulator would go; before any is fitted.
+        InputError: If a channel has no usable name, or something else stands where a simulator would go, before any is fitted;
+            if the engine cannot be used, or a simulator not be written.
     """
     out = make_folder(out)
     if (out / MANIFEST).is_file():
         raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
-    verbose = verbose and min(workers, len(series)) <= 1
-    jobs = [Job(name, each, folder_of(out, name), dict(options), cleaning, verbose) for name, each in series.items()]
+    verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
+    here = Path(os.path.abspath(out))
+    jobs = [Job(name, each, folder_of(here, name), dict(options), cleaning, verbose) for name, each in series.items()]
     for job in jobs:
         refuse_foreign(job.folder)
     remove_leftovers(out)
-    if workers and jobs:
-        return _fit_in_processes(jobs, workers, tell)
     failed: dict[str, str] = {}
-    for job in jobs:
-        try:
-            tell("\n".join(fit_job(job)))
-        except InputError as error:
-            failed[job.channel] = str(error)
-    return failed
 
+    def note(outcome: Outcome) -> None:
+        if outcome.failure is None:
+            tell("\n".join([*outcome.lines, f"simulator, report.json and report.png in {folder_of(out, outcome.channel)}/"]))
+        else:
+            failed[outcome.channel] = outcome.failure
 
-def _fit_in_processes(jobs: list[Job], workers: int, tell: Callable[[str], None]) -> dict[str, str]:
-    """Each channel in a process of its own; one that fails or is killed does not stop the others' results."""
-    failed: dict[str, str] = {}
-    before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
-    with concurrent.futures.ProcessPoolExecutor(min(workers, len(jobs)), context, _begin) as pool:
-        with _ignored_interrupts():  # processes inherit it: at an interrupt they are ended below, without a word
-            running = {pool.submit(fit_job, job): job for job in jobs}
-        try:
-            for done in concurrent.futures.as_completed(running):
-                channel = running[done].channel
-                try:
-                    tell("\n".join(done.result()))
-                except InputError as error:
-                    failed[channel] = str(error)
-                except BrokenProcessPool:
-                    failed[channel] = "Expected to fit it in a process. Received: one that was killed, perhaps for memory. Use --workers 1."
-        finally:
-            if not all(future.done() for future in running):  # at an interrupt
-                pool.shutdown(wait=False, cancel_futures=True)
-                for child in set(multiprocessing.active_children()) - before:
-                    child.terminate()
-    return failed
-
-
-def _begin() -> None:
-    """Begins a process: its threads, before TensorFlow is imported."""
-    os.environ["TF_NUM_INTRAOP_THREADS"] = str(_THREADS)
-
-
-@contextlib.contextmanager
-def _ignored_interrupts() -> Iterator[None]:
-    """Ignores interrupts for a moment, where that can be chosen: in the main thread."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        yield
+        if workers == 0:
+            for job in jobs:
+                note(fit_or_say(job))
+        else:
+            _fit_in_processes(jobs, engine, workers, note)
     finally:
-        signal.signal(signal.SIGINT, before)
+        remove_leftovers(out)  # of processes that were ended
+    return {name: failed[name] for name in series if name in failed}
+
+
+def _fit_in_processes(jobs: Sequence[Job], engine: str, workers: int | None, note: Callable[["Outcome"], None]) -> None:
+    """Hands the channels to an engine; one whose process dies again and again does not stop the others."""
+    waiting = {job.channel: job for job in jobs}
+
+    def fit(some: Sequence[Job], workers: int | None) -> None:
+        with contextlib.closing(engines.run(engine, fit_or_say, some, workers, THREADS)) as running:
+            for outcome in running:
+                note(outcome)
+                del waiting[outcome.channel]
+
+    while waiting:
+        try:
+            fit(list(waiting.values()), workers)
+        except ProcessesDiedError as died:
+            suspects = [job for job in died.items if job.channel in waiting]
+            if not suspects:
+                raise
+            for job in suspects:  # one at a time, so that the channel that ends its process is known, and has all the memory
+                try:
+                    fit([job], 1)
+                except ProcessesDiedError:
+                    said = (
+                        "Expected a process that fits it. Received: only ones that were killed, perhaps for memory. Give it less telemetry."
+                    )
+                    note(Outcome(job.channel, failure=said))
+                    del waiting[job.channel]
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What became of a channel.
+
+    Args:
+        channel: Its name.
+        lines: Those of its reports, if it was fitted.
+        failure: Why it was not.
+    """
+
+    channel: str
+    lines: Sequence[str] = ()
+    failure: str | None = None
+
+
+def fit_or_say(job: Job) -> Outcome:
+    """Fits a channel in a process of an engine; what only this channel is to blame for comes back as its failure.
+
+    Raises:
+        InputError: If the machine refuses something, which the other channels would meet too.
+    """
+    try:
+        return Outcome(job.channel, fit_job(job))
+    except InputError as error:
+        return Outcome(job.channel, failure=str(error))
+    except (OSError, MemoryError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "more than there is"
+        raise InputError(
+            f"Expected files and memory as {printable(job.channel)} needs them. Received: {reason}. What was finished is kept; make room."
+        ) from error
 
 
 def fit_job(job: Job) -> list[str]:
@@ -209,4 +235,4 @@ def fit_job(job: Job) -> list[str]:
         simulator.save(temporary)
         write_json(temporary / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
         channel_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
-    return [*cleaned.report.lines(), *report.lines(), f"simulator, report.json and report.png in {job.folder}/"]
+    return [*cleaned.report.lines(), *report.lines()]

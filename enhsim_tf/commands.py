@@ -61,7 +61,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     fit.add_argument("--num-windows", type=int, default=2_500, metavar="N", help="training windows (default: 2500)")
     fit.add_argument("--epochs", type=int, default=6, metavar="N", help="passes of the enhancer over them (default: 6)")
     fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="adversarial iterations of the noise (default: 1000)")
-    fit.add_argument("--workers", type=int, metavar="N", help="channels fitted at a time, two threads each (default: one a core)")
+    fit.add_argument("--workers", metavar="auto|N", help="channels fitted at a time, two threads each (default: auto, one a core)")
+    fit.add_argument(
+        "--engine", choices=("local", "ray"), default="local", help="who fits them: this machine (default), or Ray (docs/fleet.md)"
+    )
     _add_seed(fit)
 
     generate = commands.add_parser(

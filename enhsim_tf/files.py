@@ -1,7 +1,8 @@
 """Files and folders that appear whole or not at all, and their checksums.
 
 Everything the package writes goes to a temporary name beside its destination and is renamed when it is complete:
-a killed process leaves either the old content or the new, never a half.
+a killed process leaves either the old content or the new, never a half. A folder takes two renames; of a process that is
+killed between them the old content stands aside, and the next `replace_folder` or `remove_leftovers` puts it back.
 """
 
 import contextlib
@@ -14,20 +15,20 @@ import socket
 import time
 import urllib.parse
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from enhsim_tf.errors import InputError
 
-_LEFT = re.compile(r"\..*?\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}\.tmp")
+_LEFT = re.compile(r"\.(?P<name>.*?)\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}(?P<suffix>\.\w+|)")
 _MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
 _OLD_S = 24 * 3600  # no process writes nothing for so long
 
 
-def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}.{uuid.uuid4().hex[:8]}.tmp")
+def _temporary(path: Path, kind: str = "tmp") -> Path:
+    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}.{uuid.uuid4().hex[:8]}.{kind}")
 
 
 def _host() -> str:
@@ -63,7 +64,7 @@ def make_folder(path: str | os.PathLike) -> Path:
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = _temporary(path / "probe")
+        probe = _temporary(path / "probe.tmp")
         probe.touch()
         probe.unlink()
     except OSError as error:
@@ -84,46 +85,96 @@ def replace_file(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def replace_folder(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary folder; when the block ends well, it takes the name `path`, replacing what stood there."""
+def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None = None) -> Iterator[Path]:
+    """Yields a temporary folder; when the block ends well, it takes the name `path`, replacing what stood there.
+
+    Args:
+        path: The folder.
+        keep: Asked of what stands there at the end; where it says so, that stays, and the new content is dropped: whoever
+            reads the work of another process does not lose it while reading.
+    """
     path = Path(path)
     make_folder(path.parent)
-    temporary, old = _temporary(path), _temporary(path)
+    remove_leftovers(path.parent, path.name)
+    temporary, old = _temporary(path), _temporary(path, "old")
     temporary.mkdir()
     try:
         yield temporary
-        if path.exists():
-            os.replace(path, old)
-        try:
-            os.replace(temporary, path)
-        except OSError:
-            if old.exists():
-                os.replace(old, path)
-            raise
+        while True:
+            if os.path.lexists(path):
+                if keep is not None and keep(path):
+                    return
+                with contextlib.suppress(FileNotFoundError):  # another process has moved it meanwhile
+                    os.replace(path, old)
+            try:
+                os.replace(temporary, path)
+                return
+            except OSError:
+                if os.path.lexists(path):  # another process has put its own there meanwhile
+                    _remove(old)
+                    continue
+                if os.path.lexists(old):
+                    os.replace(old, path)
+                raise
     finally:
-        for left in (temporary, old):
-            if left.is_dir():
-                shutil.rmtree(left, ignore_errors=True)
-            else:
-                left.unlink(missing_ok=True)
+        _remove(temporary)
+        _remove(old)
 
 
-def remove_leftovers(folder: str | os.PathLike) -> None:
-    """Removes the temporary folders that killed processes left in a folder.
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
-    A process of this machine that is dead left its own for certain. Any other may belong to another machine that shares
-    the folder, and goes when nothing was written to it for a day.
+
+def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
+    """Removes what killed processes left in a folder under temporary names, and puts back what they had only moved aside.
+
+    A process of this machine that is dead left its own for certain, and one that is alive is at work. A folder that
+    belongs to neither may be of another machine that shares this one, and goes when nothing was written to it for a day.
 
     Args:
-        folder: Where `replace_folder` was to make its folders.
+        folder: Where `replace_folder` and `replace_file` were to make theirs.
+        name: Only those that were to take this name.
     """
-    for left in Path(folder).glob(".*.tmp"):
+    folder = Path(folder)
+    for left in folder.glob(".*"):
         named = _LEFT.fullmatch(left.name)
-        if named is None or not left.is_dir() or left.is_symlink():
+        if named is None or (name is not None and named["name"] != name):
             continue
-        is_dead = named["host"] == _host() and not _is_alive(int(named["process"]))
-        if is_dead or _last_written(left) < time.time() - _OLD_S:
-            shutil.rmtree(left, ignore_errors=True)
+        is_ours, is_file = named["host"] == _host(), left.is_file()
+        is_aside, is_temporary = named["suffix"] == ".old", named["suffix"] == ".tmp"
+        if left.is_symlink() and not is_aside:
+            continue
+        if is_file and not is_aside and not (named["host"] and named["name"].endswith(named["suffix"])):  # not of `replace_file`
+            continue
+        if not is_file and not is_aside and not is_temporary:
+            continue
+        if is_ours and int(named["process"]) != os.getpid():
+            is_left = not _is_alive(int(named["process"]))
+        else:
+            is_left = not is_file and _last_written(left) < _now(folder) - _OLD_S
+        if not is_left:
+            continue
+        if is_aside and not os.path.lexists(folder / named["name"]):
+            with contextlib.suppress(OSError):  # another process was quicker
+                os.replace(left, folder / named["name"])
+        else:
+            _remove(left)
+
+
+def _now(folder: Path) -> float:
+    """The time by the clock that stamps the files of a folder, which may be another machine's; in seconds since 1970."""
+    probe = _temporary(folder / "probe.tmp")
+    try:
+        probe.touch()
+        return probe.stat().st_mtime
+    except OSError:
+        return time.time()
+    finally:
+        with contextlib.suppress(OSError):
+            probe.unlink(missing_ok=True)
 
 
 def _is_alive(process: int) -> bool:

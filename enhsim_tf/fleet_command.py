@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from enhsim_tf.channels import chosen_of, folder_of, models_of
+from enhsim_tf.engines import workers_of
 from enhsim_tf.errors import InputError
 from enhsim_tf.fleet import generate_fleet
 from enhsim_tf.fleet_plan import Plan, plan_of
@@ -25,15 +26,6 @@ def run_fleet(options: argparse.Namespace, tell: Callable[[str], None]) -> int:
     for out, plan in plans.items():
         generate_fleet(out, plan, workers, options.engine or "local", tell)
     return 0
-
-
-def workers_of(text: str | None) -> int | None:
-    """The number of `--workers auto|N`; None is one a CPU."""
-    if text in (None, "auto"):
-        return None
-    if not (text.isascii() and text.isdecimal() and 1 <= len(text) <= 9 and int(text)):
-        raise InputError(f"Expected --workers auto, or a number of them. Received: {text!r}.")
-    return int(text)
 
 
 def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:

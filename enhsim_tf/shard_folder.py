@@ -1,4 +1,4 @@
-"""A data set at rest: a folder of shards, `manifest.json`, and while it is being made `journal.jsonl` and `.lock`.
+"""A data set at rest: a folder of shards, `_manifest.json`, and while it is being made `_journal.jsonl` and `.lock`.
 
 The manifest says what the data set is and, once it is finished, what is recorded of each shard. Until then a line is added
 to the journal for each shard; a line that was not written to its end counts for nothing, and its shard is made again.
@@ -19,9 +19,9 @@ from enhsim_tf.fleet_plan import FORMAT, MOST_VALUES, Plan, key_of
 from enhsim_tf.scenario_file import MOST_WINDOWS
 from enhsim_tf.shards import Record, file_of, schema_of
 
-MANIFEST, JOURNAL, _LOCK = "manifest.json", "journal.jsonl", ".lock"
+MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of a folder of Parquet files pass over such names
 _SHARD = re.compile(r"shard-\d{6,}\.parquet")
-_LEFT = re.compile(r"\.(shard-\d{6,}\.parquet|manifest\.json)\..*")  # a temporary name of `replace_file`
+_LEFT = re.compile(r"\.(shard-\d{6,}\.parquet|_manifest\.json)\..*")  # a temporary name of `replace_file`
 _SHA256 = re.compile("[0-9a-f]{64}")
 _MOST_BYTES = 1_000_000_000  # of a manifest or journal
 

@@ -1,11 +1,13 @@
-"""Faults, tried for real on the command with tiny networks: `python tests/faults.py --out faults.json`.
+"""Faults, tried for real on the commands with tiny networks: `python tests/faults.py fleet|reproduce --out faults.json`.
 
-Each try starts `python -m enhsim_tf generate`, does it some harm at a random moment, runs the same command again until it
-ends well, and compares every byte of the data set with one that was never disturbed. It writes a table: fault, tries,
-outcome. The suite tries the same in small; this takes some minutes.
+Each try starts a command, does it some harm at a random moment, runs the same command again until it ends well, and
+compares what it made with what was made without any disturbance: every byte of the data set of `generate`; every figure's
+arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
+tries the same in small; this takes minutes for `fleet` and about an hour for `reproduce`.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import shutil
@@ -110,6 +112,92 @@ def full_disk(bench, name, rng):
         shutil.rmtree(folder)
 
 
+def read_only(bench, name, rng):
+    """The folder of a run that was killed becomes read-only; writable again afterwards."""
+    folder = bench.folder / name
+    folder.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=100m", "tmpfs", folder], capture_output=True).returncode:
+        shutil.rmtree(folder)
+        return "not tried: no file system can be mounted here"
+    try:
+        process = bench.start(name)
+        bench.moment(rng)
+        workers = children_of(process)
+        process.kill()
+        process.communicate()
+        while any(Path(f"/proc/{worker}").exists() for worker in workers):  # they may have files open
+            time.sleep(0.01)
+        subprocess.run(["mount", "-o", "remount,ro", folder], check=True)
+        process = bench.start(name)
+        err = process.communicate()[1]
+        subprocess.run(["mount", "-o", "remount,rw", folder], check=True)
+        if process.returncode != 2 or len(err.splitlines()) != 1:
+            return f"NOT one line: {process.returncode} {err.strip()[-200:]}"
+        again = bench.start(name)
+        again.communicate()
+        same = again.returncode == 0 and content_of(folder) == bench.expected
+        return "one line; recovered, same bytes" if same else "NOT recovered"
+    finally:
+        subprocess.run(["umount", folder], check=True)
+        shutil.rmtree(folder)
+
+
+CLOCK = """
+import os, time
+_time, _time_ns = time.time, time.time_ns
+def _step():
+    with open(os.environ["CLOCK_STEP"]) as file:
+        return float(file.read() or 0)
+time.time, time.time_ns = lambda: _time() + _step(), lambda: _time_ns() + int(1e9 * _step())
+"""
+
+
+@contextlib.contextmanager
+def stepping(folder):
+    """Yields what steps the clock of a running command by seconds, and the environment to start it with.
+
+    The machine's own clock stays: a `sitecustomize.py` in front of the command's modules shifts `time.time`, by what a file
+    says at that moment. `time.monotonic` goes on evenly, as it does when an administrator steps the clock. Files are stamped
+    by the kernel; `stepped` shifts their times as the clock would have.
+    """
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(CLOCK)
+
+    def step(seconds):
+        (folder / "new").write_text(str(seconds))
+        os.replace(folder / "new", folder / "seconds")
+
+    step(0)
+    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        yield step, os.environ | {"PYTHONPATH": path, "CLOCK_STEP": str(folder / "seconds")}
+    finally:
+        shutil.rmtree(folder)
+
+
+def stepped(folder, seconds):
+    """Moves the times of a folder and of all in it."""
+    for path in (folder, *folder.rglob("*")):
+        with contextlib.suppress(FileNotFoundError):  # a run may be at work there
+            about = path.stat()
+            os.utime(path, (about.st_atime + seconds, about.st_mtime + seconds))
+
+
+def clock_change(bench, name, rng):
+    """The clock jumps by years in the middle of a run; the next run finds files of another time, and the clock as it was."""
+    with stepping(bench.folder / f"{name}.clock") as (step, environment):
+        process = bench.start(name, env=environment)
+        bench.moment(rng)
+        step(seconds := float(rng.choice([-1, 1]) * rng.uniform(2, 20) * 365 * 86_400))
+        if (bench.folder / name).is_dir():
+            stepped(bench.folder / name, seconds)
+        err = process.communicate()[1]
+        if process.returncode or content_of(bench.folder / name) != bench.expected:
+            return f"NOT undisturbed: {process.returncode} {err.strip()[-200:]}"
+        stepped(bench.folder / name, -2 * seconds)
+        return f"went on; {bench.recovered(name)}"
+
+
 def damaged_shard(bench, name, rng):
     shutil.copytree(bench.folder / "undisturbed", bench.folder / name)
     shard = sorted((bench.folder / name).glob("shard-*"))[rng.integers(60)]
@@ -123,7 +211,7 @@ def damaged_shard(bench, name, rng):
 
 def damaged_manifest(bench, name, rng):
     shutil.copytree(bench.folder / "undisturbed", bench.folder / name)
-    manifest = bench.folder / name / "manifest.json"
+    manifest = bench.folder / name / "_manifest.json"
     os.truncate(manifest, rng.integers(manifest.stat().st_size - 2))
     process = bench.start(name)
     err = process.communicate()[1]
@@ -184,35 +272,43 @@ FAULTS = {
     "worker killed (SIGKILL)": kill_worker,
     "interrupt by the user (SIGINT)": interrupt,
     "disk full (a small tmpfs)": full_disk,
+    "read-only output": read_only,
     "damaged shard": damaged_shard,
     "damaged manifest": damaged_manifest,
     "damaged model": damaged_model,
     "two runs into one folder": two_runs,
+    "clock change": clock_change,
     "a node of a Ray cluster removed": lost_node,
 }
-FEW = ("disk full (a small tmpfs)", "damaged shard", "damaged manifest", "damaged model", "two runs into one folder")
-TRIES = {"a node of a Ray cluster removed": 2} | dict.fromkeys(FEW, 5)
+MOMENTS = ("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)", "interrupt by the user (SIGINT)")
+TRIES = {"a node of a Ray cluster removed": 2} | dict.fromkeys(MOMENTS, 20)  # of the others 5
 
 
 def main():
+    from faults_of_reproduce import FAULTS as OF_REPRODUCE
+    from faults_of_reproduce import ReproduceBench
+
+    benches = {"fleet": (Bench, FAULTS), "reproduce": (ReproduceBench, OF_REPRODUCE)}
     parser = argparse.ArgumentParser(description="Faults, tried for real.")
+    parser.add_argument("of", choices=benches, help="what is tried: large data sets, or the cache of the paper's reproduction")
     parser.add_argument("--tries", type=int, help="of each fault (default: 20, or 5 of those that no moment matters to, 2 of Ray's)")
-    parser.add_argument("--only", choices=FAULTS, action="append", help="this fault alone; may be repeated")
+    parser.add_argument("--only", choices=[*FAULTS, *OF_REPRODUCE], action="append", help="this fault alone; may be repeated")
     parser.add_argument("--seed", type=int, default=0, help="of the moments and places")
     parser.add_argument("--out", type=Path, required=True, help="the table, as JSON")
     options = parser.parse_args()
+    make, faults = benches[options.of]
     table = []
     with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(Path(folder))
-        for number, (fault, harm) in enumerate(FAULTS.items()):
+        bench = make(Path(folder))
+        for number, (fault, harm) in enumerate(faults.items()):
             if options.only and fault not in options.only:
                 continue
             rng, outcomes = np.random.default_rng([options.seed, number]), {}
-            tries = options.tries or TRIES.get(fault, 20)
+            tries = options.tries or TRIES.get(fault, 5)
             for attempt in range(tries):
                 outcome = harm(bench, f"try-{number}-{attempt}", rng)
                 outcomes[outcome] = outcomes.get(outcome, 0) + 1
-            table.append({"fault": fault, "tries": tries, "outcomes": outcomes})
+            table.append({"of": options.of, "fault": fault, "tries": tries, "outcomes": outcomes, "seed": options.seed})
             print(f"{fault:34} {tries:3}  " + "; ".join(f"{count} {outcome}" for outcome, count in outcomes.items()), flush=True)
             options.out.write_text(json.dumps(table, indent=2) + "\n")
     return int(any("NOT" in outcome for row in table for outcome in row["outcomes"]))

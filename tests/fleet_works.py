@@ -69,6 +69,15 @@ def threads_and_square(number):
     return number**2, os.getpid(), os.environ["TF_NUM_INTRAOP_THREADS"], "tensorflow" in sys.modules
 
 
+def threads_of(number):
+    """How many threads a process has: TensorFlow's, and those of linear algebra."""
+    import os
+
+    import threadpoolctl
+
+    return os.environ["TF_NUM_INTRAOP_THREADS"], {library["num_threads"] for library in threadpoolctl.threadpool_info()}
+
+
 def refuse(number):
     """Work that finds a user's mistake."""
     from enhsim_tf.errors import InputError

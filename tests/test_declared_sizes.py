@@ -84,7 +84,9 @@ def repeated(num_rows, word=None):
     """A small file of many equal rows, which Parquet writes as one and a count."""
     cells = pa.DictionaryArray.from_arrays(pa.array(np.zeros(num_rows, np.int32)), pa.array([1.5 if word is None else word]))
     sink = io.BytesIO()
-    pq.write_table(pa.table({"value": cells.cast(cells.type.value_type) if word is None else cells}), sink, compression="zstd", store_schema=False)
+    pq.write_table(
+        pa.table({"value": cells.cast(cells.type.value_type) if word is None else cells}), sink, compression="zstd", store_schema=False
+    )
     return sink.getvalue()
 
 
@@ -130,7 +132,7 @@ BOMBS = {
     "yaml": lambda path: path.write_text(
         "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(f"{b}: &{b} [{', '.join(9 * [f'*{a}'])}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
     ),
-    "manifest.json": lambda path: path.write_text('{"format": "enhsim_tf.fleet/1", "settings": {"windows": 1000000000, "shard": 1, "window": 1,'
+    "_manifest.json": lambda path: path.write_text('{"format": "enhsim_tf.fleet/1", "settings": {"windows": 1000000000, "shard": 1, "window": 1,'
                                                    ' "interval_s": 1.0, "models": []}, "shards": [' + "{}," * 300_000 + "{}]}"),
 }  # fmt: skip
 READS = """
@@ -152,7 +154,7 @@ except InputError as error:
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_refused_in_one_line_and_little_memory(tmp_path, name):
-    path = tmp_path / ("x." + name if name != "manifest.json" else name)
+    path = tmp_path / ("x." + name if name != "_manifest.json" else name)
     BOMBS[name](path)
     limit = 4 * 2**30  # of address space; what is taken of it is told
     ended = subprocess.run(

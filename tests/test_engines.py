@@ -8,9 +8,10 @@ import signal
 import sys
 
 import pytest
-from fleet_works import PlainMaker, die_at_thirteen, plan, refuse, threads_and_square
+from fleet_works import PlainMaker, die_at_thirteen, plan, refuse, threads_and_square, threads_of
 
-from enhsim_tf import engines
+from enhsim_tf import engines, ray_engine
+from enhsim_tf.local_engine import ProcessesDiedError
 
 with_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
 
@@ -20,6 +21,10 @@ def test_every_number_is_done_once_in_processes_of_one_thread():
     assert sorted(square for square, *_ in found) == [number**2 for number in range(20)]
     assert {(threads, tensorflow) for *_, threads, tensorflow in found} == {("1", False)}
     assert os.getpid() not in {process for _, process, *_ in found}
+
+
+def test_threads_are_set_before_the_work_imports_anything():
+    assert list(engines.run("local", threads_of, [1], 1, threads=2)) == [("2", {1})]
 
 
 def test_numbers_are_drawn_as_there_is_room():
@@ -46,7 +51,11 @@ def test_a_killed_process_is_replaced_and_nothing_is_lost_or_doubled(seed):
 
 def test_processes_that_die_without_end_are_given_up(refused):
     with refused("died in a row", "--workers"):
-        list(engines.run("local", die_at_thirteen, [13], 1))
+        try:
+            list(engines.run("local", die_at_thirteen, [13], 1))
+        except ProcessesDiedError as died:
+            assert died.items == (13,)
+            raise
 
 
 def test_a_mistake_found_by_the_work_comes_back_as_it_is(refused):
@@ -77,7 +86,7 @@ def test_without_ray_there_is_one_line(monkeypatch, refused):
 def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, refused):
     import ray
 
-    from enhsim_tf.engines import _cluster
+    from enhsim_tf.ray_engine import _cluster
 
     monkeypatch.setenv("PYTHONPATH", os.path.dirname(__file__))  # where the work is found by its name
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
@@ -89,6 +98,7 @@ def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, re
             if len(found) == 20:
                 os.kill(done[1], signal.SIGKILL)
         assert sorted(found) == [number**2 for number in range(60)]
+        assert list(engines.run("ray", threads_of, [1], 1, threads=2)) == [("2", {1})]
         with refused("another number"):
             list(engines.run("ray", refuse, range(5), 1))
         asked = plan(150, 50)
@@ -96,6 +106,23 @@ def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, re
         (tmp_path / "here").mkdir()
         assert sorted(records) == [PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)]
     assert not ray.is_initialized()
+
+
+@with_ray
+@pytest.mark.parametrize("error", [Exception("The current node\ntimed out"), RuntimeError("timed out"), OSError(28, "timed out")])
+def test_a_cluster_that_does_not_start_is_one_line(error, monkeypatch, refused):
+    import ray
+
+    def init(*arguments, **options):
+        raise error
+
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setattr(ray, "init", init)
+    with refused("that starts here", "timed out"), ray_engine._cluster():
+        pass
+    error = KeyError("a mistake of ours")
+    with pytest.raises(KeyError), ray_engine._cluster():
+        pass
 
 
 @with_ray

@@ -59,6 +59,16 @@ def table(**changed):
     return {key: np.array(value) for key, value in (found | changed).items()}
 
 
+def test_names_of_layers_do_not_tell_what_else_the_process_has_made():
+    from enhsim_tf.noise_gan import build_discriminator
+    from enhsim_tf.reproduce.figure_data import _names
+
+    found = [_names(build_discriminator(60, 8, seed=0).layers) for _ in range(2)]
+    assert found == [["conv1d", "global_max_pooling1d", "dense", "dense_1"]] * 2
+    layers = [type("Dense", (), {"name": name})() for name in ("Input", "Hidden_1", "dense_7", "Hidden_2", "dense_8")]
+    assert _names(layers) == ["Input", "Hidden_1", "dense", "Hidden_2", "dense_1"]
+
+
 def made_up(name):
     """Arrays of the shapes that `FIGURE_DATA[name]` makes, of random values."""
     guess = {"rows": rows(8, WINDOW), "is_generated": np.array([0, 1, 1, 0, 0, 1, 0, 1], bool)}

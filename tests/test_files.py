@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,99 @@ with replace_{kind}(sys.argv[1]) as temporary:
     ended = subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT)
     assert ended.returncode == -9
     assert inside.read_text() == "old"
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+@pytest.mark.parametrize("then", ["remove_leftovers", "replace_folder"])
+def test_killed_between_the_two_renames_the_old_content_comes_back(tmp_path, kind, then):
+    path = tmp_path / "model.v2"
+    if kind == "folder":
+        path.mkdir()
+    inside = path / "inside" if kind == "folder" else path
+    inside.write_text("old")
+    script = """
+import os, signal, sys
+from enhsim_tf import files
+rename = os.replace
+def killed(source, destination):
+    rename(source, destination)
+    if str(destination).endswith(".old"):
+        os.kill(os.getpid(), signal.SIGKILL)
+os.replace = killed
+with files.replace_folder(sys.argv[1]) as temporary:
+    (temporary / "inside").write_text("new")
+"""
+    assert subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT).returncode == -9
+    assert not path.exists() and len(list(tmp_path.iterdir())) == 2
+    if then == "remove_leftovers":
+        files.remove_leftovers(tmp_path)
+    else:
+        with pytest.raises(RuntimeError), files.replace_folder(path):
+            raise RuntimeError
+    assert inside.read_text() == "old" and [each.name for each in tmp_path.iterdir()] == ["model.v2"]
+
+
+def test_replace_folder_keeps_what_it_is_told_to(tmp_path):
+    path, asked = tmp_path / "stage", []
+
+    def keep(found):
+        asked.append((found / "inside").read_text())
+        return asked[-1] == "whole"
+
+    for text, expected in (("broken", "broken"), ("whole", "whole"), ("other", "whole")):
+        with files.replace_folder(path, keep) as temporary:
+            (temporary / "inside").write_text(text)
+        assert content_of(tmp_path) == {"stage/inside": expected}
+    assert asked == ["broken", "whole"] and [each.name for each in tmp_path.iterdir()] == ["stage"]
+
+
+def test_replace_folder_replaces_what_another_process_put_there_meanwhile(tmp_path, monkeypatch):
+    path, rename = tmp_path / "model", os.replace
+    path.mkdir()
+
+    def meanwhile(source, destination):
+        rename(source, destination)
+        if str(destination).endswith(".old") and not asked:
+            asked.append(destination)
+            path.mkdir()
+            (path / "inside").write_text("of another")
+
+    asked = []
+    monkeypatch.setattr(os, "replace", meanwhile)
+    with files.replace_folder(path) as temporary:
+        (temporary / "inside").write_text("new")
+    assert content_of(tmp_path) == {"model/inside": "new"} and [each.name for each in tmp_path.iterdir()] == ["model"]
+
+
+def test_replace_folder_takes_the_place_of_a_link_and_not_of_what_it_names(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "model").symlink_to("elsewhere")
+    with files.replace_folder(tmp_path / "model") as temporary:
+        (temporary / "inside").write_text("new")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["elsewhere", "model"] and content_of(tmp_path) == {"model/inside": "new"}
+
+
+def test_files_that_a_killed_process_left_are_removed(tmp_path):
+    script = "import os, signal, sys\nfrom enhsim_tf.files import replace_file\nwith replace_file(sys.argv[1]) as temporary:\n"
+    script += "    temporary.write_text('half')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+    for name in ("results.json", "without"):
+        subprocess.run([sys.executable, "-c", script, str(tmp_path / name)], cwd=ROOT)
+    assert len(list(tmp_path.iterdir())) == 2
+    files.remove_leftovers(tmp_path, "without")
+    assert [each.name.startswith(".results.json.") for each in tmp_path.iterdir()] == [True]
+    files.remove_leftovers(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("days", [-400, 400])
+def test_a_clock_that_is_wrong_takes_nothing_from_a_process_at_work(tmp_path, monkeypatch, days):
+    alive = left_by(os.getppid(), tmp_path)
+    other = left_by(dead_process(), tmp_path, "another-machine")
+    grow_old(alive, days)  # the clock was changed since
+    now = time.time()
+    monkeypatch.setattr(time, "time", lambda: now + days * 86_400)  # it is wrong here, and right where the files are kept
+    files.remove_leftovers(tmp_path)
+    assert alive.is_dir() and other.is_dir()
 
 
 def test_write_json_round_trip_and_refusal_of_what_json_has_no_word_for(tmp_path):

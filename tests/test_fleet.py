@@ -80,8 +80,8 @@ def told(call, *arguments, **options):
 
 
 def test_the_manifest_says_what_the_data_set_is(undisturbed):
-    manifest = json.loads((undisturbed / "manifest.json").read_text())
-    assert sorted(content_of(undisturbed)) == sorted([".lock", "manifest.json", *(file_of(shard) for shard in range(20))])
+    manifest = json.loads((undisturbed / "_manifest.json").read_text())
+    assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(file_of(shard) for shard in range(20))])
     assert manifest["format"] == "enhsim_tf.fleet/1" and manifest["settings"]["seed"] == 3 and manifest["settings"]["window"] == 60
     assert manifest["settings"]["models"] == [{"name": "model-0", "share": 1.0, "sha256": "0" * 64}]
     assert [shard["rows"] for shard in manifest["shards"]] == [50] * 20
@@ -129,10 +129,10 @@ def test_damaged_shards_are_found_and_made_again(name, undisturbed, tmp_path, he
 def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
     """A data set as a killed run leaves it."""
     shutil.copytree(undisturbed, folder)
-    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest = json.loads((folder / "_manifest.json").read_text())
     lines = [json.dumps([shard, 50, manifest["shards"][shard]["sha256"]]).encode() + b"\n" for shard in done]
-    (folder / "journal.jsonl").write_bytes(b"".join(lines) + tail)
-    (folder / "manifest.json").write_text(json.dumps(manifest | {"shards": None}))
+    (folder / "_journal.jsonl").write_bytes(b"".join(lines) + tail)
+    (folder / "_manifest.json").write_text(json.dumps(manifest | {"shards": None}))
     for shard in set(range(20)) - set(done):
         (folder / file_of(shard)).unlink()
     (folder / f".{file_of(9)}.host.123.0123abcd.parquet").write_bytes(b"half")
@@ -169,7 +169,7 @@ def test_a_journal_goes_on_behind_a_torn_line(undisturbed, tmp_path, monkeypatch
 
 def test_a_removed_manifest_is_made_again(undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
-    (folder / "manifest.json").unlink()
+    (folder / "_manifest.json").unlink()
     told(generate_fleet, folder, plan())
     assert len(here) == 20 and content_of(folder) == content_of(undisturbed)
 
@@ -180,9 +180,9 @@ def test_a_removed_manifest_is_made_again(undisturbed, tmp_path, here):
 )
 def test_a_damaged_manifest_is_one_line_that_says_what_to_do(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
-    (folder / "manifest.json").write_bytes(content)
+    (folder / "_manifest.json").write_bytes(content)
     for call in (lambda: generate_fleet(folder, plan()), lambda: verify(folder)):
-        with refused("manifest.json", "Remove it"):
+        with refused("_manifest.json", "Remove it"):
             call()
     assert not here
 
@@ -190,11 +190,11 @@ def test_a_damaged_manifest_is_one_line_that_says_what_to_do(content, undisturbe
 @pytest.mark.parametrize("seed", range(40))
 def test_a_manifest_damaged_anywhere_is_seen(seed, undisturbed, tmp_path, capsys):
     folder, rng = copy_of(undisturbed, tmp_path / "set"), np.random.default_rng(seed)
-    content = bytearray((folder / "manifest.json").read_bytes())
+    content = bytearray((folder / "_manifest.json").read_bytes())
     places = [place for place, byte in enumerate(content) if chr(byte).isalnum()]
     place = rng.choice(places)
     content[place] = ord("7") if content[place] != ord("7") else ord("3")
-    (folder / "manifest.json").write_bytes(content)
+    (folder / "_manifest.json").write_bytes(content)
     assert main(["verify", str(folder)]) == 2
     spoken = capsys.readouterr()
     assert spoken.out + spoken.err and "Traceback" not in spoken.err
@@ -202,9 +202,9 @@ def test_a_manifest_damaged_anywhere_is_seen(seed, undisturbed, tmp_path, capsys
 
 def test_a_record_that_does_not_come_true_is_not_passed_over(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
-    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest = json.loads((folder / "_manifest.json").read_text())
     manifest["shards"][4]["sha256"] = "0" * 64
-    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "_manifest.json").write_text(json.dumps(manifest))
     with refused(file_of(4), "computes otherwise"):
         generate_fleet(folder, plan())
 
@@ -249,7 +249,7 @@ def test_a_folder_of_something_else_is_left_as_it_is(name, tmp_path, here, refus
 
 def test_shards_of_another_data_set_are_not_written_over(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
-    (folder / "manifest.json").unlink()
+    (folder / "_manifest.json").unlink()
     with refused(file_of(0)):
         generate_fleet(folder, plan(seed=4))
 
@@ -262,7 +262,7 @@ def test_outputs_that_are_no_folder_are_refused(tmp_path, here, refused):
         generate_fleet(tmp_path / "set.parquet", plan())
 
 
-@pytest.mark.parametrize("extra", ["shard-000020.parquet", "journal.jsonl"])
+@pytest.mark.parametrize("extra", ["shard-000020.parquet", "_journal.jsonl"])
 def test_verify_names_what_does_not_belong(extra, undisturbed, tmp_path):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / extra).touch()
@@ -273,13 +273,13 @@ def test_verify_sees_what_checksums_vouch_for(undisturbed, tmp_path):
     import pyarrow.parquet as pq
 
     folder = copy_of(undisturbed, tmp_path / "set")
-    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest = json.loads((folder / "_manifest.json").read_text())
     pq.write_table(pq.read_table(folder / file_of(0)).slice(1), folder / file_of(0))
     pq.write_table(pq.read_table(folder / file_of(1)).drop(["onset"]), folder / file_of(1))
     (folder / file_of(2)).write_text("no table")
     for shard in range(3):
         manifest["shards"][shard]["sha256"] = sha256(folder / file_of(shard))
-    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "_manifest.json").write_text(json.dumps(manifest))
     lines = told(verify, folder)
     assert [line.split(":")[0] for line in lines] == [file_of(0), file_of(1), file_of(2)]
     assert "49 windows, 50 recorded" in lines[0] and "columns" in lines[1] and "no Parquet" in lines[2]
@@ -436,7 +436,7 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
     assert main([*options, "--channel", "volts", "--out", str(tmp_path / "one")]) == 0
     assert sorted(os.listdir(tmp_path / "both")) == ["amps", "volts"]
     assert content_of(tmp_path / "both" / "volts") == content_of(tmp_path / "one")
-    settings = json.loads((tmp_path / "one" / "manifest.json").read_text())["settings"]
+    settings = json.loads((tmp_path / "one" / "_manifest.json").read_text())["settings"]
     assert (settings["seed"], settings["nominal"], settings["models"][0]["name"]) == (4, 0.5, "volts")
 
 

@@ -26,6 +26,8 @@ FLOORS = {
     "shard_folder": 2,
     "shards": 2,
     "engines": 1,
+    "local_engine": 1,
+    "ray_engine": 1,
     "scenario_file": 2,
     "checked_yaml": 0,
     "channels": 2,
@@ -120,6 +122,8 @@ WITHOUT_TENSORFLOW = [
     "engines",
     "declared_sizes",
     "saved_network",
+    "local_engine",
+    "ray_engine",
 ]
 
 
@@ -331,6 +335,8 @@ def test_every_room_has_its_tests():
         "saved_network": "hostile_models",
         "sheet": "figures",
         "fleet_command": "fleet",
+        "local_engine": "engines",
+        "ray_engine": "engines",
         "fleet_plan": "shards",
         "shard_folder": "fleet",
         "checked_yaml": "scenario_file",

@@ -140,6 +140,64 @@ def test_what_a_killed_run_left_is_not_taken_for_a_stage(work):
     assert work.run() == (folder, False) and len(work.made) == 3
 
 
+DAMAGES = {
+    "a changed array": (lambda folder: flip(folder / "below" / "arrays.npz"), "below/arrays.npz is not as it was written"),
+    "a file cut short": (lambda folder: os.truncate(folder / "result.txt", 0), "result.txt is not as it was written"),
+    "a missing file": (lambda folder: (folder / "result.txt").unlink(), "result.txt is missing"),
+    "a file of something else": (lambda folder: (folder / "arrays.npz").touch(), "arrays.npz is not of it"),
+    "no stage.json": (lambda folder: (folder / "stage.json").unlink(), "stage.json is missing"),
+    "a changed time": (lambda folder: retime(folder / "stage.json"), "stage.json is not as it was written"),
+    "an older stage.json": (lambda folder: (folder / "stage.json").write_text('{"stage": "work", "seconds": 1}'), "stage.json is not"),
+    "another stage's": (lambda folder: (folder / "stage.json").write_text("[]"), "stage.json is not as it was written"),
+    "a file in its place": (lambda folder: (shutil.rmtree(folder), folder.write_text("x")), "stage.json is not as it was written"),
+}
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def retime(path):
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"seconds": content["seconds"] + 1}))
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_stage_is_told_and_done_again(tmp_path, rooms, damage):
+    def make(folder):
+        (folder / "result.txt").write_text("whole")
+        (folder / "below").mkdir()
+        save_arrays(folder / "below", {"x": np.arange(100)})
+
+    told = []
+    folder = Stages(tmp_path / "cache", tell=told.append).run("work", make, (), ())
+    before = stages._checksums(folder)
+    do, words = DAMAGES[damage]
+    do(folder)
+    for cached in (False, True):
+        del told[:]
+        done = Stages(tmp_path / "cache", tell=told.append)
+        assert done.run("work", make, (), ()) == folder and stages._checksums(folder) == before
+        assert done.cached == {"work": cached} and (words in told[0]) is (not cached) and len(told) == (1 if cached else 3)
+    assert [path.name for path in folder.parent.iterdir()] == [folder.name]
+
+
+def test_of_two_runs_at_once_the_first_keeps_its_place(work):
+    def make(folder):
+        (folder / "result.txt").write_text("x")
+        if not first:  # while this run is at it, another one ends
+            first.append(None)
+            other = Stages(work.cache, tell=lambda line: None).run("work", make, (), ())
+            first.append((other, os.stat(other).st_ino))
+
+    first = []
+    folder = Stages(work.cache, tell=lambda line: None).run("work", make, (), ())
+    assert first[1] == (folder, os.stat(folder).st_ino), "what another run may be reading was put away"
+    assert [path.name for path in work.cache.iterdir()] == [folder.name]
+
+
 def test_what_a_killed_run_left_is_cleared_away_by_the_next(work, monkeypatch):
     folder, _ = work.run()
     monkeypatch.setattr(os, "getpid", lambda: 2**22 + 1)  # above the largest number of a process
@@ -160,7 +218,8 @@ def test_times_and_lines_tell_what_was_done(work, monkeypatch):
         folder = done.run("work", work.make, (), ())
         assert done.seconds == {"work": 2.5}, "the time it took when it was done"
     assert [line.split() for line in told] == [["work", "..."], ["work", "2.5", "s"], ["work", "2.5", "s", "(from", "the", "cache)"]]
-    assert json.loads((folder / "stage.json").read_text()) == {"stage": "work", "seconds": 2.5}
+    written = json.loads((folder / "stage.json").read_text())
+    assert (written["stage"], written["seconds"], list(written["sha256"])) == ("work", 2.5, ["result.txt"])
 
 
 def test_arrays_come_back_as_they_went(tmp_path):

@@ -245,9 +245,10 @@ def out_folder(options: argparse.Namespace) -> Path:
 
 def make_folders(options: argparse.Namespace) -> Path:
     """Makes the folders that the options name, before anything slow is imported; returns the one that figures go to."""
-    from enhsim_tf.files import make_folder
+    from enhsim_tf.files import make_folder, remove_leftovers
 
     out = make_folder(out_folder(options))
+    remove_leftovers(out)
     if options.cache is not None:
         make_folder(options.cache)
     return out

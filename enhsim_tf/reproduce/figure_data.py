@@ -5,7 +5,9 @@ arrays, so that `numpy.savez` keeps them without pickle. It asks only for what i
 trains no network.
 """
 
-from collections.abc import Callable
+import collections
+import re
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -214,7 +216,7 @@ def _seed(rng: np.random.Generator) -> int:
 def _layers(model) -> Arrays:
     """A Keras model as a table: one row a layer."""
     rows = {
-        "layer": [layer.name for layer in model.layers],
+        "layer": _names(model.layers),
         "type": [type(layer).__name__ for layer in model.layers],
         "detail": [_detail(layer) for layer in model.layers],
         "output_shape": [str(tuple(layer.output.shape)) for layer in model.layers],
@@ -224,6 +226,19 @@ def _layers(model) -> Arrays:
         "trainable": sum(int(np.prod(weight.shape)) for weight in model.trainable_weights),
     }
     return {key: np.array(values) for key, values in rows.items()}
+
+
+def _names(layers: Sequence) -> list[str]:
+    """Names of layers. Those that Keras makes up count what the process has made, so tell what came from the cache; here the network's."""
+    names, made_up = [], collections.Counter()
+    for layer in layers:
+        root = re.sub(r"_\d+$", "", layer.name)
+        if root.replace("_", "") == type(layer).__name__.lower():
+            names.append(f"{root}_{made_up[root]}" if made_up[root] else root)
+            made_up[root] += 1
+        else:
+            names.append(layer.name)
+    return names
 
 
 _MEANING = {

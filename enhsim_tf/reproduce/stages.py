@@ -3,6 +3,7 @@
 A stage is a function that fills a folder. The folder appears whole, under a name that holds the hash of the stage's
 settings, of its code with all rooms below it, of the stages before it, and of the versions it ran on. A killed run
 therefore leaves only whole stages, and the next one goes on behind the last of them and clears away what was half done.
+The checksums of its files stand in `stage.json`: a stage that was damaged since is told and done again.
 """
 
 import ast
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.files import make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.files import make_folder, remove_leftovers, replace_file, replace_folder, sha256, write_json
 
 _PACKAGE = Path(__file__).parents[1]
 VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
@@ -64,17 +65,54 @@ class Stages:
         depends = [name, repr(settings), _code(rooms), inspect.getsource(make), VERSIONS, [self._keys[before] for before in after]]
         key = self._keys[name] = hashlib.sha256(json.dumps(depends).encode()).hexdigest()[:16]
         folder = self.cache / f"{name}-{key}"
-        done = folder / "stage.json"
-        self.cached[name] = done.exists() and not self.fresh
-        if not self.cached[name]:
+        done, damage = (None, None) if self.fresh or not os.path.lexists(folder) else _read(folder, name)
+        if damage is not None:
+            self.tell(f"{name:12} damaged in the cache: {damage}; it is done again")
+        self.cached[name] = done is not None
+        if done is None:
             self.tell(f"{name:12} ...")
             began = time.perf_counter()
-            with replace_folder(folder) as temporary:
+            # of two runs at once the first to end keeps its place, so that nothing goes away that a run reads
+            with replace_folder(folder, None if self.fresh else lambda path: _read(path, name)[1] is None) as temporary:
                 make(temporary)
-                write_json(temporary / "stage.json", {"stage": name, "seconds": time.perf_counter() - began})
-        self.seconds[name] = json.loads(done.read_text(encoding="utf-8"))["seconds"]
+                done = {"stage": name, "seconds": time.perf_counter() - began, "sha256": _checksums(temporary)}
+                write_json(temporary / "stage.json", done | {"checksum": _checksum(done)})
+        self.seconds[name] = done["seconds"]
         self.tell(f"{name:12} {self.seconds[name]:7.1f} s{'  (from the cache)' if self.cached[name] else ''}")
         return folder
+
+
+def _read(folder: Path, name: str) -> tuple[dict[str, Any] | None, str | None]:
+    """What was written of a stage in its `stage.json`; or what is wrong with the stage."""
+    try:
+        done = json.loads((folder / "stage.json").read_text(encoding="utf-8"))
+        checksum = done.pop("checksum")
+        if checksum != _checksum(done) or done["stage"] != name:
+            raise ValueError
+        expected = done["sha256"]
+    except FileNotFoundError:
+        return None, "stage.json is missing"
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None, "stage.json is not as it was written"
+    try:
+        found = _checksums(folder)
+    except OSError as error:
+        return None, f"{Path(error.filename or folder).name} cannot be read"
+    for file in sorted(expected.keys() | found.keys()):
+        if expected.get(file) != found.get(file):
+            wrong = "is missing" if file not in found else "is not of it" if file not in expected else "is not as it was written"
+            return None, f"{file} {wrong}"
+    return done, None
+
+
+def _checksum(done: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(done, sort_keys=True).encode()).hexdigest()
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    """The checksum of each file of a stage but `stage.json`; hidden ones are the system's."""
+    paths = [path for path in sorted(folder.rglob("[!.]*")) if path.is_file() and path != folder / "stage.json"]
+    return {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
 
 
 def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -> None:
@@ -85,7 +123,8 @@ def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -
         arrays: Arrays and numbers by name.
         name: Name of the file, without its `.npz`.
     """
-    np.savez_compressed(folder / f"{name}.npz", **{key: np.asarray(value) for key, value in arrays.items()})
+    with replace_file(folder / f"{name}.npz") as temporary:
+        np.savez_compressed(temporary, **{key: np.asarray(value) for key, value in arrays.items()})
 
 
 def load_arrays(folder: Path, name: str = "arrays") -> dict[str, np.ndarray]:

@@ -16,9 +16,9 @@ import numpy as np
 
 from enhsim_tf.channels import models_of, refuse_foreign
 from enhsim_tf.fleet import verify
-from enhsim_tf.fleet_plan import Model, Plan, plan_of
+from enhsim_tf.fleet_plan import FORMAT, Model, Plan, plan_of
 from enhsim_tf.scenario_file import Mix, ScenarioShare
-from enhsim_tf.shard_folder import check_folder, read_manifest, read_records
+from enhsim_tf.shard_folder import JOURNAL, MANIFEST, check_folder, read_manifest, read_records
 from enhsim_tf.shards import file_of
 from tests.fuzzing.target import Target, all_of, json_of
 
@@ -148,8 +148,8 @@ def data_set() -> dict[str, bytes]:
         shards = [{"file": file_of(each.shard), "rows": each.rows, "sha256": each.sha256} for each in records]
         files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
         os.environ.update(before)
-    manifest = {"format": "enhsim_tf.fleet/1", "settings": _PLAN.settings(), "shards": shards}
-    return files | {"manifest.json": json.dumps(manifest).encode()}
+    manifest = {"format": FORMAT, "settings": _PLAN.settings(), "shards": shards}
+    return files | {MANIFEST: json.dumps(manifest).encode()}
 
 
 def write_data_set(folder: Path, **changed: bytes) -> Path:
@@ -157,9 +157,10 @@ def write_data_set(folder: Path, **changed: bytes) -> Path:
 
     Args:
         folder: Where to.
-        **changed: Contents by the names of files, with `_` for the point and `shard` for the first shard.
+        **changed: Contents of `manifest`, `journal` and `shard`, which is the first.
     """
-    files = data_set() | {name.replace("shard", "shard-000000").replace("_", "."): content for name, content in changed.items()}
+    names = {"manifest": MANIFEST, "journal": JOURNAL, "shard": file_of(0)}
+    files = data_set() | {names[name]: content for name, content in changed.items()}
     folder.mkdir(parents=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
@@ -178,30 +179,30 @@ def _look_at(folder: Path) -> None:
 
 
 def _data_set_manifest(data: bytes, folder: Path) -> None:
-    _look_at(write_data_set(folder / "set", manifest_json=data))
+    _look_at(write_data_set(folder / "set", manifest=data))
 
 
 def _journal(data: bytes, folder: Path) -> None:
-    unfinished = json.loads(data_set()["manifest.json"]) | {"shards": None}
-    _look_at(write_data_set(folder / "set", manifest_json=json.dumps(unfinished).encode(), journal_jsonl=data))
+    unfinished = json.loads(data_set()[MANIFEST]) | {"shards": None}
+    _look_at(write_data_set(folder / "set", manifest=json.dumps(unfinished).encode(), journal=data))
 
 
 def _journal_seeds() -> list[bytes]:
-    shards = json.loads(data_set()["manifest.json"])["shards"]
+    shards = json.loads(data_set()[MANIFEST])["shards"]
     lines = [json.dumps([number, each["rows"], each["sha256"]]) for number, each in enumerate(shards)]
     return ["\n".join(lines).encode(), f"{lines[0]}\n{lines[1][:20]}".encode()]
 
 
 def _shard(data: bytes, folder: Path) -> None:
-    manifest = json.loads(data_set()["manifest.json"])
+    manifest = json.loads(data_set()[MANIFEST])
     manifest["shards"][0]["sha256"] = hashlib.sha256(data).hexdigest()
-    _look_at(write_data_set(folder / "set", manifest_json=json.dumps(manifest).encode(), shard_parquet=data))
-    (folder / "set" / "manifest.json").unlink()
+    _look_at(write_data_set(folder / "set", manifest=json.dumps(manifest).encode(), shard=data))
+    (folder / "set" / MANIFEST).unlink()
     check_folder(folder / "set", _PLAN)
 
 
 def _shard_seeds() -> list[bytes]:
-    return [data_set()["shard-000000.parquet"]]
+    return [data_set()[file_of(0)]]
 
 
 TARGETS = {
@@ -211,7 +212,7 @@ TARGETS = {
     "archive of a network": Target(_archive, lambda: [saved_model()["enhancer.keras"]], "bytes", 0.2),
     "weights of a network": Target(_weights, lambda: [member_of("enhancer", "model.weights.h5")], "bytes", 0.1),
     "model that is planned with": Target(_planned, _planned_seeds, "json", 4),
-    "manifest of a data set": Target(_data_set_manifest, lambda: [data_set()["manifest.json"]], "json", 4),
+    "manifest of a data set": Target(_data_set_manifest, lambda: [data_set()[MANIFEST]], "json", 4),
     "journal of a data set": Target(_journal, _journal_seeds, "text", 4),
     "shard of a data set": Target(_shard, _shard_seeds, "bytes", 3),
 }
