@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 THREADS = 2  # for each channel: how sums are rounded depends on their number, so that must not depend on the workers
-_MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,15 +52,9 @@ def folder_of(models: str | os.PathLike, channel: str) -> Path:
     """The folder of a channel: its name, encoded.
 
     Raises:
-        InputError: If the name is empty, or too long for a file.
+        InputError: If no file can have the name.
     """
-    name = encoded(channel)
-    if not 1 <= len(name) <= _MOST_LETTERS:
-        raise InputError(
-            f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
-            f"Received: {printable(channel)[:60]!r} with {len(name)}. Rename it, or name the other channels."
-        )
-    return Path(models) / name
+    return Path(models) / encoded(channel)
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:

@@ -22,6 +22,8 @@ from typing import Any
 from enhsim_tf.errors import InputError
 
 _LEFT = re.compile(r"\.(?P<name>.*?)\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}(?P<suffix>\.\w+|)")
+_MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
+_KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
 _OLD_S = 24 * 3600  # no process writes nothing for so long
 
 
@@ -35,8 +37,26 @@ def _host() -> str:
 
 
 def encoded(name: str) -> str:
-    """A name as a file name: percent-encoded with its dots, so that none can leave its folder or hide in it."""
-    return urllib.parse.quote(name, safe=" ").replace(".", "%2E")
+    """A name, such as a channel's, as that of a file or folder; `urllib.parse.unquote` turns it back.
+
+    It is percent-encoded: no name can leave a folder, hide in it, or be one that a system keeps for itself.
+
+    Raises:
+        InputError: If the name is empty, too long for a file, or no Unicode.
+    """
+    try:
+        found = urllib.parse.quote(name, safe=" ").replace(".", "%2E")
+    except UnicodeEncodeError:
+        raise InputError(f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it.") from None
+    found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # which Windows takes away
+    if _KEPT.fullmatch(found):
+        found = f"%{ord(found[0]):02X}{found[1:]}"
+    if not 1 <= len(found) <= _MOST_LETTERS:
+        raise InputError(
+            f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
+            f"Received: {name[:60]!r} with {len(found)}. Rename it, or name the other channels."
+        )
+    return found
 
 
 def make_folder(path: str | os.PathLike) -> Path:

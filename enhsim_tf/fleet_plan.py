@@ -8,14 +8,14 @@ import hashlib
 import importlib.metadata
 import json
 import os
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import sha256
-from enhsim_tf.saved_simulator import MANIFEST, MOST_SETTINGS, check_saved, settings_of
+from enhsim_tf.saved_network import read_description
+from enhsim_tf.saved_simulator import MANIFEST, check_saved, settings_of
 from enhsim_tf.scenario_file import MOST_MODELS, MOST_WINDOWS, Mix, ModelShare
 
 FORMAT = "enhsim_tf.fleet/1"
@@ -158,13 +158,10 @@ def _model_of(share: ModelShare, folder: Path) -> Model:
 def _window_of(folder: Path) -> int:
     """Samples of a window: the width of the enhancer's input, as its file describes it."""
     try:
-        with zipfile.ZipFile(folder / "enhancer.keras") as archive:
-            if archive.getinfo("config.json").file_size > MOST_SETTINGS:
-                raise ValueError("a description too large")
-            network = json.loads(archive.read("config.json"))
+        network = read_description(folder / "enhancer.keras")
         window = network["config"]["layers"][0]["config"]["batch_shape"][1]
         if type(window) is not int or not 2 <= window <= MOST_VALUES:
             raise ValueError(f"windows of {window!r} samples")
-    except (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError, NotImplementedError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"Expected an enhancer whose input has one width. Received: {folder} ({' '.join(str(error).split())}).") from None
     return window

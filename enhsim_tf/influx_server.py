@@ -236,13 +236,26 @@ def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         block, left = block[:cut], block[cut:]
         if left and not data:
             raise ConnectionError("the answer ends within a line")
-        if kind is None and block.strip():
-            head, kind, block = _head(block)
-        if b",error,reference" in block:  # a table of its own, behind the points that were found before
-            said = " ".join(block.split(b"reference", 1)[-1].decode(errors="replace").split()).strip(" ,")
-            raise InputError(f"Expected the points of a series. Received: an error of InfluxDB behind some: {said[:300]}.")
-        if block.strip():
-            yield _parse(block, head, kind)
+        if kind is None and block.strip() and (block.count(b"\n") < 2 and data):  # not all of the head yet
+            left = block + left
+            continue
+        try:
+            if kind is None and block.strip():
+                head, kind, block = _head(block)
+            if block.startswith(b"#") or b"\n#" in block:  # a table of its own, behind the points that were found before
+                said = (block + left + answer.read(_BLOCK)).split(b"reference", 1)[-1]
+                said = " ".join(said.decode(errors="replace").split()).strip(" ,")
+                raise InputError(f"Expected the points of a series. Received: an error of InfluxDB behind some: {said[:300]}.")
+            found = _parse(block, head, kind) if block.strip() else None
+        except InputError:
+            raise
+        except (ValueError, KeyError, TypeError) as error:  # Arrow's errors among them
+            reason = " ".join(str(error).split())[:120]
+            raise InputError(
+                f"Expected points as InfluxDB writes them. Received: another answer ({reason}). See the server's log."
+            ) from None
+        if found is not None:
+            yield found
         if not data:
             return
 

@@ -67,6 +67,8 @@ def parse_location(text: str) -> InfluxLocation:
 
     if not isinstance(text, str) or not text.startswith(SCHEME):
         refuse(f"which does not begin with {SCHEME}")
+    if any("\ud800" <= letter <= "\udfff" for letter in text):
+        refuse("which is not UTF-8")
     path, _, query = text.removeprefix(SCHEME).partition("?")
     parts = [decode(part) for part in path.split("/")]
     for number, what in enumerate(("bucket", "measurement", "field")):
@@ -140,20 +142,21 @@ class InfluxStore:
             InputError: If there is none, or if samples are missing from it, or if the server cannot be asked.
         """
         about = self._about(name)
-        telemetry = Telemetry(np.empty(about["num_samples"], np.float32), **{key: about[key] for key in _DESCRIBED})
-        expected, found = nanoseconds(telemetry), 0
+        described = Telemetry(np.empty(0, np.float32), **{key: about[key] for key in _DESCRIBED})
+        found, pieces, num_samples = 0, [described.values], about["num_samples"]
         for times, values in self.server.stream(self._of_series(name, about), FIRST_NS, LAST_NS):
-            as_expected = expected[found : found + len(times)]
+            as_expected = nanoseconds(described, found, min(found + len(times), num_samples))
             agree = np.append(times[: len(as_expected)] == as_expected, False).argmin()  # how many at the beginning
-            telemetry.values[found : found + agree] = values[:agree]
+            with np.errstate(over="ignore"):  # those of others may be beyond float32
+                pieces.append(values[:agree].astype(np.float32))
             found += agree
             if agree < len(times):
                 break
-        if found < len(expected):
+        if found < num_samples:
             raise InputError(
-                f"Expected {len(expected):,} samples of {name!r}. Received: a gap before sample {found}. Write the series again."
+                f"Expected {num_samples:,} samples of {name!r}. Received: a gap before sample {found}. Write the series again."
             )
-        return telemetry
+        return dataclasses.replace(described, values=np.concatenate(pieces))
 
     def names(self) -> list[str]:
         """The names of the series kept here, sorted."""
@@ -230,7 +233,7 @@ class InfluxStore:
         which = f'r.key == "{self._hash(*names)}"' if names else f'r.store == "{self._hash()}"'
         steps = f'|> filter(fn: (r) => r._measurement == "{_ABOUT}" and r._field == "about" and {which}) |> keep(columns: ["_value"])'
         rows = self.server.ask(f"{self.server.points(_ABOUT_NS, _ABOUT_NS + 1)} {steps}")
-        return {about["name"]: about for about in (json.loads(row["_value"]) for row in rows)}
+        return {about["name"]: about for about in (_description(row.get("_value")) for row in rows)}
 
     def _about(self, name: str) -> dict[str, Any]:
         about = self._abouts(name).get(name)
@@ -288,6 +291,24 @@ def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
     if (np.diff(times) <= 0).any():
         raise InputError(f"Expected samples at least a nanosecond apart. Received: interval_s={telemetry.interval_s!r}. Check the unit.")
     return times, values
+
+
+def _description(text: Any) -> dict[str, Any]:
+    """What `write` said of a series.
+
+    Raises:
+        InputError: If it is something else: somebody else can write there too.
+    """
+    try:
+        about = json.loads(text)
+        is_good = all(isinstance(about[key], str) for key in ("name", "unit", _VERSION)) and isinstance(about["start"], str | None)
+        is_good = is_good and all(type(about[key]) is float and np.isfinite(about[key]) for key in ("interval_s", "offset_s"))
+        is_good = is_good and type(about["num_samples"]) is int and 1 <= about["num_samples"] < 2**53
+    except (ValueError, TypeError, KeyError, RecursionError):
+        is_good = False
+    if not is_good:
+        raise InputError(f"Expected descriptions of series as they were written. Received: {str(text)[:80]!r}. Write the series again.")
+    return about
 
 
 def _tags_of(row: Mapping[str, Any]) -> dict[str, str]:

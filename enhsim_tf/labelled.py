@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.declared_sizes import whole_array
 from enhsim_tf.errors import InputError
 from enhsim_tf.telemetry import Telemetry
 
@@ -202,11 +203,9 @@ def _load(folder: Path, labels: Labels) -> LabelledChannel:
 def _read(folder: Path, channel: str) -> tuple[Telemetry, np.ndarray]:
     path = folder / f"{channel}.npy"
     try:
-        array = np.load(path, allow_pickle=False)
-        array = array if isinstance(array, np.ndarray) else np.zeros(())
-    except (OSError, ValueError, EOFError, SyntaxError) as error:
-        reason = getattr(error, "strerror", None) or (str(error).splitlines() or ["damaged"])[0]
-        raise InputError(f"Expected the array {folder.name}/{path.name}. Received: {reason} in {folder}. Complete the data set.") from None
+        array = whole_array(path)
+    except ValueError as error:
+        raise InputError(f"Expected the array {folder.name}/{path.name}. Received: {error} in {folder}. Complete the data set.") from None
     if array.ndim == 1:
         array = array[:, None]
     if array.ndim != 2 or array.dtype.kind not in "fiu" or 0 in array.shape:

@@ -5,16 +5,17 @@ simulator itself is right.
 """
 
 import os
-import zipfile
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from enhsim_tf.declared_sizes import whole_arrays
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
 
 _CHUNK = 2_048  # windows scored at a time
 _MOST_REMEMBERED = 10_000  # training windows whose coordinates are kept
+_MOST_BYTES = 2**28  # of a saved score; they are a thousand times smaller
 _FITTED = ("mean", "unit", "components", "coordinates")
 
 
@@ -120,11 +121,12 @@ class OutOfRange:
             InputError: If `save` did not write the file.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
-                loaded = cls(float(file["explained"]), float(file["weight"]))
-                for name in _FITTED:
-                    setattr(loaded, f"_{name}", file[name])
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, InputError) as error:
+            kept = whole_arrays(path, _MOST_BYTES)
+            loaded = cls(float(kept["explained"]), float(kept["weight"]))
+            for name in _FITTED:
+                setattr(loaded, f"_{name}", kept[name])
+            loaded._score(np.zeros((1, len(loaded._mean))))  # whether they fit together
+        except (ValueError, KeyError, TypeError, IndexError) as error:
             raise InputError(f"Expected a file written by OutOfRange.save. Received: {path} ({type(error).__name__}).") from None
         return loaded
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from enhsim_tf.errors import printable
+
 KINDS = {
     "header lines": ("accepted", "lines that begin with # above the header are skipped"),
     "encoding": ("accepted", "text that is not UTF-8"),
@@ -131,7 +133,8 @@ class Report:
         parts = "1 part" if self.num_parts == 1 else f"{self.num_parts} parts"
         filled = f", {self.samples_filled:,} of them filled in" if self.samples_filled else ""
         head = f"{self.channel}: {self.rows_in:,} rows, {self.rows_used:,} used, {self.rows_left_out:,} left out; "
-        return [f"{head}{self.samples:,} samples in {parts}{filled}", *(finding.line() for finding in self.findings)]
+        lines = [f"{head}{self.samples:,} samples in {parts}{filled}", *(finding.line() for finding in self.findings)]
+        return [printable(line) for line in lines]  # names of channels and columns may hold anything
 
     def to_dict(self) -> dict[str, Any]:
         """The report in plain JSON types."""

@@ -1,17 +1,17 @@
 """A trained simulator at rest: a folder of three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
 
-It knows files and checksums, and what Keras' safe mode refuses; not what the networks are for.
+It knows files and checksums, and that Keras opens them in safe mode; not what the networks are for.
 """
 
-import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enhsim_tf.declared_sizes import DAMAGES, read_json
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_folder, sha256, write_json
+from enhsim_tf.saved_network import check_network
 
 if TYPE_CHECKING:
     import keras
@@ -88,12 +88,10 @@ def settings_of(folder: str | os.PathLike) -> dict[str, Any]:
 
 def _json_of(folder: Path, name: str) -> dict[str, Any]:
     try:
-        if (folder / name).stat().st_size > MOST_SETTINGS:
-            raise ValueError("a file too large")
-        content = json.loads((folder / name).read_text(encoding="utf-8"))
+        content = read_json(folder / name, MOST_SETTINGS)
         if not isinstance(content, dict):
             raise ValueError("no object")
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         raise InputError(
             f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
         ) from None
@@ -114,13 +112,16 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
         InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
     """
     import keras  # here: what only looks at a folder should not wait for it
+    import tensorflow as tf
 
     folder = Path(folder)
     check_saved(folder)
     settings = settings_of(folder)
     try:
+        for name in _NETWORKS:
+            check_network(folder / f"{name}.keras")
         networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
         return make(networks, settings)
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+    except (*DAMAGES, tf.errors.OpError) as error:
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.cleaning import Cleaning, clean
+from enhsim_tf.declared_sizes import MOST_COLUMNS
 from enhsim_tf.errors import InputError
 from enhsim_tf.repairs import Finding
 from enhsim_tf.stamps import stamps_of
@@ -113,6 +114,8 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None, options
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     array = load_array(path)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
+    if columns is None and array.shape[1] > MOST_COLUMNS:
+        raise InputError(f"Expected at most {MOST_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
     known = [str(number) for number in range(array.shape[1])]
     for column in columns or ():
         if column not in known:

@@ -4,6 +4,7 @@ A cell that says nothing is missing; one that cannot be understood is refused by
 """
 
 import datetime
+import re
 from typing import Any
 
 import numpy as np
@@ -76,8 +77,12 @@ def stamps_of(
 
 def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> None:
     row = int(np.argmax(bad))
+    try:
+        received = shown(cells.iloc[row])
+    except (NotImplementedError, OverflowError, ValueError):  # a time so far off that its zone cannot tell it
+        received = "a time that is far off"
     raise InputError(
-        f"Expected times as ISO 8601 date-times or seconds. Received: {shown(cells.iloc[row])} at row {row} of {what}, and "
+        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at row {row} of {what}, and "
         f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop'."
     )
 
@@ -151,7 +156,10 @@ def _stamps_of_text(
     leap[of_text] = words.str.contains(r":\d\d:60")
     zoned[of_text] = words.str.contains(r"(?:Z|[+-]\d\d:?\d\d)$")
     text[of_text] = words.str.replace(r"(:\d\d):60", r"\1:59", regex=True)
-    stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
+    try:
+        stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # a format that is none
+        raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
     bad = (stamps.isna() & ~missing).to_numpy(bool)
     if bad.any() and not drop:
         _refuse_time(cells, bad, what, f"Give time_format (such as {'%d.%m.%y %H:%M:%S'!r}) or name another time column")

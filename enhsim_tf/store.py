@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from enhsim_tf.declared_sizes import check_parquet, reason_of
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import encoded, make_folder, replace_file, replace_folder
 from enhsim_tf.telemetry import Telemetry, nanoseconds
@@ -74,6 +75,7 @@ class ParquetStore:
 
         if not telemetry.name or not len(telemetry):
             raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
+        channel = self._channel(telemetry.name)
         make_folder(self.folder)
         times = nanoseconds(telemetry)
         described = {
@@ -87,7 +89,7 @@ class ParquetStore:
         table = table.replace_schema_metadata(described)
         days = times // _DAY_NS
         edges = np.flatnonzero(np.diff(days, prepend=days[0] - 1))
-        with replace_folder(self._channel(telemetry.name)) as folder:
+        with replace_folder(channel) as folder:
             for first, stop in zip(edges, [*edges[1:], len(days)], strict=True):
                 file = folder / f"{np.datetime64(int(days[first]), 'D')}.parquet"
                 pq.write_table(table.slice(first, stop - first), file, compression="zstd")
@@ -105,18 +107,25 @@ class ParquetStore:
         if not files:
             raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
         try:
+            for file in files:
+                check_parquet(file)
             table = pa.concat_tables([pq.read_table(file) for file in files])
             about = {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
+            name, unit, start = about["name"], about["unit"], about["start"]
             interval_s, offset_s = float(about["interval_s"]), float(about["offset_s"])
+            if not (len(table) and 0 < interval_s < np.inf and np.isfinite(offset_s)):
+                raise ValueError("an offset or an interval that no series has")
             values = table["value"].to_numpy().astype(np.float32)
             times = table["time"].cast(pa.int64()).to_numpy()
         except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
             raise InputError(
-                f"Expected Parquet files of this store in {files[0].parent}. Received: {str(error).splitlines()[0]}. Write the series again."
+                f"Expected Parquet files of this store in {files[0].parent}. Received: {reason_of(error)}. Write the series again."
             ) from None
         if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 1e-3 * interval_s * 1e9:
             raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
-        return Telemetry(values, interval_s, offset_s, about["start"] or None, about["name"], about["unit"])
+        telemetry = Telemetry(values, interval_s, offset_s, start or None, name, unit)
+        nanoseconds(telemetry)  # refuses a start that is none
+        return telemetry
 
     def names(self) -> list[str]:
         """The names of the series kept here, sorted."""

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
+from enhsim_tf.declared_sizes import DAMAGES, MOST_COLUMNS, check_parquet, reason_of
 from enhsim_tf.errors import InputError
 from enhsim_tf.parsing import is_missing, is_text, numbers_of
 from enhsim_tf.repairs import Finding
@@ -33,13 +35,14 @@ def read_table(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
     findings: list[Finding] = []
     try:
         if path.suffix.lower() == ".parquet":
+            check_parquet(path)
             table = pd.read_parquet(path)
         else:
             table, findings = _read_text(path)
     except InputError:
         raise
-    except (ValueError, OSError, MemoryError, pd.errors.ParserWarning, NotImplementedError) as error:  # parsers' and Arrow's errors
-        reason = (str(error).splitlines() or ["no reason given"])[0]
+    except (*DAMAGES, pd.errors.ParserWarning, pa.ArrowException) as error:
+        reason = reason_of(error)
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
     if not isinstance(table.index, pd.RangeIndex) and (any(table.index.names) or _holds_dates(table.index.to_series())):
         table = table.reset_index()  # what it is indexed by is a column like the others
@@ -71,6 +74,8 @@ def _read_text(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
     if any(line.strip() for line in lines[:comments]):
         findings.append(Finding("header lines", comments, f"lines before the header, skipped: {comments:,}"))
     separator = _separator(lines[comments : comments + 3])
+    if lines[comments].count(separator) >= MOST_COLUMNS:
+        raise ValueError(f"more than {MOST_COLUMNS:,} columns")
     options = {"sep": separator, "skiprows": comments, "index_col": False, "skip_blank_lines": False, "low_memory": False}
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # lines longer than the header would lose their ends

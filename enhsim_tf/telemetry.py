@@ -6,12 +6,12 @@ that its caller does not own, and it never interprets values: a series is what i
 
 import dataclasses
 import os
-import tokenize
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.declared_sizes import DAMAGES, check_parquet, reason_of, whole_array
 from enhsim_tf.errors import InputError
 
 _MOST_S = 9_223_372_036  # seconds before and after 1970 that nanoseconds in 64 bits reach
@@ -60,11 +60,13 @@ class Telemetry:
         return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
 
 
-def nanoseconds(telemetry: Telemetry) -> np.ndarray:
+def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -> np.ndarray:
     """When each sample was taken.
 
     Args:
-        telemetry: The series.
+        telemetry: The series, or one of another length on its clock.
+        first: The first sample that is asked for.
+        stop: The one behind the last; None: behind the series' last.
 
     Returns:
         Nanoseconds since 1970 (UTC), int64 array of shape `(samples,)`; since the clock's zero where the source has no time.
@@ -78,8 +80,9 @@ def nanoseconds(telemetry: Telemetry) -> np.ndarray:
         text = telemetry.start or "1970-01-01"
         start = pd.Timestamp(text if text[0].isdigit() else None)  # "now" is no start
         start = start.tz_localize("UTC") if start.tz is None else start.tz_convert("UTC")
-        start_s, since_s = start.timestamp(), telemetry.time_s
-    except (ValueError, TypeError, AttributeError):
+        samples = np.arange(first, len(telemetry) if stop is None else stop)
+        start_s, since_s = start.timestamp(), telemetry.offset_s + telemetry.interval_s * samples
+    except (ValueError, TypeError, AttributeError, OverflowError):
         raise InputError(f"Expected start as an ISO 8601 time. Received: {telemetry.start!r}. Correct it.") from None
     if not max(abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < _MOST_S:
         raise InputError(
@@ -99,14 +102,13 @@ def load_array(path: str | os.PathLike) -> np.ndarray:
     """
     path = Path(path)
     try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:  # what damaged headers raise
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        array = whole_array(path)
+    except ValueError as error:
         raise InputError(
-            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({reason}). Save it again."
+            f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
         ) from None
-    if not isinstance(array, np.ndarray) or array.ndim not in (1, 2) or array.dtype.names:
-        shape = "fields" if isinstance(array, np.ndarray) and array.dtype.names else getattr(array, "shape", "an archive")
+    if array.ndim not in (1, 2) or array.dtype.names:
+        shape = "fields" if array.dtype.names else array.shape
         raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
     return array
 
@@ -226,10 +228,11 @@ def _read_table(path: Path, column: str | None, time: str | None):
             header = pd.read_csv(path, header=None, nrows=1, dtype=str, keep_default_na=False)  # before pandas makes names differ
             table, names = pd.read_csv(path), header.iloc[0].tolist()
         else:
+            check_parquet(path)
             table = pd.read_parquet(path)
             names = table.columns.tolist()
-    except (ValueError, OSError) as error:  # pandas' and Arrow's parser errors are ValueErrors
-        reason = (str(error).splitlines() or ["no reason given"])[0]
+    except DAMAGES as error:  # pandas' and Arrow's parser errors are ValueErrors
+        reason = reason_of(error)
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
     twice = [name for name in dict.fromkeys(names) if name != "" and names.count(name) > 1 and (column is None or name in (column, time))]
     if twice:

@@ -6,7 +6,9 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-from enhsim_tf.errors import InputError
+from enhsim_tf.errors import InputError, printable
+
+__all__ = ["Parser", "finish", "printable", "start_tensorflow", "tell"]
 
 
 class Parser(argparse.ArgumentParser):
@@ -20,14 +22,13 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"Expected options as --help lists them. Received: {' '.join(message.split())}.")
 
 
-def printable(text: str) -> str:
-    """Text for one line of a terminal: what cannot be printed, such as a line's end, becomes a question mark."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
-
-
 def tell(line: str) -> None:
-    """Prints a line at once, so that whoever waits or reads through a pipe sees it."""
-    print(line, flush=True)
+    """Prints a line, or some, at once, so that whoever waits or reads through a pipe sees it.
+
+    Args:
+        line: Names of channels and folders in it may hold anything.
+    """
+    print("\n".join(printable(each) for each in line.split("\n")), flush=True)
 
 
 def finish(run: Callable[[], int], interrupted: str) -> int:
@@ -49,10 +50,9 @@ def finish(run: Callable[[], int], interrupted: str) -> int:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it once more at its end
         return 141
     except (OSError, MemoryError) as error:
-        reason = " ".join(str(error).splitlines()) or "more than there is"
-        print(
-            f"error: Expected files and memory as they are needed. Received: {reason[:300]}. Make room, or ask for less.", file=sys.stderr
-        )
+        reason = " ".join(str(error).splitlines())[:300] or "more than there is"
+        line = InputError(f"Expected files and memory as they are needed. Received: {reason}. Make room, or ask for less.")
+        print(f"error: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(interrupted, file=sys.stderr)

@@ -180,7 +180,8 @@ def vouch(folder):
 @pytest.mark.parametrize("config", ["{}", "[]", "1", "{", '{"config": {"layers": [{"config": {"batch_shape": [null, true]}}]}}'])
 def test_enhancers_without_a_width_are_refused(copied, config, refused):
     with zipfile.ZipFile(copied / "enhancer.keras", "w") as archive:
-        archive.writestr("config.json", config)
+        for name, content in {"config.json": config, "metadata.json": "{}", "model.weights.h5": ""}.items():
+            archive.writestr(name, content)
     vouch(copied)
     with refused("width"):
         plan_of(Mix(), copied, 0, 10)

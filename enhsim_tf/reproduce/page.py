@@ -8,6 +8,7 @@ import base64
 import dataclasses
 import itertools
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ NAME = "report.html"
 PIPELINE = "fig01_pipeline"
 # the sign and the colour of each verdict in the style sheet; one that it does not know is shown as not measured
 _KINDS = {REPRODUCED: "good", PARTLY: "half", NOT_REPRODUCED: "bad", NOT_TESTED: "open", NOT_MEASURED: "none"}
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")  # no such letter belongs on a page
 _TYPES = {"png": "image/png", "svg": "image/svg+xml"}
 _ORIGINS = {"paper": "from the paper’s text", "author": "from the author’s public code", "ours": "ours, each with its reason"}
 
@@ -79,6 +81,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,  # names of files and channels come from outside
+        finalize=lambda value: _CONTROL.sub("?", value) if type(value) is str else value,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

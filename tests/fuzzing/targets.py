@@ -1,0 +1,6 @@
+"""The table of targets: everything of the package that reads what somebody else may have written."""
+
+from tests.fuzzing import of_folders, of_tables, of_texts
+from tests.fuzzing.target import Target
+
+TARGETS: dict[str, Target] = of_folders.TARGETS | of_tables.TARGETS | of_texts.TARGETS
