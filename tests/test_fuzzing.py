@@ -203,6 +203,7 @@ def test_the_record_holds_what_is_promised():
     assert all(each["accepted"] and each["counters"] for each in record["targets"].values())
     grown = [name for name, each in record["targets"].items() if each["counters"] > each["counters_at_first"]]
     assert len(grown) > len(TARGETS) / 2
+    assert total["peak_mib"] < MOST_MIB
     assert total["slowest_s"] < MOST_SECONDS == record["most_seconds"] and total["more_than_at_first_mib"] < MOST_MIB == record["most_mib"]
 
 
