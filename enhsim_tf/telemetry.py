@@ -160,7 +160,7 @@ def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndar
         )
     if len(values) < min_samples:
         raise InputError(
-            f"Expected at least {min_samples} samples (two windows). Received: {len(values)} from {what}. Give a longer series."
+            f"Expected at least {min_samples} samples. Received: {len(values)} from {what}. Give a longer series or a smaller window."
         )
     if np.ptp(values) == 0:
         raise InputError(f"Expected values that vary. Received: the constant {values[0]:g} in {what}. Choose another channel.")

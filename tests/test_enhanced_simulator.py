@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import inspect
 import json
 import sys
 
@@ -10,13 +11,14 @@ import numpy as np
 import pytest
 
 from enhsim_tf import enhanced_simulator, enhancer
-from enhsim_tf.enhanced_simulator import EnhancedSimulator
+from enhsim_tf.enhanced_simulator import PAPER, EnhancedSimulator
 from enhsim_tf.enhancer import build_enhancer
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import sha256
 from enhsim_tf.noise import GaussianNoise, extract_noise, noise_unit
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 from enhsim_tf.pairs import cut_pairs, even_places
+from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.simulator import MODES, Degraded, SquareWave, SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
 
@@ -337,8 +339,24 @@ def small_batches(monkeypatch):
 
 
 def fitted(seed=0, **arguments):
+    """In the manner of the paper, with small counts."""
     counts = {"num_windows": 60, "epochs": 4, "num_iterations": 2, "window": 60, "verbose": 0}
-    return EnhancedSimulator.fit(measured(), seed=seed, **{**counts, **arguments})
+    return EnhancedSimulator.fit(measured(), seed=seed, **{**PAPER, **counts, **arguments})
+
+
+def test_the_recipe_of_the_paper_is_that_of_the_reproduction():
+    chosen, defaults = make_settings("full"), inspect.signature(EnhancedSimulator.fit).parameters
+    assert (PAPER["num_windows"], PAPER["epochs"]) == (chosen.telemetry.num_windows, chosen.enhancer.epochs) == (1_500, 40)
+    assert defaults["num_iterations"].default == chosen.adversarial.num_iterations
+    assert defaults["moving_average"].default == chosen.noise.moving_average
+    assert (PAPER["noise"], PAPER["extraction"], PAPER["decay"]) == ("paper", "moving average", False)
+
+
+def test_the_defaults_are_those_that_the_experiment_compares_with_the_paper():
+    second, defaults = make_settings("full").second, inspect.signature(EnhancedSimulator.fit).parameters
+    for name in ("num_windows", "epochs", "held_out"):
+        assert defaults[name].default == getattr(second, name)
+    assert [defaults[name].default for name in ("noise", "extraction", "decay")] == ["convolutional", "enhancer", True]
 
 
 def test_fit_to_short_telemetry_end_to_end(small_batches):
@@ -371,7 +389,7 @@ def test_fit_with_another_seed_and_without_normalisation(small_batches):
 
 
 def test_fit_of_the_convolutional_noise_to_what_the_enhancer_leaves(tmp_path):
-    simulator = fitted(noise="convolutional", extraction="enhancer", num_windows=300, epochs=8, decay=True)
+    simulator = fitted(noise="convolutional", extraction="enhancer", num_windows=300, epochs=8, decay=True, held_out=0.25)
     # white noise of 4 and what error the enhancer has: at least 4, and far below the 35 that the sine's own deviation is
     assert 3.9 < simulator.noise.scale < 10
     series = simulator.generate_series(1_000, seed=3)
@@ -389,6 +407,7 @@ def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batch
     clean = 1_000 + 50 * np.sin(2 * np.pi * 2.0 * np.arange(3_000) / 100)
     telemetry = Telemetry((clean + steps).astype(np.float32), interval_s=2.0)
     settings = {"num_windows": 300, "epochs": 8, "num_iterations": 0, "window": 60, "verbose": 0, "decay": True, "moving_average": 5}
+    settings |= {"noise": "paper", "held_out": 0.25}
     scales = {
         extraction: EnhancedSimulator.fit(telemetry, seed=0, extraction=extraction, **settings).noise.scale * 0.1
         for extraction in ("moving average", "enhancer")
@@ -412,7 +431,7 @@ def drifting(number=4_000):
 def followers():
     """Simulators that follow the telemetry and that do not, fitted to its first half."""
     coarse, counts = SquareWaveSimulator([SquareWave(40, low=99, high=101)]), {"window": 80, "num_windows": 300, "epochs": 6}
-    settings = {"noise": "convolutional", "extraction": "enhancer", "held_out": 0.0, "decay": True, "num_iterations": 2, "verbose": 0}
+    settings = {"num_iterations": 2, "verbose": 0}
     learnt = drifting().part(0, 2_000)
     parts = [learnt.part(0, 1_100), learnt.part(1_150, 2_000)]
     return {follow: EnhancedSimulator.fit(parts, coarse, 0, **counts, **settings, follow=follow) for follow in (True, False)}
@@ -531,8 +550,10 @@ def test_bars_of_the_fit_are_for_terminals(small_batches, capsys, monkeypatch, i
 
 
 def test_fit_refuses_less_than_two_windows(refused):
-    with refused("119", "120 samples", "two windows"):
-        EnhancedSimulator.fit(measured(119), window=60, verbose=0)
+    with refused("119", "120 samples"):
+        EnhancedSimulator.fit(measured(119), window=60, verbose=0, **PAPER)
+    with refused("479", "480 samples"):
+        EnhancedSimulator.fit(measured(479), window=60, verbose=0)
 
 
 @pytest.mark.parametrize("width", [4, 1, 2_000])
@@ -540,7 +561,7 @@ def test_a_moving_average_of_a_wrong_width_is_refused_before_training(monkeypatc
     monkeypatch.setattr(enhancer, "fit_windows", lambda *arguments, **options: pytest.fail("trained first"))
     values = np.sin(np.arange(1_500) / 5).astype(np.float32)
     with pytest.raises(InputError, match="width|window"):
-        EnhancedSimulator.fit(Telemetry(values), window=60, moving_average=width)
+        EnhancedSimulator.fit(Telemetry(values), window=60, moving_average=width, **PAPER)
 
 
 def test_saving_leaves_a_folder_with_a_foreign_manifest_alone(tmp_path):
