@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import importlib.util
 import json
+import operator
 import pickle
 import resource
 import subprocess
@@ -28,8 +29,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fleet", description="Speed of large data sets.")
     parser.add_argument("models", type=Path, metavar="MODEL_DIR", help="a saved simulator")
-    parser.add_argument("--windows", type=int, default=1_000_000, metavar="N", help="windows of each row (default: 1000000)")
-    parser.add_argument("--repetitions", type=int, default=2, metavar="N", help="of each row, in turn (default: 2)")
+    parser.add_argument("--windows", type=int, default=200_000, metavar="N", help="windows of each row (default: 200000)")
+    parser.add_argument("--repetitions", type=int, default=3, metavar="N", help="of each row, in turn (default: 3)")
+    parser.add_argument(
+        "--large", type=int, default=1_000_000, metavar="N", help="windows of one more, with two workers (default: 1000000)"
+    )
     parser.add_argument("--nominal-share", type=float, default=0.5, metavar="SHARE", help="the others are stuck or drift (default: 0.5)")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "fleet.json", help="the results (default: %(default)s)")
     parser.add_argument("--one", choices=[*ROWS, PARTS, *IDLE], help=argparse.SUPPRESS)  # in a process whose memory is its own
@@ -158,23 +162,18 @@ def _matrix_product() -> tuple[float, float]:
     return min(times), 2 * 1_024 * 3_200 * 3_200
 
 
-def same(number: int) -> int:
-    """No work at all."""
-    return number
-
-
 def measure_idle(options: argparse.Namespace) -> dict:
     """How many numbers a second an engine hands out and gets back."""
     from enhsim_tf import engines
 
     engine, workers = IDLE[options.one]
-    times = [time.perf_counter() for _ in engines.run(engine, same, range(_NUM_IDLE), workers)]
+    times = [time.perf_counter() for _ in engines.run(engine, operator.index, range(_NUM_IDLE), workers)]  # no work at all
     return {"shards_a_second": (len(times) - 500) / (times[-1] - times[499])}
 
 
-def measured(options: argparse.Namespace, name: str) -> dict:
+def measured(options: argparse.Namespace, name: str, windows: int) -> dict:
     """What a process of its own measured."""
-    given = [str(options.models), "--windows", str(options.windows), "--nominal-share", str(options.nominal_share), "--one", name]
+    given = [str(options.models), "--windows", str(windows), "--nominal-share", str(options.nominal_share), "--one", name]
     ended = subprocess.run([sys.executable, "-m", "benchmarks.fleet", *given], capture_output=True, text=True)
     if ended.returncode:
         raise SystemExit(f"{name}: {(ended.stderr.strip().splitlines() or ['no word'])[-1]}")
@@ -193,15 +192,24 @@ def main(arguments: list[str] | None = None) -> int:
 
     has_ray = importlib.util.find_spec("ray") is not None
     names = [name for name in ROWS if "ray" not in name or has_ray]
-    made = {"machine": machine(), "nominal_share": options.nominal_share, PARTS: measured(options, PARTS)}
-    made["driver"] = {IDLE[name][0]: measured(options, name) for name in IDLE if "ray" not in name or has_ray}
+    made = {"machine": machine(), "nominal_share": options.nominal_share, PARTS: measured(options, PARTS, options.windows)}
+    made["driver"] = {IDLE[name][0]: measured(options, name, 1) for name in IDLE if "ray" not in name or has_ray}
     found: dict[str, list[dict]] = {name: [] for name in names}
+    large: dict[str, dict] = {}
+
+    def measure_and_say(name: str, windows: int) -> dict:
+        row = measured(options, name, windows)
+        print(f"{name:18} {windows:10,} windows {row['windows_a_second']:10,.0f} a second", flush=True)
+        return row
+
     for _ in range(options.repetitions):
         for name in names:  # in turn: what else the machine does meets all rows alike
-            found[name].append(measured(options, name))
-            print(f"{name:18} {found[name][-1]['windows_a_second']:10,.0f} windows a second", flush=True)
-    equal = len({json.dumps(row.pop("sha256")) for rows in found.values() for row in rows}) == 1
-    write_json(options.out, made | {"same_bytes": equal, "rows": found})
+            found[name].append(measure_and_say(name, options.windows))
+    for name in names[1:]:
+        large[name] = measure_and_say(name, options.large)
+    sets = [[row.pop("sha256") for row in rows] for rows in ([row for rows in found.values() for row in rows], large.values())]
+    equal = all(each == same_size[0] for same_size in sets for each in same_size)
+    write_json(options.out, made | {"same_bytes": equal, "rows": found, "large": large})
     return 0 if equal else 1
 
 

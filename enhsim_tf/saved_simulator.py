@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MANIFEST, SETTINGS = "manifest.json", "settings.json"
 MOST_SETTINGS = 50_000_000  # bytes of a JSON file; ours have some ten thousand
-_OURS = '"enhsim_tf.EnhancedSimulator/'  # stands in the manifest of every version
+_OURS = b'"enhsim_tf.EnhancedSimulator/'  # stands at the beginning of the manifest of every version
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
 
@@ -48,9 +48,14 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"]
 def is_foreign(folder: Path) -> bool:
     """Whether something else than a saved simulator stands there; a damaged one is one, and an empty folder is as good as none."""
     manifest = folder / MANIFEST
-    is_ours = manifest.is_file() and _OURS in manifest.read_text(encoding="utf-8", errors="replace")  # others have manifests too
+    is_ours = manifest.is_file() and _OURS in _beginning_of(manifest)  # others have manifests too
     is_empty = folder.is_dir() and not any(folder.iterdir())
     return os.path.lexists(folder) and not (is_ours or is_empty)
+
+
+def _beginning_of(path: Path) -> bytes:
+    with open(path, "rb") as file:
+        return file.read(1_000)
 
 
 def check_saved(folder: str | os.PathLike) -> None:

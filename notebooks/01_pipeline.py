@@ -51,8 +51,7 @@ print(f"largest difference between the noises: {np.abs(added - (telemetry - clea
 assert np.allclose(added, telemetry - clean, atol=1e-5) and np.abs(stuck - clean).max() > 0.1
 
 # %% [markdown]
-# With telemetry of your own, the whole pipeline is one call. It fits the square wave, trains both networks (by default those of
-# notebook 22; `**PAPER` chooses the paper's) and keeps them:
+# With telemetry of your own, the whole pipeline is one call. It fits the square wave, trains both networks and keeps them:
 #
 # ```python
 # simulator = EnhancedSimulator.fit(telemetry, seed=0)

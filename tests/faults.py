@@ -1,9 +1,10 @@
-"""Faults, tried for real on the commands with tiny networks: `python tests/faults.py fleet|reproduce --out faults.json`.
+"""Faults, tried for real on the commands with tiny networks: `python tests/faults.py fleet|reproduce --out docs/faults.json`.
 
 Each try starts a command, does it some harm at a random moment, runs the same command again until it ends well, and
 compares what it made with what was made without any disturbance: every byte of the data set of `generate`; every figure's
 arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
-tries the same in small; this takes minutes for `fleet` and about an hour for `reproduce`.
+tries the same in small; this takes minutes for `fleet` and about an hour for `reproduce`. `python tests/faults.py readme --out
+docs/faults.json` fills the README's table from the file.
 """
 
 import argparse
@@ -25,6 +26,10 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from test_fleet import children_of, content_of  # noqa: E402
 
+from enhsim_tf.files import replace_file, write_json  # noqa: E402
+from enhsim_tf.reproduce.report import fill_parts  # noqa: E402
+
+MISSED = "too early or late"  # begins the outcome of a try that met nobody: it does not count, and is done again
 MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n"
 
 
@@ -67,7 +72,7 @@ def kill_driver(bench, name, rng):
     was_running = process.poll() is None
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    return ("" if was_running else "too late: it had ended; ") + bench.recovered(name)
+    return ("" if was_running else f"{MISSED}; ") + bench.recovered(name)
 
 
 def kill_worker(bench, name, rng):
@@ -77,7 +82,7 @@ def kill_worker(bench, name, rng):
     if workers:
         os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
     err = process.communicate()[1]
-    missed = "" if workers else "too early or late: no worker was there; "
+    missed = "" if workers else f"{MISSED}; "
     return missed + bench.recovered(name) if process.returncode == 0 else f"NOT recovered by itself: {err.strip()[-200:]}"
 
 
@@ -240,8 +245,8 @@ def two_runs(bench, name, rng):
     err = second.communicate()[1]
     first.communicate()
     refused = second.returncode == 2 and len(err.splitlines()) == 1
-    late = second.returncode == 0  # the first had ended
-    return bench.recovered(name) if first.returncode == 0 and (refused or late) else f"NOT refused: {err.strip()[-200:]}"
+    late = f"{MISSED}; " if second.returncode == 0 else ""  # the first had ended
+    return late + bench.recovered(name) if first.returncode == 0 and (refused or late) else f"NOT refused: {err.strip()[-200:]}"
 
 
 def lost_node(bench, name, rng):
@@ -262,7 +267,7 @@ def lost_node(bench, name, rng):
         err = process.communicate()[1]
         same = process.returncode == 0 and content_of(bench.folder / name) == bench.expected
         shutil.rmtree(bench.folder / name)
-        return ("went on" if was_running else "had ended before") + ", same bytes" if same else f"NOT recovered: {err.strip()[-300:]}"
+        return ("" if was_running else f"{MISSED}; ") + "went on, same bytes" if same else f"NOT recovered: {err.strip()[-300:]}"
     finally:
         cluster.shutdown()
 
@@ -280,8 +285,28 @@ FAULTS = {
     "clock change": clock_change,
     "a node of a Ray cluster removed": lost_node,
 }
-MOMENTS = ("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)", "interrupt by the user (SIGINT)")
-TRIES = {"a node of a Ray cluster removed": 2} | dict.fromkeys(MOMENTS, 20)  # of the others 5
+TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)"), 20)  # of the others 3
+
+
+def as_markdown(table):
+    """The README's table: what was tried on which command, how often, and what came of it."""
+    commands = {"fleet": "`generate --workers`", "reproduce": "`enhsim_tf.reproduce`"}
+    lines = ["| fault | command | tries | outcome |", "|---|---|---|---|"]
+    for row in table:
+        outcomes = row["outcomes"]
+        words = "; ".join(f"{count} × {outcome}" if len(outcomes) > 1 else outcome for outcome, count in outcomes.items())
+        lines.append(f"| {row['fault']} | {commands[row['of']]} | {row['tries']} | {words} |")
+    return (
+        "\n".join(lines) + "\n\nFrom `docs/faults.json`, which `python tests/faults.py fleet` and `python tests/faults.py reproduce` wrote."
+    )
+
+
+def fill_readme(table):
+    """Writes the table between the README's markers."""
+    path = ROOT / "README.md"
+    filled = fill_parts(path.read_text(encoding="utf-8"), {"faults": as_markdown(table)}, path.name)
+    with replace_file(path) as temporary:
+        temporary.write_text(filled, encoding="utf-8")
 
 
 def main():
@@ -290,27 +315,37 @@ def main():
 
     benches = {"fleet": (Bench, FAULTS), "reproduce": (ReproduceBench, OF_REPRODUCE)}
     parser = argparse.ArgumentParser(description="Faults, tried for real.")
-    parser.add_argument("of", choices=benches, help="what is tried: large data sets, or the cache of the paper's reproduction")
-    parser.add_argument("--tries", type=int, help="of each fault (default: 20, or 5 of those that no moment matters to, 2 of Ray's)")
+    choices = [*benches, "readme"]
+    parser.add_argument(
+        "of", choices=choices, help="what is tried: large data sets, or the cache of the paper's reproduction; readme: nothing"
+    )
+    parser.add_argument("--tries", type=int, help="of each fault (default: 20 of those that kill, 3 of the others)")
     parser.add_argument("--only", choices=[*FAULTS, *OF_REPRODUCE], action="append", help="this fault alone; may be repeated")
     parser.add_argument("--seed", type=int, default=0, help="of the moments and places")
     parser.add_argument("--out", type=Path, required=True, help="the table, as JSON")
     options = parser.parse_args()
+    kept = json.loads(options.out.read_text()) if options.out.exists() else []
+    if options.of == "readme":
+        fill_readme(kept)
+        return 0
     make, faults = benches[options.of]
-    table = []
+    table = [row for row in kept if row["of"] != options.of or (options.only and row["fault"] not in options.only)]
     with tempfile.TemporaryDirectory() as folder:
         bench = make(Path(folder))
         for number, (fault, harm) in enumerate(faults.items()):
             if options.only and fault not in options.only:
                 continue
-            rng, outcomes = np.random.default_rng([options.seed, number]), {}
-            tries = options.tries or TRIES.get(fault, 5)
-            for attempt in range(tries):
-                outcome = harm(bench, f"try-{number}-{attempt}", rng)
-                outcomes[outcome] = outcomes.get(outcome, 0) + 1
-            table.append({"of": options.of, "fault": fault, "tries": tries, "outcomes": outcomes, "seed": options.seed})
-            print(f"{fault:34} {tries:3}  " + "; ".join(f"{count} {outcome}" for outcome, count in outcomes.items()), flush=True)
-            options.out.write_text(json.dumps(table, indent=2) + "\n")
+            rng, outcomes, attempts = np.random.default_rng([options.seed, number]), {}, 0
+            tries = options.tries or TRIES.get(fault, 3)
+            while sum(outcomes.values()) < tries and attempts < 3 * tries:
+                outcome = harm(bench, f"try-{number}-{attempts}", rng)
+                attempts += 1
+                if not outcome.startswith(MISSED):
+                    outcomes[outcome] = outcomes.get(outcome, 0) + 1
+            row = {"of": options.of, "fault": fault, "tries": sum(outcomes.values()), "outcomes": outcomes}
+            table.append(row | {"missed": attempts - sum(outcomes.values()), "seed": options.seed})
+            print(f"{fault:34} {row['tries']:3}  " + "; ".join(f"{count} {outcome}" for outcome, count in outcomes.items()), flush=True)
+            write_json(options.out, sorted(table, key=lambda row: (row["of"], list(benches[row["of"]][1]).index(row["fault"]))))
     return int(any("NOT" in outcome for row in table for outcome in row["outcomes"]))
 
 

@@ -11,6 +11,7 @@ import time
 import zipfile
 from pathlib import Path
 
+from faults import MISSED
 from test_fleet import content_of
 
 ROOT = Path(__file__).parents[1]
@@ -115,7 +116,7 @@ def kill(bench, name, rng):
     was_running = process.poll() is None
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    return ("" if was_running else "too late: it had ended; ") + bench.recovered(name)
+    return ("" if was_running else f"{MISSED}; ") + bench.recovered(name)
 
 
 def interrupt(bench, name, rng):
