@@ -91,8 +91,10 @@ def interrupt(bench, name, rng):
     bench.moment(rng)
     os.killpg(process.pid, signal.SIGINT)
     err = process.communicate()[1]
-    one_line = process.returncode == 0 or (process.returncode == 130 and len(err.splitlines()) == 1)
-    return bench.recovered(name) if one_line else f"NOT one line: {process.returncode} {err.strip()[-200:]}"
+    if process.returncode == 0:
+        return f"{MISSED}; {bench.recovered(name)}"
+    one_line = process.returncode == 130 and len(err.splitlines()) == 1
+    return f"one line; {bench.recovered(name)}" if one_line else f"NOT one line: {process.returncode} {err.strip()[-200:]}"
 
 
 def full_disk(bench, name, rng):
@@ -324,6 +326,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0, help="of the moments and places")
     parser.add_argument("--out", type=Path, required=True, help="the table, as JSON")
     options = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it, and so would what it starts
     kept = json.loads(options.out.read_text()) if options.out.exists() else []
     if options.of == "readme":
         fill_readme(kept)

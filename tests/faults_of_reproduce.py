@@ -124,8 +124,10 @@ def interrupt(bench, name, rng):
     bench.moment(rng)
     os.killpg(process.pid, signal.SIGINT)
     err = process.communicate()[1]
-    one_line = process.returncode == 0 or (process.returncode == 130 and len(err.splitlines()) == 1)
-    return bench.recovered(name) if one_line else f"NOT one line: {process.returncode} {err.strip()[-300:]}"
+    if process.returncode == 0:
+        return f"{MISSED}; {bench.recovered(name)}"
+    one_line = process.returncode == 130 and len(err.splitlines()) == 1
+    return f"one line; {bench.recovered(name)}" if one_line else f"NOT one line: {process.returncode} {err.strip()[-300:]}"
 
 
 @contextlib.contextmanager
