@@ -153,8 +153,9 @@ def test_the_library_knows_the_same_defaults():
         NoiseGAN.fit: {"num_iterations": "adversarial.num_iterations", "record_every": "adversarial.record_every"},
         noise.extract_noise: {"width": "noise.moving_average"},
         EnhancedSimulator.fit: {
-            "num_windows": "telemetry.num_windows",
-            "epochs": "enhancer.epochs",
+            "num_windows": "second.num_windows",
+            "epochs": "second.epochs",
+            "held_out": "second.held_out",
             "num_iterations": "adversarial.num_iterations",
             "moving_average": "noise.moving_average",
             "window": "telemetry.window",
