@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enhsim_tf.commands import parse
-from enhsim_tf.terminal import finish, printable, tell
+from enhsim_tf.errors import InputError, printable
+from enhsim_tf.terminal import finish, tell
 
 if TYPE_CHECKING:
     from enhsim_tf.cleaning import Cleaning
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int:
     """Runs what the options ask for and returns the exit code."""
-    from enhsim_tf.errors import InputError
-
     if not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
     return {"fit": run_fit, "generate": run_generate, "verify": run_verify, "score": run_score}[options.command](options)
@@ -48,7 +47,6 @@ def run_generate(options: argparse.Namespace) -> int:
         from enhsim_tf.fleet_command import run_fleet
 
         return run_fleet(options, tell)
-    from enhsim_tf.errors import InputError
     from enhsim_tf.training_sets import (
         num_samples_of,
         parse_length,
@@ -105,7 +103,6 @@ def run_verify(options: argparse.Namespace) -> int:
 def run_score(options: argparse.Namespace) -> int:
     """Scores each channel of the source that has a simulator."""
     from enhsim_tf import detectors
-    from enhsim_tf.errors import InputError
     from enhsim_tf.scoring import ScoreOptions, score_channel, write_scores
 
     detector = {name.casefold().replace(" ", "-"): name for name in detectors.DETECTORS}[options.detector]
@@ -149,8 +146,6 @@ def run_score(options: argparse.Namespace) -> int:
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
     """Does the work for each channel; one that cannot be used does not stop the others. Returns the exit code."""
-    from enhsim_tf.errors import InputError
-
     channels, failed = list(channels), {}
     for channel in channels:
         try:
@@ -201,7 +196,6 @@ def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) ->
         InputError: If one file was named for several channels, or it cannot be written.
     """
     from enhsim_tf.channels import folder_of
-    from enhsim_tf.errors import InputError
     from enhsim_tf.files import make_folder
 
     names, is_folder = list(channels), os.path.isdir(out)

@@ -7,8 +7,8 @@ from matplotlib import font_manager
 from matplotlib.axes import Axes
 
 from enhsim_tf.channel_verdict import RATE, SEVERITY, ChannelReport
+from enhsim_tf.errors import printable
 from enhsim_tf.sheet import COARSE, DOUBLE, EDGE, ENHANCED, FOOT, GENERATED, LINE, QUIET, REAL, STYLE, new_sheet, title_words
-from enhsim_tf.terminal import printable
 
 _HEIGHT = 4.3  # inches
 _LEFT, _MIDDLE = (0.68, 3.36), (4.66, 7.0)  # where the columns of panels begin and end, inches from the left

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.terminal import printable
+from enhsim_tf.errors import printable
 
 RATE = 0.01  # of false alarms, that thresholds are set for
 SEVERITY = 4.0  # standard deviations of the noise, of the anomalies that the verdict speaks of

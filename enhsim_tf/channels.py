@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 from enhsim_tf import engines
 from enhsim_tf.cleaning import Cleaning, clean
-from enhsim_tf.errors import InputError
+from enhsim_tf.errors import InputError, printable
 from enhsim_tf.files import encoded, make_folder, remove_leftovers, replace_folder, write_json
 from enhsim_tf.fit_options import FitOptions
 from enhsim_tf.local_engine import ProcessesDiedError, num_cpus
 from enhsim_tf.saved_simulator import MANIFEST, is_foreign
-from enhsim_tf.terminal import printable, start_tensorflow
+from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd

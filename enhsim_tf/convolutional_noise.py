@@ -161,7 +161,7 @@ def convolutional_noise_gan(noise_windows: np.ndarray, num_iterations: int = 1_0
 
     def falling(rate: float, steps: int) -> keras.optimizers.schedules.LearningRateSchedule:
         steps = max(1, steps)  # none are asked for where the noise stays untrained
-        constant = round(0.6 * steps)  # a "warm-up" that begins where it ends
+        constant = min(round(0.6 * steps), steps - 1)  # a "warm-up" that begins where it ends; Keras wants a step to fall in
         return keras.optimizers.schedules.CosineDecay(rate, steps - constant, 0.05, warmup_target=rate, warmup_steps=constant)
 
     scale = float(np.std(noise_windows, dtype=np.float64))

@@ -1,17 +1,21 @@
 """Files and folders that appear whole or not at all, and their checksums.
 
 Everything the package writes goes to a temporary name beside its destination and is renamed when it is complete:
-a killed process leaves either the old content or the new, never a half. A folder takes two renames; of a process that is
-killed between them the old content stands aside, and the next `replace_folder` or `remove_leftovers` puts it back.
+a killed process leaves either the old content or the new, never a half. A folder that takes the place of another is
+exchanged with it in one step where the system can do that (Linux, on its usual file systems). Elsewhere it takes two
+renames; of a process that is killed between them the old content stands aside, and the next `replace_folder` or
+`remove_leftovers` puts it back.
 """
 
 import contextlib
+import ctypes
 import hashlib
 import json
 import os
 import re
 import shutil
 import socket
+import sys
 import time
 import urllib.parse
 import uuid
@@ -24,6 +28,7 @@ from enhsim_tf.errors import InputError
 _LEFT = re.compile(r"\.(?P<name>.*?)\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}(?P<suffix>\.\w+|)")
 _MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
+_HERE, _RENAME_EXCHANGE = -100, 2  # AT_FDCWD and the flag, see renameat2(2)
 _OLD_S = 24 * 3600  # no process writes nothing for so long
 
 
@@ -104,6 +109,8 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
             if os.path.lexists(path):
                 if keep is not None and keep(path):
                     return
+                if _exchange(temporary, path):
+                    return
                 with contextlib.suppress(FileNotFoundError):  # another process has moved it meanwhile
                     os.replace(path, old)
             try:
@@ -119,6 +126,21 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
     finally:
         _remove(temporary)
         _remove(old)
+
+
+def _exchange(first: Path, second: Path) -> bool:
+    """Lets two files or folders change their names in one step, so that whoever reads one finds it at every moment.
+
+    Returns:
+        Whether it was done; not every system and file system can.
+    """
+    if not sys.platform.startswith("linux"):
+        return False
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError):  # a C library without it
+        return False
+    return rename(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _RENAME_EXCHANGE) == 0
 
 
 def _remove(path: Path) -> None:

@@ -242,7 +242,8 @@ class NoiseGAN:
                 if iteration < num_iterations:
                     self._step(noise)
                     bar.update()
-        self.generator_optimizer.finalize_variable_values(self.generator.trainable_variables)  # the average, where there is one
+        if num_iterations:  # the average over no iterations is nought
+            self.generator_optimizer.finalize_variable_values(self.generator.trainable_variables)
         return {key: np.array([record[key] for record in history]) for key in history[0]}
 
     def _evaluate(self, noise: tf.Tensor) -> dict[str, float]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from enhsim_tf.declared_sizes import read_json
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import make_folder, sha256, write_json
 from enhsim_tf.fleet_plan import FORMAT, MOST_VALUES, Plan, key_of
@@ -90,9 +91,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     path = folder / MANIFEST
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise ValueError("too large")
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path, _MOST_BYTES)
         if not isinstance(content, dict) or content["format"] != FORMAT:
             raise ValueError("another format")
         settings, shards = content["settings"], content["shards"]
@@ -108,7 +107,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         content["shards"] = None if shards is None else [_record_of(number, each) for number, each in enumerate(shards)]
     except FileNotFoundError:
         raise InputError(f"Expected a data set that `generate` made. Received: {folder}, without a {MANIFEST}.") from None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         reason = " ".join(str(error).split())[:80]
         raise InputError(
             f"Expected {MANIFEST} as it was written. Received: a damaged one in {folder} ({type(error).__name__}: {reason}). "

@@ -189,7 +189,8 @@ class ShardMaker:
         windows, rows = make_windows(self.plan, self.simulators, shard)
         nominal = rows.severity == 0  # scenario 0 among them
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
-        onsets = np.array([int(round(onset * self.plan.window, 6)) for onset in rows.onset], np.int32)  # as a degraded mode counts
+        scenarios = [_scenario_of(self.plan, rows, place) for place in range(len(nominal))]
+        onsets = np.array([0 if each is None else each.first_sample(self.plan.window) for each in scenarios], np.int32)
         columns = [
             pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), self.plan.window),
             pa.array(np.where(nominal, NOMINAL, modes[rows.scenario]), pa.string()),

@@ -92,6 +92,10 @@ class Degraded:
         if not (0 <= self.severity <= 1 and 0 <= self.onset < 1):
             raise InputError(f"Expected severity from 0 to 1 and onset from 0 to before 1. Received: {self}.")
 
+    def first_sample(self, num_samples: int) -> int:
+        """The sample of a window or series at which it sets in; rounded first, since 0.29 times 100 is 28.999999999999996."""
+        return min(int(round(self.onset * num_samples, 6)), num_samples - 1)
+
 
 def degrade(
     signal: Callable[[np.ndarray], np.ndarray],
@@ -121,7 +125,7 @@ def degrade(
         return signal(time_s)
     severity, (low, high) = scenario.severity, levels
     num_windows, num_samples = time_s.shape
-    onset = min(int(round(scenario.onset * num_samples, 6)), num_samples - 1)
+    onset = scenario.first_sample(num_samples)
     time_s, late = time_s.copy(), time_s[:, onset:]
     begin = late[:, :1]
 

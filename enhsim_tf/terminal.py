@@ -8,8 +8,6 @@ from typing import NoReturn
 
 from enhsim_tf.errors import InputError, printable
 
-__all__ = ["Parser", "finish", "printable", "start_tensorflow", "tell"]
-
 
 class Parser(argparse.ArgumentParser):
     """A parser whose refusals are those of the whole command: one line, exit code 2."""

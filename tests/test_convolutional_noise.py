@@ -155,3 +155,21 @@ def test_the_average_takes_the_place_of_the_last_weights():
         for step in same_steps[1:]:
             expected = 0.5 * expected + 0.5 * step[number]
         np.testing.assert_allclose(np.asarray(weight), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("num_iterations", [1, 2, 3, 10, 1_000])
+def test_the_rates_are_constant_and_then_fall_along_a_cosine(num_iterations):
+    gan = convolutional_noise_gan(NOISE, num_iterations)
+    constant = min(round(0.6 * num_iterations), num_iterations - 1)
+    for iteration in {0, constant, (constant + num_iterations) // 2, num_iterations}:
+        fallen = max(0.0, (iteration - constant) / (num_iterations - constant))
+        expected = 0.002 * (0.05 + 0.95 * (1 + np.cos(np.pi * fallen)) / 2)
+        assert float(gan.generator_optimizer._learning_rate(iteration)) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("num_iterations", [0, 1])
+def test_no_iteration_and_one(num_iterations):
+    gan = convolutional_noise_gan(NOISE, num_iterations)
+    before = gan.generate(2, seed=0)
+    gan.fit(NOISE, num_iterations, verbose=False)
+    assert np.array_equal(before, gan.generate(2, seed=0)) == (num_iterations == 0)

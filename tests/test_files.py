@@ -15,6 +15,17 @@ from enhsim_tf import files
 ROOT = Path(__file__).parents[1]
 
 
+each_way = pytest.mark.parametrize("can_exchange", [True, False], ids=["exchanged", "two renames"], indirect=True)
+
+
+@pytest.fixture
+def can_exchange(request, monkeypatch):
+    """Whether folders are exchanged in one step; where they are not, the two renames are tried."""
+    if not request.param:
+        monkeypatch.setattr(files, "_exchange", lambda first, second: False)
+    return request.param
+
+
 def content_of(folder):
     return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
@@ -54,7 +65,8 @@ def test_interrupted_replace_file_leaves_what_was(tmp_path, before):
     assert content_of(tmp_path) == before
 
 
-def test_replace_folder_takes_the_place_of_all_that_stood_there(tmp_path):
+@each_way
+def test_replace_folder_takes_the_place_of_all_that_stood_there(can_exchange, tmp_path):
     path = tmp_path / "above" / "model"
     for number in (1, 2):
         with files.replace_folder(path) as temporary:
@@ -62,7 +74,8 @@ def test_replace_folder_takes_the_place_of_all_that_stood_there(tmp_path):
     assert content_of(tmp_path) == {"above/model/only_2": "2"}
 
 
-def test_replace_folder_takes_the_place_of_a_file_and_leaves_no_temporary(tmp_path):
+@each_way
+def test_replace_folder_takes_the_place_of_a_file_and_leaves_no_temporary(can_exchange, tmp_path):
     path = tmp_path / "model"
     path.write_text("a file")
     with files.replace_folder(path) as temporary:
@@ -82,7 +95,8 @@ def test_interrupted_replace_folder_leaves_what_was(tmp_path, before):
     assert len(list(tmp_path.iterdir())) == len(before)
 
 
-def test_replace_folder_keeps_the_old_when_the_new_cannot_take_the_name(tmp_path, monkeypatch):
+@pytest.mark.parametrize("can_exchange", [False], indirect=True)
+def test_replace_folder_keeps_the_old_when_the_new_cannot_take_the_name(can_exchange, tmp_path, monkeypatch):
     path = tmp_path / "model"
     path.mkdir()
     (path / "inside").write_text("old")
@@ -130,6 +144,7 @@ def test_killed_between_the_two_renames_the_old_content_comes_back(tmp_path, kin
     script = """
 import os, signal, sys
 from enhsim_tf import files
+files._exchange = lambda first, second: False
 rename = os.replace
 def killed(source, destination):
     rename(source, destination)
@@ -149,7 +164,28 @@ with files.replace_folder(sys.argv[1]) as temporary:
     assert inside.read_text() == "old" and [each.name for each in tmp_path.iterdir()] == ["model.v2"]
 
 
-def test_replace_folder_keeps_what_it_is_told_to(tmp_path):
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a folder takes two renames")
+def test_a_reader_finds_one_of_both_at_every_moment(tmp_path):
+    path = tmp_path / "model"
+    with files.replace_folder(path) as temporary:
+        (temporary / "number").write_text("0")
+    script = """
+import sys
+from enhsim_tf.files import replace_folder
+for number in range(1, 301):
+    with replace_folder(sys.argv[1]) as temporary:
+        (temporary / "number").write_text(str(number))
+"""
+    writer = subprocess.Popen([sys.executable, "-c", script, str(path)], cwd=ROOT)
+    missed, reads = 0, 0
+    while writer.poll() is None:
+        missed, reads = missed + (not path.is_dir()), reads + 1
+    assert writer.returncode == 0 and (path / "number").read_text() == "300"
+    assert reads > 300 and missed == 0 and [each.name for each in tmp_path.iterdir()] == ["model"]
+
+
+@each_way
+def test_replace_folder_keeps_what_it_is_told_to(can_exchange, tmp_path):
     path, asked = tmp_path / "stage", []
 
     def keep(found):
@@ -163,7 +199,8 @@ def test_replace_folder_keeps_what_it_is_told_to(tmp_path):
     assert asked == ["broken", "whole"] and [each.name for each in tmp_path.iterdir()] == ["stage"]
 
 
-def test_replace_folder_replaces_what_another_process_put_there_meanwhile(tmp_path, monkeypatch):
+@pytest.mark.parametrize("can_exchange", [False], indirect=True)
+def test_replace_folder_replaces_what_another_process_put_there_meanwhile(can_exchange, tmp_path, monkeypatch):
     path, rename = tmp_path / "model", os.replace
     path.mkdir()
 
@@ -181,7 +218,8 @@ def test_replace_folder_replaces_what_another_process_put_there_meanwhile(tmp_pa
     assert content_of(tmp_path) == {"model/inside": "new"} and [each.name for each in tmp_path.iterdir()] == ["model"]
 
 
-def test_replace_folder_takes_the_place_of_a_link_and_not_of_what_it_names(tmp_path):
+@each_way
+def test_replace_folder_takes_the_place_of_a_link_and_not_of_what_it_names(can_exchange, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "model").symlink_to("elsewhere")
     with files.replace_folder(tmp_path / "model") as temporary:
