@@ -29,6 +29,7 @@ from enhsim_tf.shard_folder import (
     read_records,
 )
 from enhsim_tf.shards import Record, ShardMaker, file_of
+from enhsim_tf.terminal import progress
 
 
 def generate_fleet(
@@ -63,13 +64,11 @@ def generate_fleet(
 
 
 def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Callable[[str], None]) -> None:
-    from tqdm import tqdm
-
     begin(out, plan)
     began, quiet = time.monotonic(), not sys.stderr.isatty()
     recorded = read_records(out)
     records: dict[int, Record] = {}
-    for number in tqdm(range(plan.num_shards), "checking", unit="shards", disable=quiet or not recorded, leave=False):
+    for number in progress(range(plan.num_shards), "checking", unit="shards", disable=quiet or not recorded, leave=False):
         record = recorded.get(number)
         if record is not None and record.rows == plan.rows_of(number) and is_whole(out, record):
             records[number] = record
@@ -77,7 +76,7 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
         tell(f"{len(records):,} of {plan.num_shards:,} shards are there and whole; {plan.num_shards - len(records):,} to make")
     kept = sum(record.rows for record in records.values())
     missing = (number for number in range(plan.num_shards) if number not in records)
-    bar = tqdm(total=plan.num_windows, initial=kept, unit="windows", unit_scale=True, disable=quiet, smoothing=0.05)
+    bar = progress(total=plan.num_windows, initial=kept, unit="windows", unit_scale=True, disable=quiet, smoothing=0.05)
     running = engines.run(engine, ShardMaker(plan, out), missing, workers)  # starts nothing where nothing is missing
     with bar, journal_of(out) as write, contextlib.closing(running):
         for record in running:

@@ -14,6 +14,7 @@ from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_comput
 from enhsim_tf.enhancer import predict_windows, seeded_initialiser
 from enhsim_tf.fused_adam import fused_adam
 from enhsim_tf.latent import Latent
+from enhsim_tf.terminal import progress
 
 Schedule = keras.optimizers.schedules.LearningRateSchedule
 REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
@@ -228,12 +229,10 @@ class NoiseGAN:
             The history, one entry a record, the first before training: `iteration`, and for `real` and `generated` rows
             `accuracy_*` (share judged rightly) and `loss_*` (binary cross-entropy).
         """
-        from tqdm import tqdm
-
         noise = tf.constant(np.asarray(windows, np.float32)[:, :, None] / self.scale)
         history = []
         disable = None if verbose is None else not verbose  # None: tqdm looks whether there is a terminal
-        with tqdm(total=num_iterations, desc="noise GAN", unit="iteration", disable=disable) as bar:
+        with progress(total=num_iterations, desc="noise GAN", unit="iteration", disable=disable) as bar:
             for iteration in range(num_iterations + 1):
                 if iteration % record_every == 0 or iteration == num_iterations:
                     history.append({"iteration": iteration, **self._evaluate(noise)})

@@ -3,10 +3,14 @@
 import argparse
 import os
 import sys
+import threading
 from collections.abc import Callable
-from typing import NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from enhsim_tf.errors import InputError, printable
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 
 class Parser(argparse.ArgumentParser):
@@ -27,6 +31,23 @@ def tell(line: str) -> None:
         line: Names of channels and folders in it may hold anything.
     """
     print("\n".join(printable(each) for each in line.split("\n")), flush=True)
+
+
+def progress(*arguments: Any, **options: Any) -> "tqdm":
+    """A bar of `tqdm`, which is of this process alone.
+
+    Its own lock would be shared between processes by a semaphore; of a process of a pool that is ended in the middle, Python
+    then tells the user that one was leaked.
+
+    Args:
+        *arguments: Those of `tqdm`.
+        **options: Those of `tqdm`.
+    """
+    from tqdm import tqdm
+
+    if not hasattr(tqdm, "_lock"):
+        tqdm.set_lock(threading.RLock())
+    return tqdm(*arguments, **options)
 
 
 def finish(run: Callable[[], int], interrupted: str) -> int:

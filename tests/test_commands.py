@@ -389,14 +389,18 @@ def test_a_reader_that_leaves_ends_the_command_quietly(world, tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are those of POSIX")
-def test_an_interrupt_ends_a_fit_with_its_processes(world, tmp_path):
+@pytest.mark.parametrize(("engine", "after_s"), [("local", 1), ("local", 8), ("ray", 10)])
+def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_path):
+    if engine == "ray":
+        pytest.importorskip("ray", reason="the optional extra ray is not installed")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "10000"]
+    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "2"]
+    command += ["--iterations", "1000000", "--engine", engine]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True, start_new_session=True)
     while not (tmp_path / "models").is_dir():
         assert process.poll() is None
         time.sleep(0.1)
-    time.sleep(1)  # the processes begin, or are at work
+    time.sleep(after_s)  # the processes begin, or are at work; whichever it is
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
     out, error = process.communicate(timeout=60)
     assert (process.returncode, out, error) == (130, "", "interrupted; what was finished is kept\n")

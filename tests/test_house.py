@@ -357,6 +357,12 @@ def test_a_line_is_told_at_once():
     assert ended.stdout == "a line\n"
 
 
+def test_a_bar_of_a_process_that_is_ended_leaves_no_word_of_semaphores():
+    script = "import os\nfrom enhsim_tf.terminal import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert (ended.stdout, ended.stderr) == ("", "")
+
+
 def test_tensorflow_starts_without_notes_and_standard_error_is_given_back():
     script = (
         "import sys\nfrom enhsim_tf.terminal import start_tensorflow\nstart_tensorflow()\n"
