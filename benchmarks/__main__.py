@@ -10,7 +10,7 @@ import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-ROWS = ("enhancer", "gan", "generation", "loading", "starting", "growth")
+ROWS = ("enhancer", "gan", "second", "generation", "loading", "starting", "growth")
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:

@@ -11,6 +11,7 @@ import numpy as np
 import tensorflow as tf
 
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.enhancer import batches, build_enhancer, fit_windows
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 
@@ -49,8 +50,20 @@ def seconds_of_epoch(model: keras.Model, *data: object, **settings: object) -> f
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
     """Iterations of 200 real, 200 generated and 200 judged rows."""
-    gan = NoiseGAN(build_generator(window), build_discriminator(window, filters, dropout=dropout))
-    noise = tf.constant(np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1)), tf.float32)
+    return _iterations(NoiseGAN(build_generator(window), build_discriminator(window, filters, dropout=dropout)), num_iterations, window)
+
+
+def convolutional_iteration(num_iterations: int, window: int = 500) -> Work:
+    """Iterations of as many rows through the second pair of networks."""
+    return _iterations(convolutional_noise_gan(_example_noise(window)), num_iterations, window)
+
+
+def _example_noise(window: int) -> np.ndarray:
+    return np.random.default_rng(0).normal(0, 0.1, (1_500, window))
+
+
+def _iterations(gan: NoiseGAN, num_iterations: int, window: int) -> Work:
+    noise = tf.constant(_example_noise(window)[:, :, None] / gan.scale, tf.float32)
 
     def run() -> None:
         for _ in range(num_iterations):

@@ -108,6 +108,20 @@ def gan(budget: Budget) -> Iterator[dict]:
                 yield compared(work, found["ours"], name, found[name], "ms", bar, peak_mb=peaks["ours"], their_peak_mb=peaks[name])
 
 
+def second(budget: Budget) -> Iterator[dict]:
+    """One adversarial iteration of the second generator, beside one of the paper's networks."""
+    given = {"num_iterations": budget.iterations}
+    window = {name: value for name, value in budget.gan_size.items() if name == "window"}
+    workers = {
+        "ours": Worker("ours", "convolutional_iteration", **given, **window),
+        "the paper's": Worker("ours", "gan_iteration", **given, **budget.gan_size),
+    }
+    found, peaks, _ = workers_in_turns(workers, budget.repetitions)
+    ours, theirs = found["ours"], found["the paper's"]
+    memory = {"peak_mb": peaks["ours"], "their_peak_mb": peaks["the paper's"]}
+    yield compared("GAN iteration, second generator", ours, "the paper's networks, same package", theirs, "ms", 2.0, **memory)
+
+
 def generation(budget: Budget) -> Iterator[dict]:
     """Windows made, in memory and to Parquet; milliseconds a window."""
     given = {"num_windows": budget.windows, **budget.size}
@@ -210,4 +224,12 @@ def reproduction(rows: list[dict]) -> Iterator[dict]:
         }
 
 
-ROWS = {"enhancer": enhancer, "gan": gan, "generation": generation, "loading": loading, "starting": starting, "growth": growth}
+ROWS = {
+    "enhancer": enhancer,
+    "gan": gan,
+    "second": second,
+    "generation": generation,
+    "loading": loading,
+    "starting": starting,
+    "growth": growth,
+}
