@@ -1,4 +1,4 @@
-"""What the three commands for telemetry of one's own can be asked: their options and their help. Nothing slow is imported."""
+"""What the commands for telemetry of one's own can be asked: their options and their help. Nothing slow is imported."""
 
 import argparse
 from pathlib import Path
@@ -7,7 +7,7 @@ from enhsim_tf.fit_options import FEWEST_SAMPLES
 from enhsim_tf.terminal import Parser
 
 EXAMPLES = """\
-three commands:
+from telemetry to scores:
   python -m enhsim_tf fit telemetry.csv --out models
   python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   python -m enhsim_tf score models new.csv --out scores.parquet

@@ -9,6 +9,7 @@ renames; of a process that is killed between them the old content stands aside, 
 
 import contextlib
 import ctypes
+import functools
 import hashlib
 import json
 import os
@@ -25,8 +26,8 @@ from typing import Any
 
 from enhsim_tf.errors import InputError
 
-_LEFT = re.compile(r"\.(?P<name>.*?)\.(?:(?P<host>[\w-]+)\.(?P<process>\d+)\.)?[0-9a-f]{8}(?P<suffix>\.\w+|)")
-_MOST_LETTERS = 180  # of a file name, encoded: with what temporary names add it stays below the 255 of most file systems
+_LEFT = re.compile(r"\.(?P<name>.*?)\.(?P<host>[\w-]+)\.(?P<process>\d+)\.[0-9a-f]{8}(?P<suffix>\.\w+|)")
+_MOST_LETTERS = 160  # of a file name, encoded: with what two temporary names add (40 each) it stays below the 255 of most file systems
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
 _HERE, _RENAME_EXCHANGE = -100, 2  # AT_FDCWD and the flag, see renameat2(2)
 _OLD_S = 24 * 3600  # no process writes nothing for so long
@@ -36,9 +37,12 @@ def _temporary(path: Path, kind: str = "tmp") -> Path:
     return path.with_name(f".{path.name}.{_host()}.{os.getpid()}.{uuid.uuid4().hex[:8]}.{kind}")
 
 
+@functools.cache
 def _host() -> str:
-    """This machine's name, short and without dots: a process number means nothing on another."""
-    return re.sub(r"[^\w-]", "-", socket.gethostname())[:20] or "host"
+    """What says where a process number means something: this machine, and on it this container. 17 letters, without dots."""
+    name, container = socket.gethostname(), "/proc/self/ns/pid"
+    whole = name + (os.readlink(container) if os.path.islink(container) else "")
+    return f"{re.sub(r'[^A-Za-z0-9-]', '-', name)[:8]}-{hashlib.sha256(whole.encode(errors='replace')).hexdigest()[:8]}"
 
 
 def encoded(name: str) -> str:
@@ -117,15 +121,16 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
                 os.replace(temporary, path)
                 return
             except OSError:
-                if os.path.lexists(path):  # another process has put its own there meanwhile
-                    _remove(old)
-                    continue
-                if os.path.lexists(old):
-                    os.replace(old, path)
-                raise
+                if not os.path.lexists(path):
+                    raise
+                _remove(old)  # another process has put its own there meanwhile
     finally:
         _remove(temporary)
-        _remove(old)
+        if os.path.lexists(old):
+            if os.path.lexists(path):
+                _remove(old)
+            else:  # interrupted between the two renames: what is aside is all that there is
+                os.replace(old, path)
 
 
 def _exchange(first: Path, second: Path) -> bool:
@@ -165,21 +170,13 @@ def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None
         named = _LEFT.fullmatch(left.name)
         if named is None or (name is not None and named["name"] != name):
             continue
-        is_ours, is_file = named["host"] == _host(), left.is_file()
-        is_aside, is_temporary = named["suffix"] == ".old", named["suffix"] == ".tmp"
-        if left.is_symlink() and not is_aside:
-            continue
-        if is_file and not is_aside and not (named["host"] and named["name"].endswith(named["suffix"])):  # not of `replace_file`
-            continue
-        if not is_file and not is_aside and not is_temporary:
-            continue
-        if is_ours and int(named["process"]) != os.getpid():
+        if named["host"] == _host() and int(named["process"]) != os.getpid():
             is_left = not _is_alive(int(named["process"]))
         else:
-            is_left = not is_file and _last_written(left) < _now(folder) - _OLD_S
+            is_left = left.is_dir() and not left.is_symlink() and _last_written(left) < _now(folder) - _OLD_S
         if not is_left:
             continue
-        if is_aside and not os.path.lexists(folder / named["name"]):
+        if named["suffix"] == ".old" and not os.path.lexists(folder / named["name"]):
             with contextlib.suppress(OSError):  # another process was quicker
                 os.replace(left, folder / named["name"])
         else:

@@ -59,7 +59,7 @@ def numbers_of(values: Any, what: str, drop: bool = False, decimal: str | None =
         expected = f"values that float32 holds, up to {_LARGEST:.1e}" if beyond[row] else "numbers"
         raise InputError(
             f"Expected {expected}. Received: {shown(values.iloc[row])} at row {row} of {what}, and {int((bad | beyond).sum()) - 1:,} more. "
-            "Correct them, or leave them out with on_bad_values='drop'."
+            "Correct them, or leave them out with on_bad_values='drop' (--drop-bad)."
         )
     return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
 

@@ -97,7 +97,9 @@ def _cluster() -> Iterator[Any]:
     try:
         import ray
     except ModuleNotFoundError:
-        raise InputError("Expected the package ray for --engine ray. Received: none. Install it: pip install 'enhsim_tf[ray]'.") from None
+        raise InputError(
+            "Expected the package ray for --engine ray. Received: none. Install it, in a clone: python -m pip install '.[ray]'."
+        ) from None
     if ray.is_initialized():
         yield ray
         return

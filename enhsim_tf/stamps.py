@@ -83,7 +83,7 @@ def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> Non
         received = "a time that is far off"
     raise InputError(
         f"Expected times as ISO 8601 date-times or seconds. Received: {received} at row {row} of {what}, and "
-        f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop'."
+        f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
     )
 
 

@@ -30,7 +30,8 @@ def tell(line: str) -> None:
     Args:
         line: Names of channels and folders in it may hold anything.
     """
-    print("\n".join(printable(each) for each in line.split("\n")), flush=True)
+    text, encoding = "\n".join(printable(each) for each in line.split("\n")), getattr(sys.stdout, "encoding", None) or "utf-8"
+    print(text.encode(encoding, "replace").decode(encoding), flush=True)  # a narrow terminal shows what it can
 
 
 def progress(*arguments: Any, **options: Any) -> "tqdm":

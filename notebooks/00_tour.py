@@ -249,6 +249,7 @@ with drawing(alt, len(MODES), 1.5, sharey=True) as panels:
 #    Notebook 04 looks closer.
 # 2. *Enhanced + Gaussian noise*: the simplest noise that matches the scale gives false alarms near those of real telemetry. First check
 #    that it misses no more anomalies than a detector trained on real telemetry does (`experiment.false_alarms["recall"]`), and whether
-#    the real noise is white at all: here it was made so. For noise with structure the Gaussian arm has no right to win.
+#    the real noise is white at all: here it was made so. For noise with structure the Gaussian arm has no right to win. This tour follows
+#    the paper's recipe; `EnhancedSimulator.fit` trains another generator by default, and notebook 22 compares the two.
 #
 # </details>

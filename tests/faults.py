@@ -42,7 +42,8 @@ def as_markdown(table):
         words = "; ".join(f"{count} × {outcome}" if len(outcomes) > 1 else outcome for outcome, count in outcomes.items())
         lines.append(f"| {row['fault']} | {commands[row['of']]} | {row['tries']} | {words} |")
     return (
-        "\n".join(lines) + "\n\nFrom `docs/faults.json`, which `python tests/faults.py fleet` and `python tests/faults.py reproduce` wrote."
+        "\n".join(lines)
+        + "\n\nFrom `docs/faults.json`, which `python tests/faults.py fleet --out docs/faults.json` and the same with `reproduce` wrote."
     )
 
 

@@ -78,7 +78,7 @@ def test_different_names_have_different_folders():
 
 @pytest.mark.parametrize("name", ["", "x" * 181, "漢" * 21])
 def test_names_that_no_folder_can_have_are_refused(refused, tmp_path, name):
-    with refused("1 to 180"):
+    with refused("1 to 160"):
         fit(tmp_path / "models", {name: series(), "volts": series()})
     assert files(tmp_path) == {}
 

@@ -1,4 +1,4 @@
-"""The three commands, end to end: from a dirty table to a simulator, training data and scores; what they refuse, in one line."""
+"""The commands, end to end: from a dirty table to a simulator, training data and scores; what they refuse, in one line."""
 
 import os
 import signal

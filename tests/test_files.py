@@ -299,8 +299,6 @@ def test_leftovers_of_a_killed_process_are_removed(tmp_path):
 
 def test_leftovers_that_may_be_at_work_stay_for_a_day(tmp_path):
     others = [left_by(os.getpid(), tmp_path), left_by(dead_process(), tmp_path, "another-machine")]
-    others.append(tmp_path / ".stage-4567.89abcdef.tmp")  # says nothing of its process
-    others[-1].mkdir()
     for days in (0, 0.9):
         for left in others:
             grow_old(left, days)
@@ -310,17 +308,78 @@ def test_leftovers_that_may_be_at_work_stay_for_a_day(tmp_path):
         grow_old(left, 0.2)
     (others[0] / "below" / "new").write_text("at work")
     files.remove_leftovers(tmp_path)
-    assert [left.is_dir() for left in others] == [True, False, False]
+    assert [left.is_dir() for left in others] == [True, False]
+
+
+def test_what_only_looks_like_a_leftover_stays(tmp_path):
+    mine = [".photos.20240101.tmp", ".model.20240101.old", ".notes.20240101.old", ".notes.2024.20240101.old"]
+    for name in mine:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "kept").write_text("mine")
+        grow_old(tmp_path / name, 400)
+    (tmp_path / "model").mkdir()
+    files.remove_leftovers(tmp_path)
+    assert sorted(path.parent.name for path in tmp_path.glob("*/kept")) == sorted(mine)
+
+
+def test_what_an_exchange_left_of_a_file_or_a_link_is_removed(tmp_path):
+    script = """
+import os, signal, sys
+from enhsim_tf import files
+files._remove = lambda path: os.kill(os.getpid(), signal.SIGKILL)
+with files.replace_folder(sys.argv[1]) as temporary:
+    (temporary / "inside").write_text("new")
+"""
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "link").symlink_to("nowhere")
+    for name in ("file", "link"):
+        assert subprocess.run([sys.executable, "-c", script, str(tmp_path / name)], cwd=ROOT).returncode == -9
+    files.remove_leftovers(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
+    assert [(tmp_path / name / "inside").read_text() for name in ("file", "link")] == ["new", "new"]
+
+
+@pytest.mark.parametrize("can_exchange", [False], indirect=True)
+def test_interrupted_between_the_two_renames_the_old_content_stays(can_exchange, tmp_path, monkeypatch):
+    path, rename = tmp_path / "model", os.replace
+    path.mkdir()
+    (path / "inside").write_text("old")
+
+    def interrupted(source, destination):
+        rename(source, destination)
+        if str(destination).endswith(".old"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt), files.replace_folder(path) as temporary:
+        (temporary / "inside").write_text("new")
+    assert content_of(tmp_path) == {"model/inside": "old"} and [each.name for each in tmp_path.iterdir()] == ["model"]
+
+
+def test_machines_of_nearly_the_same_name_are_told_apart(monkeypatch):
+    seen = []
+    for name in ("gke-prod-cluster-default-pool-aaaa", "gke-prod-cluster-default-pool-bbbb", "x", ""):
+        monkeypatch.setattr(files.socket, "gethostname", lambda name=name: name)
+        seen.append(files._host.__wrapped__())
+    assert len(set(seen)) == 4 and max(map(len, seen)) <= 17 and not any("." in each for each in seen)
+
+
+def test_the_longest_name_has_room_for_two_temporary_ones(tmp_path):
+    path = tmp_path / files.encoded("a" * 160)
+    with (
+        files.replace_folder(path) as outer,
+        files.replace_folder(outer) as inner,
+        files.replace_file(inner / "settings.json") as temporary,
+    ):
+        temporary.write_text("{}")
+    assert (path / "settings.json").read_text() == "{}"
 
 
 def test_nothing_else_is_taken_for_a_leftover(tmp_path):
-    gone = dead_process()
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "kept").write_text("x")
     (tmp_path / "stage-0123").mkdir()
     (tmp_path / ".mine.tmp").mkdir()
-    (tmp_path / f".file.{files._host()}.{gone}.0123abcd.tmp").write_text("x")
-    (tmp_path / f".link.{files._host()}.{gone}.0123abcd.tmp").symlink_to("elsewhere")
     for path in tmp_path.iterdir():
         if not path.is_symlink():
             grow_old(path, 2)

@@ -156,6 +156,12 @@ def test_c8_by_the_rule_of_the_ledger(found):
     quiet = tables()
     quiet["alarms"].loc[quiet["alarms"]["arm"] == "enhanced + GAN", "alarms"] = 4  # below twice two, plus one
     assert robustness_report.verdict_c8(findings.summarise(quiet)) == "holds"
+    assert robustness_report.share_c8(findings.summarise(quiet), "ours + GAN") == (28, 28)
+    recall = quiet["recall"]
+    blind = (recall["arm"] == "enhanced + GAN") & (recall["environment"] == "shot") & (recall["detector"] == next(iter(DETECTORS)))
+    recall.loc[blind, "recall"] -= 0.06  # quiet, since it finds less: more than five points below the real-trained arm
+    assert robustness_report.share_c8(findings.summarise(quiet)) == (27, 28)
+    assert robustness_report.verdict_c8(findings.summarise(quiet)) == "holds in part"
 
 
 def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):

@@ -220,6 +220,8 @@ def test_the_numbers_of_the_promise_are_those_of_the_record():
         f"{total['slowest_s']:.1f}", str(total["more_than_at_first_mib"]),
     )  # fmt: skip
     assert record["command"] in text
+    slow = ("manifest of a model", "settings of a model", "description of a network", "archive of a network", "weights of a network")
+    assert f"they had {sum(record['targets'][name]['inputs'] for name in slow):,} inputs together" in text
     named = re.findall(r"`(tests/test_\w+\.py)(?:::(\w+))?`", text)
     assert len(named) >= 10
     for file, test in named:

@@ -323,3 +323,29 @@ def test_a_readme_of_somebody_else_does_not_spoil_a_run(pretended, tmp_path):
     (tmp_path / "README.md").write_text("# My own project\n")
     assert pretended() == 0
     assert (tmp_path / "README.md").read_text() == "# My own project\n"
+
+
+def test_a_part_of_an_experiment_does_not_take_the_place_of_the_whole(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    header = "chan_id,spacecraft,anomaly_sequences,class,num_values\n"
+    for folder, names in (("shown", "AB"), ("mine", "AC")):
+        Path(folder).mkdir()
+        Path(folder, "labeled_anomalies.csv").write_text(header + "".join(f'{name},X,"[[5, 9]]",[point],100\n' for name in names))
+    labelled = ["--experiment", "labelled", "--data"]
+    assert command.out_folder(parse([*labelled, "mine"])) == Path("figures")  # nothing is shown yet
+    Path("figures/labelled").mkdir(parents=True)
+    Path("figures/labelled/findings.json").write_text(json.dumps({"channels": ["A"], "skipped": {"B": "why"}}))
+    for arguments, out in {
+        "--experiment robustness": "figures",
+        "--experiment robustness --seeds 2": "figures_part",
+        "--experiment robustness --environment shot --budget smoke": "smoke_part",
+        "--experiment labelled --data shown": "figures",
+        "--experiment labelled --data shown --channels A": "figures_shown",
+        "--experiment labelled --data mine": "figures_mine",
+        "--experiment labelled --data mine --out figures": "figures",
+        "--telemetry mine/x.csv": "figures_x",
+        "": "figures",
+    }.items():
+        options = parse(arguments.split())
+        assert command.out_folder(options) == Path(out), arguments
+        assert command.is_other(options) == (out != "figures" and "x.csv" not in arguments or "--out" in arguments), arguments

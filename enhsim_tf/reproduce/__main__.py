@@ -52,7 +52,12 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--only", metavar="FIGURE", help="draw one figure, for example fig04, and judge no claim")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where figures and results.json go (default: figures; smoke: smoke)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="where figures and results.json go (default: figures; smoke: smoke; a channel or part of an experiment: its own)",
+    )
     parser.add_argument("--spread", type=int, default=0, metavar="N", help="judge the claims for N further seeds, ranges in spread.json")
     parser.add_argument(
         "--experiment",
@@ -148,7 +153,7 @@ def run_experiment(options: argparse.Namespace, folder: Path) -> int:
     out = folder / FOLDER
     found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
     tell("\n" + "\n".join(verdict_lines(found)))
-    if options.budget == "full" and out == Path("figures") / FOLDER:
+    if options.budget == "full" and out == Path("figures") / FOLDER and not is_other(options):
         report(found, Path())
     tell(f"tables, findings.json and figures in {out}/")
     return 0
@@ -167,7 +172,7 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     found = run(make_settings(options.budget), cache, options.data, out, chosen, options.fresh, tell)
     tell("\n" + "\n".join(lines(found)))
     kept = findings_of(Path(), "robustness")
-    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None:
+    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None and not is_other(options):
         report(kept, Path())
     tell(f"tables, findings.json and figures in {out}/")
     return 0
@@ -238,9 +243,24 @@ def chosen_figures(only: str | None) -> list[str]:
 
 
 def out_folder(options: argparse.Namespace) -> Path:
-    """Where figures go; a smoke run and a real channel have folders of their own."""
+    """Where figures go; a smoke run, a real channel and what is a part of an experiment have folders of their own."""
     default = "smoke" if options.budget == "smoke" else "figures"
-    return options.out or Path(default if options.telemetry is None else f"{default}_{options.telemetry.stem}")
+    if options.telemetry is not None:
+        default = f"{default}_{options.telemetry.stem}"
+    elif is_other(options):
+        default = f"{default}_{'part' if options.data is None else options.data.resolve().name}"
+    return options.out or Path(default)
+
+
+def is_other(options: argparse.Namespace) -> bool:
+    """Whether an experiment is not the one that the project shows: fewer seeds, one environment, other channels."""
+    if options.experiment != "labelled":
+        return options.seeds is not None or options.environment is not None
+    from enhsim_tf.labelled import read_labels
+    from enhsim_tf.reproduce.robustness_report import findings_of
+
+    shown = findings_of(Path(), "labelled")
+    return bool(options.channels) or (shown is not None and set(read_labels(options.data)) != {*shown["channels"], *shown["skipped"]})
 
 
 def make_folders(options: argparse.Namespace) -> Path:

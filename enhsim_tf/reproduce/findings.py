@@ -98,7 +98,8 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
         "auc_pr": by_replicate(tables["recall"], "auc_pr"),
         "vus_pr": by_replicate(tables["traces"], "vus_pr"),
     }
-    per_detector = rate.groupby(["arm", "environment", "detector"])["rate"].mean()
+    keys = ["arm", "environment", "detector"]
+    per_detector, recalls = rate.groupby(keys)["rate"].mean(), trained(tables["recall"]).groupby(keys)["recall"].mean()
     arms = {}
     for arm in (name for name in ARMS if name in mean_rate):
         closed = gap_closed(mean_rate, arm)
@@ -111,6 +112,7 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
                     "false_alarms": _interval(mean_rate[arm].loc[[name]], ["seed"]),
                     "recall": float(others["recall"][arm].loc[name].mean()),
                     "detectors": {key: float(value) for key, value in per_detector[arm, name].items()},
+                    "recalls": {key: float(value) for key, value in recalls[arm, name].items()},
                 }
                 for name in environments
             },

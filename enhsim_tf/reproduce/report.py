@@ -181,4 +181,7 @@ def timings_table(found: Mapping[str, Any]) -> str:
     """Seconds of each stage in Markdown."""
     rows = [f"| {name} | {seconds:.1f} |" for name, seconds in found["timings"].items()]
     total = sum(found["timings"].values())
-    return "\n".join(["| stage | seconds |", "|---|---|", *rows, f"| **sum** | **{total:.0f}** |"])
+    lines = ["| stage | seconds |", "|---|---|", *rows, f"| **sum** | **{total:.0f}** |"]
+    if found["from_cache"]:
+        lines += ["", f"Found in the cache, with the seconds that they took when they were done: {', '.join(found['from_cache'])}."]
+    return "\n".join(lines)

@@ -200,8 +200,9 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.2,
-        f"Beyond nominal operation the paper's enhancer errs by {errors['paper']['inside']:.2f}; trained over randomised configurations it errs by "
-        f"{errors['randomised']['inside']:.2f} inside the range it saw and {errors['randomised']['outside']:.2f} outside",
+        f"The paper's enhancer errs by {errors['paper']['inside']:.2f} up to severity {found['modes']['largest_trained']} and by "
+        f"{errors['paper']['outside']:.2f} beyond; trained over randomised configurations up to there, by {errors['randomised']['inside']:.2f} and "
+        f"{errors['randomised']['outside']:.2f}",
         f"Root mean square error of the enhanced signal against the true degraded one, in units of the nominal signal's standard deviation; grey: severities "
         f"that the randomised enhancer was trained on; {in_seeds(found['modes']['seeds'])}.",
     )

@@ -36,29 +36,26 @@ def reached(is_reached: bool) -> str:
     return "reached" if is_reached else "**not reached**"
 
 
-def verdict_c8(found: Findings) -> str:
-    """Verdict on claim C8, that detectors trained on the paper's output are robust: by the rule fixed for the ledger.
+def share_c8(found: Findings, arm: str = "enhanced + GAN") -> tuple[int, int]:
+    """In how many pairs of environment and detector an arm keeps the ledger's rule of claim C8, and of how many.
 
-    It holds if, for every environment and detector, false alarms are at most twice the real-trained rate plus a point.
+    False alarms are at most twice the real-trained rate plus a point, and recall is at most five points below the
+    real-trained one.
     """
-    arms = found["arms"]
-    cells = [
-        arms["enhanced + GAN"]["by_environment"][name]["detectors"][detector]
-        <= 2 * arms["real"]["by_environment"][name]["detectors"][detector] + 0.01
-        for name in found["environments"]
-        for detector in arms["real"]["by_environment"][name]["detectors"]
-    ]
-    return "holds" if all(cells) else "holds in part" if any(cells) else "does not hold"
-
-
-def share_c8(found: Findings) -> tuple[int, int]:
-    """In how many pairs of environment and detector the rule of claim C8 is kept, and of how many."""
-    arms, kept, total = found["arms"], 0, 0
+    kept, total = 0, 0
     for name in found["environments"]:
-        for detector, real in arms["real"]["by_environment"][name]["detectors"].items():
-            kept += arms["enhanced + GAN"]["by_environment"][name]["detectors"][detector] <= 2 * real + 0.01
+        given, real = (found["arms"][each]["by_environment"][name] for each in (arm, "real"))
+        for detector, rate in real["detectors"].items():
+            is_quiet = given["detectors"][detector] <= 2 * rate + 0.01
+            kept += is_quiet and given["recalls"][detector] >= real["recalls"][detector] - 0.05
             total += 1
     return kept, total
+
+
+def verdict_c8(found: Findings) -> str:
+    """Verdict on claim C8, that detectors trained on the paper's output are robust: it holds where all pairs keep the rule."""
+    kept, total = share_c8(found)
+    return "holds" if kept == total else "holds in part" if kept else "does not hold"
 
 
 def render(
@@ -91,7 +88,9 @@ def render(
         "share": share,
     }
     words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
-    return environment.get_template(template).render(found=found, labelled=labelled, designs=designs, words=words, c8=share_c8(found))
+    return environment.get_template(template).render(
+        found=found, labelled=labelled, designs=designs, words=words, c8=share_c8(found), c8_ours=share_c8(found, "ours + GAN")
+    )
 
 
 def findings_of(root: Path, name: str) -> Findings | None:
@@ -160,7 +159,8 @@ def table(found: Findings) -> str:
     seeds = found["seeds"]
     return "\n".join(lines) + (
         f"\n\nFalse alarms on {found['num_windows']:,} real nominal windows, mean over seven detectors set for 1 %, with its 95 % interval over "
-        f"{in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five severities. "
+        f"{in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}); recall at the arm's own threshold, mean over eight kinds of anomaly and five "
+        "severities; gap closed: share of the way from *enhanced* to *real*, mean over replicates. "
         "From `figures/robustness/findings.json`."
     )
 
@@ -169,7 +169,7 @@ def verdict_lines(found: Findings) -> list[str]:
     """What the command says at its end."""
     kept, total = share_c8(found)
     lines = [
-        f"C8  {verdict_c8(found)}: with the paper's generated noise, false alarms are near the real-trained ones "
+        f"C8  {verdict_c8(found)}: with the paper's generated noise, false alarms and recall are near the real-trained ones "
         f"in {kept} of {total} pairs of environment and detector"
     ]
     for name, bar in found["bars"].items():
