@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int:
     """Runs what the options ask for and returns the exit code."""
-    if not 0 <= options.seed < 2**31:
+    if options.seed is not None and not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
     return {"fit": run_fit, "generate": run_generate, "verify": run_verify, "score": run_score}[options.command](options)
 
@@ -47,6 +47,7 @@ def run_generate(options: argparse.Namespace) -> int:
         from enhsim_tf.fleet_command import run_fleet
 
         return run_fleet(options, tell)
+    options.seed = options.seed or 0
     from enhsim_tf.training_sets import (
         num_samples_of,
         parse_length,

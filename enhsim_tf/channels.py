@@ -71,7 +71,13 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
         raise InputError(
             f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which holds none. Make one with `fit`."
         )
-    return {urllib.parse.unquote(folder.parent.name): folder.parent for folder in folders}
+    found: dict[str, Path] = {}
+    for folder in (manifest.parent for manifest in folders):
+        name = urllib.parse.unquote(folder.name)
+        if name in found:
+            raise InputError(f"Expected a folder a channel. Received: {found[name].name} and {folder.name}, both of {name!r}. Remove one.")
+        found[name] = folder
+    return found
 
 
 def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:

@@ -104,7 +104,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     large.add_argument(
         "--scenarios", type=Path, metavar="FILE", help="YAML: scenarios with shares and ranges, several models (docs/scenarios.md)"
     )
-    _add_seed(generate)
+    _add_seed(generate, None)  # a scenario file may give another
 
     verify = commands.add_parser("verify", help="check a large data set against its manifest", epilog=EXIT, **form)
     verify.add_argument("folder", type=Path, metavar="FOLDER", help="what `generate --workers` wrote")
@@ -129,8 +129,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _add_seed(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
+def _add_seed(parser: argparse.ArgumentParser, default: int | None = 0) -> None:
+    parser.add_argument("--seed", type=int, default=default, help="seed of everything drawn (default: 0)")
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:

@@ -113,9 +113,19 @@ def check_parquet(path: str | os.PathLike) -> None:
             about = file.metadata
             if about.num_columns > MOST_COLUMNS:
                 raise ValueError(f"more than {MOST_COLUMNS:,} columns")
-            if about.num_rows * max(1, about.num_columns) > max(_FEW_VALUES, _VALUES_A_BYTE * size):
-                raise ValueError(f"{about.num_rows:,} rows in {size:,} bytes, more than a file of telemetry holds; save it as CSV")
-            _check_text(file, max(_FEW_BYTES, _VALUES_A_BYTE * size))
+            chunks = [
+                (about.row_group(group).column(column), about.schema.column(column))
+                for group in range(about.num_row_groups)
+                for column in range(about.num_columns)
+            ]
+            # of a list a row has many values, and one of fixed width may be wide
+            values = max(about.num_rows * max(1, about.num_columns), sum(chunk.num_values for chunk, _ in chunks))
+            if values > max(_FEW_VALUES, _VALUES_A_BYTE * size):
+                raise ValueError(f"{values:,} values in {size:,} bytes, more than a file of telemetry holds; save it as CSV")
+            most_bytes = max(_FEW_BYTES, _VALUES_A_BYTE * size)
+            if sum(chunk.num_values * (column.length or 0) for chunk, column in chunks) > most_bytes:
+                raise ValueError(f"values of fixed width that become {most_bytes:,} bytes and more; save it as CSV")
+            _check_text(file, most_bytes)
     except (*DAMAGES, pa.ArrowException) as error:
         raise ValueError(reason_of(error)) from None
 
@@ -147,11 +157,15 @@ def read_json(path: str | os.PathLike, most_bytes: int) -> Any:
         ValueError: If it is larger, nested too deeply, or no JSON; the message says why.
         OSError: If it cannot be read.
     """
-    path = Path(path)
-    if path.stat().st_size > most_bytes:
-        raise ValueError("a file too large")
+    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
+        raise ValueError("what is no file")
+    with open(path, "rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > most_bytes:
+            raise ValueError("a file too large")
+        content = file.read(size)
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(content.decode())
     except RecursionError:
         raise ValueError("a file nested too deeply") from None
 

@@ -4,7 +4,8 @@ import os
 import re
 
 _MOST_LETTERS, _END = 600, 150  # of a message, and of these at its end, where it says what to do
-_PASSWORD = re.compile(r"(?<=//)[^/@\s]*:[^/\s]*@")  # the name and the password of an address
+_PASSWORD = re.compile(r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)")
+"""The name and the password of an address: behind its //, up to the @; or, of one without, before `@host:port`."""
 _TOKEN, _LEAST_TOKEN = "INFLUXDB_V2_TOKEN", 8  # what is shorter is a word that a message may need
 
 
@@ -21,7 +22,9 @@ class InputError(ValueError):
     def __init__(self, message: str = ""):
         line = printable(" ".join(str(message).splitlines()))
         token = os.environ.get(_TOKEN, "")
-        line = _PASSWORD.sub("***@", line.replace(token, "***") if len(token) >= _LEAST_TOKEN else line)
+        for form in (token, repr(token)[1:-1]) if len(token) >= _LEAST_TOKEN else ():  # as it is, and as a message quotes it
+            line = line.replace(form, "***")
+        line = _PASSWORD.sub("***@", line)
         if len(line) > _MOST_LETTERS:
             line = f"{line[: _MOST_LETTERS - _END - 5]} ... {line[-_END:]}"
         super().__init__(line)

@@ -59,6 +59,8 @@ def generate_fleet(
                 _generate(out, plan, workers, engine, tell)
             finally:
                 clear(out)
+    except BrokenPipeError:  # whoever read what is told has left
+        raise
     except OSError as error:
         raise InputError(f"Expected a folder that can be written to. Received: {out} ({error.strerror or error}).") from None
 
@@ -85,6 +87,11 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
                 raise InputError(
                     f"Expected {file_of(record.shard)} to become what was recorded of it in {out}. Received: other bytes: this machine "
                     f"computes otherwise, or the record is damaged. Remove {MANIFEST} and run the same command again: all shards are made again."
+                )
+            if not (out / file_of(record.shard)).is_file():
+                raise InputError(
+                    f"Expected {file_of(record.shard)} in {out} after it was written. Received: no such file here: another machine wrote it. "
+                    "Name an --out that all machines share."
                 )
             write(record)
             records[record.shard] = record

@@ -8,6 +8,7 @@ import hashlib
 import importlib.metadata
 import json
 import os
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -150,8 +151,8 @@ def _model_of(share: ModelShare, folder: Path) -> Model:
     """Looks at a saved simulator without loading it: its checksums, its window, its interval."""
     check_saved(folder)
     interval_s = settings_of(folder).get("interval_s")
-    if type(interval_s) not in (int, float) or not 0 < interval_s < float("inf"):
-        raise InputError(f"Expected interval_s above 0 in settings.json. Received: {interval_s!r} in {folder}.")
+    if type(interval_s) not in (int, float) or not 0 < interval_s <= sys.float_info.max:
+        raise InputError(f"Expected interval_s above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
     return Model(share.name, folder, share.share, sha256(folder / MANIFEST), _window_of(folder), float(interval_s))
 
 

@@ -8,6 +8,7 @@ is whole. The series of others are read as they are stored.
 import dataclasses
 import hashlib
 import json
+import re
 import urllib.parse
 from collections.abc import Iterator, Mapping
 from typing import Any, NoReturn
@@ -21,6 +22,7 @@ from enhsim_tf.telemetry import Telemetry, check_telemetry, nanoseconds
 SCHEME = "influxdb://"
 _ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions stand in the year 2100, where no bucket's retention ends
 _CHANNEL, _VERSION = "channel", "version"  # the tags of a series of ours
+_IS_VERSION = re.compile(r"[0-9a-f]{16}")
 _DESCRIBED = [field.name for field in dataclasses.fields(Telemetry) if field.name != "values"]
 _SHOWN = 8  # names that a message lists
 
@@ -133,7 +135,8 @@ class InfluxStore:
         self.server.send(f'{_ABOUT}{_tag_set(key)} about="{text}" {_ABOUT_NS}')
         rows = self.server.ask(f"{self.server.points()} {self._filter({_CHANNEL: tags[_CHANNEL]})} |> first()")
         for old in {row[_VERSION] for row in rows if _VERSION in row and _tags_of(row) == tags | {_VERSION: row[_VERSION]}} - {version}:
-            self.server.delete(f'{_VERSION}="{old}"')
+            if _IS_VERSION.fullmatch(old):  # not the tag of somebody else that happens to have this name
+                self.server.delete(f'{_VERSION}="{old}"')
 
     def read(self, name: str) -> Telemetry:
         """The series kept under `name`.

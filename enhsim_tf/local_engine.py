@@ -35,7 +35,7 @@ class ProcessesDiedError(InputError):
 
 
 class Deaths:
-    """Counts processes that died in a row."""
+    """Counts processes that died in a row, each in the place of the one before it."""
 
     def __init__(self):
         self.count = 0

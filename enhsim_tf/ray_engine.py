@@ -55,35 +55,37 @@ def run_ray(begin: Callable[[], Any], items: Iterator[Any], workers: int | None)
     with _cluster() as ray:
         cpus = max(1.0, ray.cluster_resources().get("CPU", 1.0))
         first = list(itertools.islice(items, workers or int(cpus)))
-        again, items, deaths = collections.deque(), itertools.chain(first, items), Deaths()
+        again, items = collections.deque(), itertools.chain(first, items)
         share = round(min(_ACTOR_CPUS, _ACTOR_CPUS * cpus / max(1, len(first))), 4)
         make = ray.remote(_Actor).options(num_cpus=max(share, 1e-4), scheduling_strategy="SPREAD").remote
         lost = tuple(getattr(ray.exceptions, f"{name}Error") for name in ("RayActor", "ObjectLost", "NodeDied", "OutOfMemory"))
-        waiting: dict[Any, tuple[Any, Any]] = {}
+        waiting: dict[Any, tuple[Any, Any, Deaths]] = {}
 
-        def ask(actor: Any, item: Any) -> None:
-            waiting[actor.call.remote(item)] = actor, item
+        def ask(actor: Any, item: Any, deaths: Deaths) -> None:
+            waiting[actor.call.remote(item)] = actor, item, deaths
 
-        for _ in first:
-            ask(make(begin), None)  # an actor that finds no room yet holds no item that another could do
+        every = [Deaths() for _ in first]  # of an actor and those in its place: a node that is lost ends many, each of them once
+        for deaths in every:
+            ask(make(begin), None, deaths)  # an actor that finds no room yet holds no item that another could do
         while waiting:
             (done,), _ = ray.wait(list(waiting), num_returns=1)
-            actor, item = waiting.pop(done)
+            actor, item, deaths = waiting.pop(done)
             try:
                 kind, result = ray.get(done)
             except lost as error:
                 deaths.add([] if item is None else [item], _last_line(error))
                 again.extend([] if item is None else [item])
-                ask(make(begin), None)
+                ask(make(begin), None, deaths)
                 continue
             if kind == "refused":
                 raise InputError(result)
             if kind == "done":
-                deaths.end()
+                for deaths_of_one in every:
+                    deaths_of_one.end()
             following = again.popleft() if again else next(items, None)
             if following is not None:
-                ask(actor, following)
-            elif not any(each is not None for _, each in waiting.values()):
+                ask(actor, following, deaths)
+            elif not any(each is not None for _, each, _ in waiting.values()):
                 waiting.clear()  # what is left are actors that never found room
             if kind == "done":
                 yield result

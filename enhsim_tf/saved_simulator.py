@@ -121,11 +121,13 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
 
     folder = Path(folder)
     check_saved(folder)
-    settings = settings_of(folder)
+    settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
     try:
         for name in _NETWORKS:
             check_network(folder / f"{name}.keras")
         networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
+        if sha256(folder / MANIFEST) != as_checked:  # a new simulator took its place meanwhile, and the networks may be of both
+            raise ValueError("it was replaced while it was read; try again")
         return make(networks, settings)
     except (*DAMAGES, tf.errors.OpError) as error:
         reason = (str(error).splitlines() or [""])[0]

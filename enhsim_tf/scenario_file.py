@@ -79,8 +79,11 @@ def mix_of(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
         raise InputError(f"Expected a nominal share from 0 to 1. Received: {nominal_share}.")
     if not scenarios:
         return Mix()
+    late = [each.onset for each in scenarios if each.onset > _LATEST_ONSET]
+    if late:
+        raise InputError(f"Expected an onset from 0 to {_LATEST_ONSET}. Received: {late[0]}. Choose an earlier one.")
     share = (1 - nominal_share) / len(scenarios)
-    parts = [ScenarioShare(each.mode, share, (each.severity,) * 2, (min(each.onset, _LATEST_ONSET),) * 2) for each in scenarios]
+    parts = [ScenarioShare(each.mode, share, (each.severity,) * 2, (each.onset,) * 2) for each in scenarios]
     return Mix(nominal_share, tuple(parts))
 
 

@@ -15,16 +15,17 @@ from typing import Any
 
 from enhsim_tf.declared_sizes import read_json
 from enhsim_tf.errors import InputError
-from enhsim_tf.files import make_folder, sha256, write_json
+from enhsim_tf.files import sha256, write_json
 from enhsim_tf.fleet_plan import FORMAT, MOST_VALUES, Plan, key_of
 from enhsim_tf.scenario_file import MOST_WINDOWS
 from enhsim_tf.shards import Record, file_of, schema_of
 
 MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of a folder of Parquet files pass over such names
-_SHARD = re.compile(r"shard-\d{6,}\.parquet")
+_SHARD = re.compile(r"shard-(\d{6,})\.parquet")
 _LEFT = re.compile(r"\.(shard-\d{6,}\.parquet|_manifest\.json)\..*")  # a temporary name of `replace_file`
 _SHA256 = re.compile("[0-9a-f]{64}")
-_MOST_BYTES = 1_000_000_000  # of a manifest or journal
+_MOST_BYTES = 1_000_000_000  # of a manifest
+_LONGEST_LINE = 1_000  # of the journal, in bytes; what is longer comes in pieces without sense
 
 
 @contextlib.contextmanager
@@ -34,13 +35,17 @@ def held(folder: Path) -> Iterator[None]:
     Raises:
         InputError: If another run holds it, or it cannot be written to.
     """
-    make_folder(folder)
     try:
-        import fcntl
-    except ModuleNotFoundError:  # no such lock on Windows
-        yield
-        return
-    with open(folder / _LOCK, "ab") as lock:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = open(folder / _LOCK, "ab")  # noqa: SIM115  no probe beside it: another run may be looking at what is there
+    except OSError as error:
+        raise InputError(f"Expected a folder that can be written to. Received: {folder} ({error.strerror}). Name another.") from None
+    with lock:
+        try:
+            import fcntl
+        except ModuleNotFoundError:  # no such lock on Windows
+            yield
+            return
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -67,7 +72,8 @@ def check_folder(folder: Path, plan: Plan) -> None:
                 raise InputError(f"Expected {name} as this data set was begun: {was}. Received: {now}. Name another --out than {folder}.")
         return
     others = sorted(name for name in names if name != JOURNAL and not _SHARD.fullmatch(name) and not _LEFT.fullmatch(name))
-    others += sorted(name for name in names if _SHARD.fullmatch(name) and _key_in(folder / name) != plan.key)
+    shards = {name: int(found[1]) for name in sorted(names) if (found := _SHARD.fullmatch(name))}
+    others += [name for name, number in shards.items() if number >= plan.num_shards or _key_in(folder / name) != plan.key]
     if others:
         raise InputError(f"Expected a new folder, or one of this data set. Received: {folder}, which holds {others[0]!r}. Name another.")
 
@@ -133,7 +139,7 @@ def read_records(folder: Path) -> dict[int, Record]:
     if not (folder / JOURNAL).exists():
         return records
     with open(folder / JOURNAL, "rb") as journal:
-        for line in journal:
+        while line := journal.readline(_LONGEST_LINE):
             try:
                 record = Record(*json.loads(line))
             except (ValueError, TypeError, RecursionError):

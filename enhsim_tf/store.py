@@ -76,6 +76,10 @@ class ParquetStore:
         if not telemetry.name or not len(telemetry):
             raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
         channel = self._channel(telemetry.name)
+        others = sorted(path.name for path in channel.iterdir() if path.suffix != ".parquet") if channel.is_dir() else []
+        if others or channel.is_file():
+            what = f"which holds {others[0]!r}" if others else "a file"
+            raise InputError(f"Expected a place for the series. Received: {channel}, {what}. Name another folder for the store.")
         make_folder(self.folder)
         times = nanoseconds(telemetry)
         described = {

@@ -88,7 +88,7 @@ def main():
             while sum(outcomes.values()) < tries and attempts < 3 * tries:
                 outcome = harm(bench, f"try-{number}-{attempts}", rng)
                 attempts += 1
-                if not outcome.startswith(MISSED):
+                if not outcome.startswith(MISSED) or "NOT" in outcome:
                     outcomes[outcome] = outcomes.get(outcome, 0) + 1
             row = {"of": options.of, "fault": fault, "tries": sum(outcomes.values()), "outcomes": outcomes}
             table.append(row | {"missed": attempts - sum(outcomes.values()), "seed": options.seed})

@@ -69,6 +69,16 @@ def threads_and_square(number):
     return number**2, os.getpid(), os.environ["TF_NUM_INTRAOP_THREADS"], "tensorflow" in sys.modules
 
 
+def meet(folder, num_processes, number):
+    """Work that waits until there are so many processes at it."""
+    import os
+
+    (folder / str(os.getpid())).touch()
+    while len(os.listdir(folder)) < num_processes:
+        time.sleep(0.01)
+    return number
+
+
 def threads_of(number):
     """How many threads a process has: TensorFlow's, and those of linear algebra."""
     import os

@@ -76,7 +76,15 @@ def test_different_names_have_different_folders():
     assert len({folder_of("m", name) for name in HOSTILE}) == len(HOSTILE)
 
 
-@pytest.mark.parametrize("name", ["", "x" * 181, "漢" * 21])
+def test_two_folders_of_one_name_are_refused(refused, tmp_path):
+    for name in ("a b", "a%20b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "manifest.json").write_text("{}")
+    with refused("a b", "a%20b"):
+        models_of(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["", "x" * 161, "漢" * 21])
 def test_names_that_no_folder_can_have_are_refused(refused, tmp_path, name):
     with refused("1 to 160"):
         fit(tmp_path / "models", {name: series(), "volts": series()})

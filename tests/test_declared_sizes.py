@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -94,11 +95,22 @@ def test_a_table_that_would_fill_the_memory_is_refused(tmp_path):
     path = tmp_path / "x.parquet"
     path.write_bytes(repeated(30_000_000))
     assert path.stat().st_size < 150_000
-    with pytest.raises(ValueError, match="30,000,000 rows"):
+    with pytest.raises(ValueError, match="30,000,000 values"):
         check_parquet(path)
     path.write_bytes(repeated(1_000_000, "long " * 20_000))  # 100 GB of text
     assert path.stat().st_size < 100_000
     with pytest.raises(ValueError, match="text that becomes"):
+        check_parquet(path)
+    lists = pa.array([[0.0] * 100_000] * 200, pa.list_(pa.float64()))  # 160 MB in few rows
+    pq.write_table(pa.table({"x": lists}), path, compression="zstd")
+    assert path.stat().st_size < 150_000
+    with pytest.raises(ValueError, match="20,000,000 values"):
+        check_parquet(path)
+    wide = pa.array([b"w" * 1_000_000] * 2, pa.binary(1_000_000)).dictionary_encode()
+    wide = pa.DictionaryArray.from_arrays(pa.array(np.zeros(4_000, np.int32)), wide.dictionary)
+    pq.write_table(pa.table({"x": wide}), path, compression="zstd")  # 4 GB
+    assert path.stat().st_size < 150_000
+    with pytest.raises(ValueError, match="fixed width|text that becomes"):
         check_parquet(path)
     pq.write_table(pa.table({str(number): [1.0] for number in range(MOST_COLUMNS + 1)}), path)
     with pytest.raises(ValueError, match="columns"):
@@ -123,6 +135,15 @@ def test_json_that_is_none_or_too_large_or_too_deep_is_refused(tmp_path, content
         read_json(path, 1_000 if content == " " * 2_000 else 10**7)
     path.write_text(json.dumps({"a": [1, None]}))
     assert read_json(path, 100) == {"a": [1, None]}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes of a name")
+def test_a_pipe_is_no_file_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "x.json")
+    with pytest.raises(ValueError, match="no file"):
+        read_json(tmp_path / "x.json", 100)
+    with pytest.raises(FileNotFoundError):
+        read_json(tmp_path / "y.json", 100)
 
 
 BOMBS = {

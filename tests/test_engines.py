@@ -1,5 +1,6 @@
 """Engines: every number once, whoever dies; one thread each; one line where they cannot work."""
 
+import functools
 import importlib.util
 import itertools
 import multiprocessing
@@ -8,7 +9,7 @@ import signal
 import sys
 
 import pytest
-from fleet_works import PlainMaker, die_at_thirteen, plan, refuse, threads_and_square, threads_of
+from fleet_works import PlainMaker, die_at_thirteen, meet, plan, refuse, threads_and_square, threads_of
 
 from enhsim_tf import engines, ray_engine
 from enhsim_tf.local_engine import ProcessesDiedError
@@ -98,6 +99,14 @@ def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, re
             if len(found) == 20:
                 os.kill(done[1], signal.SIGKILL)
         assert sorted(found) == [number**2 for number in range(60)]
+        (tmp_path / "met").mkdir()
+        running, found = engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8), []
+        for done in running:
+            found.append(done)
+            if len(found) == 1:  # all eight at once, as a node that is lost takes all its actors
+                for process in os.listdir(tmp_path / "met"):
+                    os.kill(int(process), signal.SIGKILL)
+        assert sorted(found) == list(range(60)) and len(os.listdir(tmp_path / "met")) > 8
         assert list(engines.run("ray", threads_of, [1], 1, threads=2)) == [("2", {1})]
         with refused("another number"):
             list(engines.run("ray", refuse, range(5), 1))

@@ -219,6 +219,21 @@ def test_save_load_generate_gives_equal_bits(saved):
     assert (judged[0] == judged[1]).all()
 
 
+def test_a_simulator_that_takes_the_place_of_another_while_that_is_read_is_not_mixed_with_it(copied, monkeypatch, refused):
+    load, other = keras.saving.load_model, small(seed=1)
+
+    def replaced_meanwhile(path, **options):
+        if path.name == "generator.keras":
+            other.save(copied)
+        return load(path, **options)
+
+    monkeypatch.setattr(keras.saving, "load_model", replaced_meanwhile)
+    with refused("try again"):
+        EnhancedSimulator.load(copied)
+    monkeypatch.undo()
+    assert (EnhancedSimulator.load(copied).generate(3, seed=0) == other.generate(3, seed=0)).all()
+
+
 def test_saving_again_replaces_the_folder(saved, copied):
     (copied / "stray.txt").write_text("x")
     other = small(seed=1)

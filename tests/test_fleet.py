@@ -209,6 +209,65 @@ def test_a_record_that_does_not_come_true_is_not_passed_over(undisturbed, tmp_pa
         generate_fleet(folder, plan())
 
 
+def test_a_shard_that_another_machine_kept_is_not_believed(tmp_path, here, monkeypatch, refused):
+    class Elsewhere(fleet.ShardMaker):
+        def __call__(self, shard):
+            record = super().__call__(shard)
+            if shard == 3:
+                (self.folder / file_of(shard)).unlink()
+            return record
+
+    maker = fleet.ShardMaker
+    monkeypatch.setattr(fleet, "ShardMaker", Elsewhere)
+    with refused(file_of(3), "all machines share"):
+        generate_fleet(tmp_path / "set", plan())
+    monkeypatch.setattr(fleet, "ShardMaker", maker)
+    assert told(generate_fleet, tmp_path / "set", plan())[0].startswith("3 of 20 shards")
+
+
+def test_shards_of_a_larger_data_set_are_not_left_beside_a_smaller(undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    (folder / "_manifest.json").unlink()
+    with refused(file_of(10)):
+        generate_fleet(folder, plan(500))
+    assert not here
+
+
+def test_what_looks_at_a_folder_writes_nothing_but_the_lock(tmp_path, refused):
+    from enhsim_tf.shard_folder import held
+
+    with held(tmp_path / "above" / "set"):
+        assert os.listdir(tmp_path / "above" / "set") == [".lock"]
+    (tmp_path / "file").touch()
+    with refused("can be written to"), held(tmp_path / "file" / "set"):
+        pass
+
+
+def test_a_line_without_end_in_the_journal_takes_no_memory(undisturbed, tmp_path):
+    import tracemalloc
+
+    from enhsim_tf.shard_folder import read_records
+
+    folder = copy_of(undisturbed, tmp_path / "set")
+    manifest = json.loads((folder / "_manifest.json").read_text())
+    lines = [json.dumps([shard, 50, manifest["shards"][shard]["sha256"]]).encode() + b"\n" for shard in (1, 2)]
+    (folder / "_manifest.json").write_text(json.dumps(manifest | {"shards": None}))
+    (folder / "_journal.jsonl").write_bytes(lines[0] + b"[" * 20_000_000 + b"\n" + lines[1])
+    tracemalloc.start()
+    found = read_records(folder)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert sorted(found) == [1, 2] and peak < 1_000_000
+
+
+def test_a_reader_who_has_left_is_no_fault_of_the_folder(tmp_path, here):
+    def left(line):
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        generate_fleet(tmp_path / "set", plan(), tell=left)
+
+
 # other folders
 
 
@@ -296,7 +355,7 @@ def started(folder, *options, **how):
 
 def wait_for(folder, num_shards, process):
     """Waits until a run has written some shards; the moment is that of a file, not of a clock."""
-    while sum(name.startswith("shard-") for name in os.listdir(folder) if folder.is_dir()) < num_shards and process.poll() is None:
+    while len(list(folder.glob("shard-*"))) < num_shards and process.poll() is None:
         time.sleep(0.002)
 
 
@@ -450,6 +509,10 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
         (["--scenarios", "mix.yaml", "--scenario", "stuck:0.5"], "--scenario"),
         (["--scenarios", "mix.yaml", "--windows", "9"], "10 in the scenario file"),
         (["--scenarios", "mix.yaml", "--seed", "2"], "seed"),
+        (["--scenarios", "mix.yaml", "--seed", "0"], "seed"),
+        (["--workers", "1", "--windows", "9", "--start", "2024-01-01"], "--start"),
+        (["--workers", "1", "--windows", "9", "--nominal-share", "0.3"], "--nominal-share"),
+        (["--workers", "1", "--windows", "9", "--scenario", "stuck:0.5:0.9995"], "0.9995"),
         (["--scenarios", "mix.yaml", "--channel", "volts"], "--channel"),
         (["--engine", "local", "--windows", "9", "--channel", "x"], "'x'"),
         (["--engine", "spark", "--windows", "9"], "spark"),

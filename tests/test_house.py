@@ -357,6 +357,16 @@ def test_a_line_is_told_at_once():
     assert ended.stdout == "a line\n"
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_narrow_terminal_shows_what_it_can(encoding):
+    script = "from enhsim_tf.terminal import tell\ntell('Größe 漢')"
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding})
+    assert (ended.stdout.decode(encoding), ended.stderr) == (
+        {"ascii": "Gr??e ?\n", "latin-1": "Größe ?\n"}.get(encoding, "Größe 漢\n"),
+        b"",
+    )
+
+
 def test_a_bar_of_a_process_that_is_ended_leaves_no_word_of_semaphores():
     script = "import os\nfrom enhsim_tf.terminal import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)

@@ -76,6 +76,20 @@ def test_no_refusal_repeats_a_password(address, tmp_path):
             assert PASSWORD not in told
 
 
+@pytest.mark.parametrize(
+    "address", ["influxdb://user:se/cret@host/m", "https://se:cr et@b/x", "user:pw@host:10001", "'user:pw@[::1]:1'", "ray://:pass@h:1"]
+)
+def test_passwords_of_unusual_addresses_are_hidden(address):
+    line = str(InputError(f"Expected a. Received: {address}. Do c."))
+    assert "***@" in line and not any(secret in line for secret in ("cret", "cr et", "pw", "pass"))
+
+
+@pytest.mark.parametrize("token", ["it's secret", "back\\slash-and-more"])
+def test_no_refusal_repeats_the_token_as_it_is_quoted(monkeypatch, token):
+    monkeypatch.setenv("INFLUXDB_V2_TOKEN", token)
+    assert str(InputError(f"Expected a. Received: {[token]!r}.")).count("***") == 1
+
+
 @pytest.mark.parametrize("token", [TOKEN, "x" * 2_000, "a.b*c[d\\e"])
 def test_no_refusal_repeats_the_token(monkeypatch, token):
     monkeypatch.setenv("INFLUXDB_V2_TOKEN", token)

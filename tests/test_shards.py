@@ -171,6 +171,15 @@ def test_damaged_models_are_refused(copied, file, damage, refused):
         plan_of(Mix(), copied, 0, 10)
 
 
+@pytest.mark.parametrize("interval", ["1" + "0" * 400, "-1", "1e999", "true", '"2"', "null"])
+def test_an_interval_that_is_none_is_refused(copied, interval, refused):
+    settings = json.loads((copied / "settings.json").read_text())
+    (copied / "settings.json").write_text(json.dumps(settings | {"interval_s": 12345}).replace("12345", interval))
+    vouch(copied)
+    with refused("interval_s"):
+        plan_of(Mix(), copied, 0, 10)
+
+
 def vouch(folder):
     from test_enhanced_simulator import vouch_for
 

@@ -6,6 +6,7 @@ import pytest
 from round_trips import BEYOND, ROUND_TRIPS, same, series
 
 from enhsim_tf.store import ParquetStore
+from enhsim_tf.telemetry import Telemetry
 
 
 @pytest.mark.parametrize("about", ROUND_TRIPS.values(), ids=ROUND_TRIPS)
@@ -61,6 +62,16 @@ def test_series_without_a_name_does_not_take_the_place_of_the_store(tmp_path, re
     with refused():
         store.write(series(10, name=""))
     assert store.names() == ["neighbour"]
+
+
+def test_a_folder_of_something_else_is_left_as_it_is(tmp_path, refused):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "thesis.tex").write_text("mine")
+    (tmp_path / "notes").write_text("mine")
+    for name, what in (("docs", "thesis.tex"), ("notes", "a file")):
+        with refused(what):
+            ParquetStore(tmp_path).write(Telemetry(np.arange(3.0, dtype=np.float32), name=name))
+    assert (tmp_path / "docs" / "thesis.tex").read_text() == (tmp_path / "notes").read_text() == "mine"
 
 
 def test_series_without_samples_is_refused(tmp_path, refused):

@@ -39,6 +39,13 @@ class Outcome:
     why: str = ""
 
 
+def _is_of_memory(error: BaseException | None) -> bool:
+    """Whether memory that the limit did not give stands behind an error: what refuses in time never asks for it."""
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__context__
+    return error is not None
+
+
 def judge(run: Callable[[bytes, Path], None], data: bytes, folder: Path) -> Outcome:
     """Runs one input in an empty folder.
 
@@ -62,7 +69,7 @@ def judge(run: Callable[[bytes, Path], None], data: bytes, folder: Path) -> Outc
         verdict, why = "accepted", ""
     except InputError as error:
         why = str(error)
-        verdict = "refused" if is_good(why) else "failed"
+        verdict = "refused" if is_good(why) and not _is_of_memory(error) else "failed"
     except UnusedError:
         verdict, why = "unused", ""
     except TooLong:
