@@ -8,7 +8,6 @@ import sys
 import time
 
 from faults_in_common import MISSED, ROOT, Bench, clock_change, flip, full_disk, interrupt, kill, not_one_line, read_only
-from test_enhanced_simulator import small
 from test_fleet import children_of, content_of
 
 MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n"
@@ -20,6 +19,8 @@ class FleetBench(Bench):
     same = "same bytes"
 
     def __init__(self, folder):
+        from test_enhanced_simulator import small  # TensorFlow takes a while, and filling the README needs none
+
         small(window=60).save(folder / "models" / "volts")
         (folder / "mix.yaml").write_text(MIX)
         super().__init__(folder)
