@@ -26,24 +26,28 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
     nearest = [min(each, key=each.get) for each in all_errors]
     figure, down = new_sheet(
         SINGLE,
-        1.6 + 0.24 * len(channels),
+        1.7 + 0.3 * len(channels),
         f"The enhancer is nearest to real telemetry on {nearest.count('enhanced')} of {len(nearest)} channels; ridge regression, given its clock, "
         f"on {nearest.count('ridge, same clock')}",
         "Median error over nominal test windows, in standard deviations of each window, once clock, level and amplitude are set to that window. "
         "Hollow: ridge regression with the clock that the enhanced shape finds.",
     )
-    axes = panels(figure, down + 0.2, 1, 1)[0, 0]
+    axes = panels(figure, down + 0.4, 1, 1)[0, 0]
     place = axes.get_position()
     axes.set_position([0.16, place.y0 + 0.03, 0.8, place.height - 0.03])
-    marks = (("coarse", "s", COARSE), ("ridge", "^", AVERAGE), ("ridge, same clock", "^", AVERAGE), ("enhanced", "o", ENHANCED))
-    for method, marker, colour in marks:
+    marks = (
+        ("coarse", "s", COARSE, COARSE, 0.0),
+        ("enhanced", "o", ENHANCED, ENHANCED, 0.0),
+        ("ridge", "^", AVERAGE, AVERAGE, 0.3),  # beside the row, where no other mark covers it
+        ("ridge, same clock", "^", AVERAGE, "none", -0.3),
+    )
+    for method, marker, colour, inside, beside in marks:
         values = [about["nrmse"][method] for about in channels.values()]
-        inside = "none" if "," in method else colour
-        axes.plot(values, -np.arange(len(values)), marker, color=colour, markerfacecolor=inside, markersize=5, label=method)
+        axes.plot(values, beside - np.arange(len(values)), marker, color=colour, markerfacecolor=inside, markersize=5, label=method)
     axes.set_yticks(-np.arange(len(channels)), list(channels))
     axes.set_xlim(0, 1.08 * max(max(each.values()) for each in all_errors))
     axes.set_xlabel("NRMSE")
-    axes.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(-0.05, 1.0), handletextpad=0.2, columnspacing=1.0)
+    axes.legend(frameon=False, ncols=2, loc="lower left", bbox_to_anchor=(-0.05, 1.0), handletextpad=0.2, columnspacing=1.0)
     return figure
 
 
