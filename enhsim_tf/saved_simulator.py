@@ -4,6 +4,7 @@ It knows files and checksums, and that Keras opens them in safe mode; not what t
 """
 
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,10 +126,12 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
     try:
         for name in _NETWORKS:
             check_network(folder / f"{name}.keras")
-        networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # of a layer that the file has no weights for, Keras only warns
+            networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
         if sha256(folder / MANIFEST) != as_checked:  # a new simulator took its place meanwhile, and the networks may be of both
             raise ValueError("it was replaced while it was read; try again")
         return make(networks, settings)
-    except (*DAMAGES, tf.errors.OpError) as error:
+    except (*DAMAGES, UserWarning, tf.errors.OpError) as error:
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

@@ -67,6 +67,13 @@ def test_the_model_as_it_was_written_loads(tmp_path):
     assert EnhancedSimulator.load(model).generate(2).shape == (2, 24) and plan_of(Mix(), model, 0, 5).window == 24
 
 
+@pytest.mark.filterwarnings("default")  # as it is for users: Keras would warn, and keep weights that nobody trained
+def test_a_network_whose_weights_are_those_of_another_is_refused(refused_without_running):
+    content = json.loads(member_of("generator", "config.json"))
+    content["config"]["name"] = "enhancer"
+    refused_without_running("no matching group", enhancer_keras=enhancer_of(content))
+
+
 def test_marshalled_code_in_a_lambda_layer_does_not_run(tmp_path, refused_without_running):
     import base64
 
