@@ -10,6 +10,7 @@ import itertools
 import logging
 import os
 import socket
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -109,12 +110,14 @@ def _cluster() -> Iterator[Any]:
     address = os.environ.get("RAY_ADDRESS")
     local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # nothing large travels
     _check_address(address)
-    with _Starting(f"at {address}" if address else "that starts here", (*_REFUSALS, ray.exceptions.RayError)):
-        ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
     try:
+        starting = _Starting(f"at {address}" if address else "that starts here", (*_REFUSALS, ray.exceptions.RayError))
+        with starting, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a server that does not answer it warns, and then raises
+            ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
         yield ray
     finally:
-        ray.shutdown()
+        ray.shutdown()  # also of what did not start: Ray would go on asking the server that was not there
 
 
 class _Starting:

@@ -135,6 +135,18 @@ def test_a_cluster_that_does_not_start_is_one_line(error, monkeypatch, refused):
 
 
 @with_ray
+def test_after_a_server_that_is_not_there_a_cluster_of_this_machine_starts(monkeypatch, refused):
+    from enhsim_tf.ray_engine import _cluster
+
+    monkeypatch.setenv("RAY_ADDRESS", "ray://127.0.0.1:9")
+    with refused("ray://127.0.0.1:9"), _cluster():
+        pass
+    monkeypatch.delenv("RAY_ADDRESS")
+    with _cluster() as ray:
+        assert ray.is_initialized()
+
+
+@with_ray
 def test_a_cluster_that_is_not_there_is_one_line(monkeypatch, refused):
     monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")
     with refused("127.0.0.1:1"):

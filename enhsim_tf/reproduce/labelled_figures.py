@@ -26,7 +26,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
     nearest = [min(each, key=each.get) for each in all_errors]
     figure, down = new_sheet(
         SINGLE,
-        1.7 + 0.3 * len(channels),
+        2.3 + 0.2 * len(channels),
         f"The enhancer is nearest to real telemetry on {nearest.count('enhanced')} of {len(nearest)} channels; ridge regression, given its clock, "
         f"on {nearest.count('ridge, same clock')}",
         "Median error over nominal test windows, in standard deviations of each window, once clock, level and amplitude are set to that window. "
