@@ -43,6 +43,10 @@ def run_fit(options: argparse.Namespace) -> int:
 
 def run_generate(options: argparse.Namespace) -> int:
     """Generates labelled training data from each channel's simulator."""
+    if options.nominal_share is not None and not options.scenarios and (options.continuous is not None or not options.scenario):
+        raise InputError("Expected --nominal-share with --windows and --scenario only. Received: it without them. Leave it out.")
+    if options.start is not None and options.continuous is None:
+        raise InputError(f"Expected --start with --continuous only. Received: --start {options.start} with --windows. Leave it out.")
     if options.workers or options.engine or options.scenarios:
         from enhsim_tf.fleet_command import run_fleet
 
@@ -65,10 +69,6 @@ def run_generate(options: argparse.Namespace) -> int:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
     if options.continuous is not None and len(scenarios) > 1:
         raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write a series for each.")
-    if options.nominal_share is not None and (options.continuous is not None or not scenarios):
-        raise InputError("Expected --nominal-share with --windows and --scenario only. Received: it without them. Leave it out.")
-    if options.start is not None and options.continuous is None:
-        raise InputError(f"Expected --start with --continuous only. Received: --start {options.start} with --windows. Leave it out.")
     nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
     shares = shares_of(scenarios, options.windows or 0, nominal_share, options.seed) if options.windows else []
     start = None if options.start is None else start_of(options.start)

@@ -32,11 +32,7 @@ def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
     """The data sets by their folders."""
     if options.continuous is not None:
         raise InputError("Expected --windows with --workers, --engine or --scenarios. Received: --continuous.")
-    if options.start is not None:
-        raise InputError(f"Expected --start with --continuous only. Received: --start {options.start} with --windows. Leave it out.")
     if options.scenarios is None:
-        if options.nominal_share is not None and not options.scenario:
-            raise InputError("Expected --nominal-share with --scenario. Received: --nominal-share alone. Leave it out.")
         mix = mix_of([parse_scenario(text) for text in options.scenario], 0.5 if options.nominal_share is None else options.nominal_share)
     elif options.scenario or options.nominal_share is not None:
         raise InputError("Expected scenarios in one place. Received: --scenarios with --scenario or --nominal-share. Put all in the file.")

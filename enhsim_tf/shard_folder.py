@@ -33,14 +33,11 @@ def held(folder: Path) -> Iterator[None]:
     """Holds a folder against other runs; the system lets go of it when this process ends, however it ends.
 
     Raises:
-        InputError: If another run holds it, or it cannot be written to.
+        InputError: If another run holds it.
+        OSError: If it cannot be written to.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = open(folder / _LOCK, "ab")  # noqa: SIM115  no probe beside it: another run may be looking at what is there
-    except OSError as error:
-        raise InputError(f"Expected a folder that can be written to. Received: {folder} ({error.strerror}). Name another.") from None
-    with lock:
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / _LOCK, "ab") as lock:  # no probe beside it: another run may be looking at what is there
         try:
             import fcntl
         except ModuleNotFoundError:  # no such lock on Windows

@@ -94,7 +94,7 @@ class Degraded:
 
     def first_sample(self, num_samples: int) -> int:
         """The sample of a window or series at which it sets in; rounded first, since 0.29 times 100 is 28.999999999999996."""
-        return min(int(round(self.onset * num_samples, 6)), num_samples - 1)
+        return int(round(self.onset * num_samples, 6))
 
 
 def degrade(
@@ -125,7 +125,7 @@ def degrade(
         return signal(time_s)
     severity, (low, high) = scenario.severity, levels
     num_windows, num_samples = time_s.shape
-    onset = scenario.first_sample(num_samples)
+    onset = min(scenario.first_sample(num_samples), num_samples - 1)
     time_s, late = time_s.copy(), time_s[:, onset:]
     begin = late[:, :1]
 

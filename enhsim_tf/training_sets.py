@@ -246,4 +246,7 @@ def _labels(scenario: Degraded | None, num_samples: int) -> tuple[str, float, in
     """Name, severity and first sample of a scenario; one of severity 0 is nominal."""
     if scenario is None or scenario.severity == 0:
         return NOMINAL, 0.0, None
-    return scenario.mode, scenario.severity, scenario.first_sample(num_samples)
+    onset = scenario.first_sample(num_samples)
+    if onset >= num_samples:
+        raise InputError(f"Expected an onset within {num_samples} samples. Received: {scenario.onset}. Choose an earlier one.")
+    return scenario.mode, scenario.severity, onset

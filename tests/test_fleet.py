@@ -239,8 +239,8 @@ def test_what_looks_at_a_folder_writes_nothing_but_the_lock(tmp_path, refused):
     with held(tmp_path / "above" / "set"):
         assert os.listdir(tmp_path / "above" / "set") == [".lock"]
     (tmp_path / "file").touch()
-    with refused("can be written to"), held(tmp_path / "file" / "set"):
-        pass
+    with refused("can be written to"):
+        generate_fleet(tmp_path / "file" / "set", plan())
 
 
 def test_a_line_without_end_in_the_journal_takes_no_memory(undisturbed, tmp_path):

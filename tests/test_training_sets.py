@@ -193,12 +193,13 @@ def test_the_onset_is_the_first_sample_concerned(tmp_path, onset):
         assert (drifting[:, int(label) + 1 :] != nominal[:, int(label) + 1 :]).all()
 
 
-def test_an_onset_at_the_very_end_is_the_last_sample(tmp_path):
+def test_an_onset_behind_the_last_sample_is_refused(tmp_path, refused):
     late = Degraded("friction", 0.5, 1 - 1e-9)
-    write_windows_labelled(tmp_path / "x.parquet", known(), [Share(late, 5, 1)])
-    assert set(pd.read_parquet(tmp_path / "x.parquet")["onset"]) == {59}
-    write_series_labelled(tmp_path / "y.parquet", known(), 30, late, 0)
-    assert (pd.read_parquet(tmp_path / "y.parquet")["scenario"] == "nominal").tolist() == [True] * 29 + [False]
+    with refused("onset within 60 samples"):
+        write_windows_labelled(tmp_path / "x.parquet", known(), [Share(late, 5, 1)])
+    with refused("onset within 30 samples"):
+        write_series_labelled(tmp_path / "y.parquet", known(), 30, late, 0)
+    assert not list(tmp_path.iterdir())
 
 
 def test_other_programs_can_read_it(written):

@@ -168,11 +168,11 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
 
     out = folder / FOLDER
     chosen = None if options.channels is None else [name.strip() for name in options.channels.split(",")]
-    cache = options.cache or default_cache()
+    cache, is_shown = options.cache or default_cache(), not is_other(options)  # asked before the run writes over what is shown
     found = run(make_settings(options.budget), cache, options.data, out, chosen, options.fresh, tell)
     tell("\n" + "\n".join(lines(found)))
     kept = findings_of(Path(), "robustness")
-    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None and not is_other(options):
+    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None and is_shown:
         report(kept, Path())
     tell(f"tables, findings.json and figures in {out}/")
     return 0
