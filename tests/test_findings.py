@@ -39,11 +39,11 @@ def tables():
                             found = {"recall": recall, "recall_at_real_rate": recall / 2, "auc_roc": 0.7, "auc_pr": 0.3}
                             rows["recall"].append({**about, "kind": kind, "severity": severity, **found})
                     rows["traces"].append({**about, "vus_pr": 0.4})
-                if " + " in arm:
+                if " + " in arm or arm == "real":
                     for number, measure in enumerate(("follows", "does not")):
                         departure = [ALARMS[arm], -ALARMS[arm]][number] + 100.0
                         row = {"section": "A1", "measure": measure, "departure": departure, "floor_mean": 60.0, "ratio": departure / 60}
-                        rows["realism"].append({**where, "noise": arm, **row})
+                        rows["realism"].append({**where, "noise": arm, **row, "is_within": departure < 150})
             rows["traces"].append({**where, "arm": "real", "detector": "oracle", "vus_pr": 1.0})
             for detector in QUICK_DETECTORS:
                 for scale, share, alarms in ((2.0, 0.0, 1), (0.75, 0.0, 9), (1.5, 0.0, 2), (1.0, 0.25, 5)):
@@ -137,6 +137,23 @@ def test_a_measure_that_follows_the_alarms_predicts_them(found):
     predicts = found["measures"]["predicts"]
     assert predicts["follows"]["rho"] == pytest.approx(-1) and predicts["does not"]["rho"] == pytest.approx(1)
     assert found["measures"]["num_rows"] == 12 * sum(" + " in arm for arm in ARMS)
+
+
+def test_measures_within_their_floors_are_counted_for_every_noise():
+    louder = tables()
+    realism = louder["realism"]
+    one = (realism["noise"] == "real") & (realism["measure"] == "follows")
+    realism.loc[one & (realism["environment"] == "white"), "departure"] = 121.0  # twice the floor is 120
+    realism.loc[one & (realism["environment"] == "shot") & (realism["seed"] == SEEDS[0]), "is_within"] = False
+    within = findings.summarise(louder)["measures"]["within"]
+    assert within["real"] == {"twice": {"white": 1, "autoregressive": 2, "heteroscedastic": 2, "shot": 2}, "all_below_95": 11}
+    assert within["enhanced + GAN"] == {"twice": dict.fromkeys(ENVIRONMENTS, 1), "all_below_95": 0}  # 160 and 40 of 60
+
+
+@pytest.mark.parametrize("value, text", [(-0.0004, "0.0 %"), (0.0004, "0.0 %"), (-0.0006, "-0.1 %"), (0.123, "12.3 %"), (1.0, "100.0 %")])
+def test_what_rounds_to_nought_has_no_sign(value, text):
+    assert robustness_report.per_cent(value) == text
+    assert robustness_report.interval({"mean": value, "low": value, "high": value}).startswith(text + " (")
 
 
 def test_variations_join_the_arms_they_come_from(found):

@@ -192,14 +192,13 @@ def _contrasts(alarms: "pd.DataFrame") -> dict[str, list[dict[str, Any]]]:
 def _bars(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environments: Sequence[str]) -> dict[str, Any]:
     """The second generator against what it was asked for, environment by environment; fixed before the runs."""
     alarms, recall = by_replicate(rate, "rate"), by_replicate(tables["recall"], "recall")
-    realism = tables["realism"].query("noise == 'ours + GAN'")
+    ratios = floor_ratios(tables["realism"])
     excess, lost = alarms["ours + GAN"] - alarms["real"], recall["real"] - recall["ours + GAN"]
     bars = {}
     for name in environments:
         largest, bound = BARS[name]
         over, less = _interval(excess.loc[[name]], ["seed"]), _interval(lost.loc[[name]], ["seed"])
-        measured = realism[realism["environment"] == name].groupby("measure")[["departure", "floor_mean"]].mean()
-        ratio = measured["departure"] / measured["floor_mean"]
+        ratio = ratios.loc["ours + GAN", name]
         bars[name] = {
             "excess": over,
             "largest_excess": largest,
@@ -212,6 +211,16 @@ def _bars(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
             "num_measures": int(len(ratio)),
         }
     return bars
+
+
+def floor_ratios(realism: "pd.DataFrame") -> "pd.DataFrame":
+    """Departure from real noise in units of the floor, each a mean over seeds: a row a noise and environment, a column a measure.
+
+    Args:
+        realism: The table of that name.
+    """
+    means = realism.groupby(["noise", "environment", "measure"])[["departure", "floor_mean"]].mean()
+    return (means["departure"] / means["floor_mean"]).unstack("measure")
 
 
 def _measures(rate: "pd.DataFrame", realism: "pd.DataFrame") -> dict[str, Any]:
@@ -231,7 +240,13 @@ def _measures(rate: "pd.DataFrame", realism: "pd.DataFrame") -> dict[str, Any]:
     by_noise: dict[str, Any] = {}
     for (noise, environment, measure), ratio in medians.items():
         by_noise.setdefault(noise, {}).setdefault(environment, {})[measure] = float(ratio)
-    return {"predicts": found, "num_rows": int(len(joined) / max(len(found), 1)), "median_ratios": by_noise}
+    counts = (floor_ratios(realism) <= LARGEST_RATIO).sum(axis=1)
+    is_all = realism.groupby(["noise", "environment", "seed"])["is_within"].all()
+    within = {
+        noise: {"twice": {key: int(value) for key, value in counts.loc[noise].items()}, "all_below_95": int(is_all.loc[noise].sum())}
+        for noise in counts.index.unique("noise")
+    }
+    return {"predicts": found, "num_rows": int(len(joined) / max(len(found), 1)), "median_ratios": by_noise, "within": within}
 
 
 def _variations(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:

@@ -14,16 +14,28 @@ from enhsim_tf.reproduce.caption import in_seeds
 
 Findings = Mapping[str, Any]
 PATH = Path("docs") / "REPORT.md"
+SURROGATES = ("bootstrap", "AR", "Gaussian")
+NOISES = (
+    "real",
+    *(f"{arm}{rest}" for arm in ("ours", "enhanced") for rest in (": extracted", " + GAN", *(f" + {name}" for name in SURROGATES))),
+)
+"""What the measures of realism judge, in the order of the report."""
+
+
+def number(value: float, digits: int = 1) -> str:
+    """A number with so many decimals; what rounds to nought has no sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def per_cent(value: float, digits: int = 1) -> str:
     """A share as per cent."""
-    return f"{100 * value:.{digits}f} %"
+    return f"{number(100 * value, digits)} %"
 
 
 def interval(about: Mapping[str, float], digits: int = 1) -> str:
     """A mean of shares with its interval, in per cent."""
-    return f"{100 * about['mean']:.{digits}f} % ({100 * about['low']:.{digits}f} to {100 * about['high']:.{digits}f})"
+    mean, low, high = (number(100 * about[name], digits) for name in ("mean", "low", "high"))
+    return f"{mean} % ({low} to {high})"
 
 
 def p_value(value: float) -> str:
@@ -77,7 +89,11 @@ def render(
     from enhsim_tf.reproduce import degraded_modes, findings, replicates
 
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
     environment.filters |= {
         "per_cent": per_cent,
@@ -87,7 +103,15 @@ def render(
         "in_seeds": in_seeds,
         "share": share,
     }
-    words = {"arms": replicates.ARMS, "methods": degraded_modes.METHODS, "contrasts": findings.CONTRASTS, "verdict_c8": verdict_c8(found)}
+    asked = [found["bars"][name] for name in findings.KINDS_OF_NOISE["Gaussian"] if name in found["bars"]]
+    words = {
+        "arms": replicates.ARMS,
+        "methods": degraded_modes.METHODS,
+        "noises": NOISES,
+        "contrasts": findings.CONTRASTS,
+        "verdict_c8": verdict_c8(found),
+        "is_realistic": all(bar["measures_within"] == bar["num_measures"] for bar in asked),
+    }
     return environment.get_template(template).render(
         found=found, labelled=labelled, designs=designs, words=words, c8=share_c8(found), c8_ours=share_c8(found, "ours + GAN")
     )
