@@ -11,6 +11,7 @@ import pytest
 from enhsim_tf.detectors import CONTROLS, DETECTORS
 from enhsim_tf.errors import InputError
 from enhsim_tf.injections import INJECTIONS
+from enhsim_tf.realism import MEASURES
 from enhsim_tf.reproduce import findings, robustness_figures, robustness_report
 from enhsim_tf.reproduce.caption import caption_of_findings
 from enhsim_tf.reproduce.degraded_modes import METHODS, SCORED
@@ -150,6 +151,22 @@ def test_measures_within_their_floors_are_counted_for_every_noise():
     assert within["enhanced + GAN"] == {"twice": dict.fromkeys(ENVIRONMENTS, 1), "all_below_95": 0}  # 160 and 40 of 60
 
 
+def test_tries_are_counted_and_the_furthest_measure_is_named(found):
+    ratios = {measure.name: "1.5" for measure in MEASURES} | {"coverage": "2.01", "tail ratio": "7.04", "density": "2"}
+    row = {
+        "environment": "white",
+        "seed": "110",
+        "noise": "as it is",
+        "iterations": "1000",
+        "false_alarms": "0.0123",
+        "recall": "",
+        **ratios,
+    }
+    text = robustness_report.render({**found, "budget": "full"}, tries=[row])
+    assert "| white | 110 | as it is | 1000 | 13 of 15 | tail ratio | 7.0 | 1.2 % |  |" in text
+    assert "Tries where" not in robustness_report.render({**found, "budget": "full"})
+
+
 @pytest.mark.parametrize("value, text", [(-0.0004, "0.0 %"), (0.0004, "0.0 %"), (-0.0006, "-0.1 %"), (0.123, "12.3 %"), (1.0, "100.0 %")])
 def test_what_rounds_to_nought_has_no_sign(value, text):
     assert robustness_report.per_cent(value) == text
@@ -226,9 +243,9 @@ def test_the_report_is_what_the_tables_say():
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
     again = findings.summarise(findings.KEPT.read(KEPT))
     assert json.loads(json.dumps(again)) == {key: kept[key] for key in again}
-    assert robustness_report.render(kept, robustness_report.findings_of(ROOT, "labelled"), robustness_report.designs_of(ROOT)) == (
-        ROOT / robustness_report.PATH
-    ).read_text(encoding="utf-8")
+    assert robustness_report.render(
+        kept, robustness_report.findings_of(ROOT, "labelled"), *(robustness_report.designs_of(ROOT, name) for name in ("designs", "tries"))
+    ) == (ROOT / robustness_report.PATH).read_text(encoding="utf-8")
     assert robustness_report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
     assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000
     assert min(kept["seeds"]) >= 1_000, "development seeds are 100 to 199"

@@ -74,6 +74,7 @@ def render(
     found: Findings,
     labelled: Findings | None = None,
     designs: Sequence[Mapping[str, str]] = (),
+    tries: Sequence[Mapping[str, str]] = (),
     template: str = "robustness_report.md.jinja",
 ) -> str:
     """The report as Markdown.
@@ -82,6 +83,7 @@ def render(
         found: The findings.
         labelled: Those of the study of real telemetry, or None where there was none.
         designs: Rows of what was tried on the way to the second generator, as `designs_of` reads them.
+        tries: Those of what was tried where it misses a bar.
         template: Its template, beside this module.
     """
     import jinja2
@@ -113,7 +115,13 @@ def render(
         "is_realistic": all(bar["measures_within"] == bar["num_measures"] for bar in asked),
     }
     return environment.get_template(template).render(
-        found=found, labelled=labelled, designs=designs, words=words, c8=share_c8(found), c8_ours=share_c8(found, "ours + GAN")
+        found=found,
+        labelled=labelled,
+        designs=designs,
+        tries=[_tried(row) for row in tries],
+        words=words,
+        c8=share_c8(found),
+        c8_ours=share_c8(found, "ours + GAN"),
     )
 
 
@@ -128,17 +136,29 @@ def findings_of(root: Path, name: str) -> Findings | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
-def designs_of(root: Path) -> list[dict[str, str]]:
-    """What was tried on the way to the second generator, a row a training; none where the project keeps no such table.
+def designs_of(root: Path, name: str = "designs") -> list[dict[str, str]]:
+    """What was tried, a row a training; none where the project keeps no such table.
 
     Args:
         root: Folder of the project.
+        name: `designs`, on the way to the second generator, or `tries`, where it misses a bar.
     """
-    path = root / "docs" / "designs.csv"
+    path = root / "docs" / f"{name}.csv"
     if not path.is_file():
         return []
     with open(path, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+def _tried(row: Mapping[str, str]) -> dict[str, Any]:
+    """A row of the tries as the report shows it: how many measures are within twice their floor, and which is furthest."""
+    from enhsim_tf.realism import MEASURES
+    from enhsim_tf.reproduce.findings import LARGEST_RATIO
+
+    ratios = {measure.name: float(row[measure.name]) for measure in MEASURES}
+    worst = max(ratios, key=ratios.__getitem__)
+    within = sum(ratio <= LARGEST_RATIO for ratio in ratios.values())
+    return {**row, "within": within, "number": len(ratios), "worst": worst, "largest": number(ratios[worst])}
 
 
 def share(text: str) -> str:
@@ -159,7 +179,7 @@ def report(found: Findings, root: Path) -> None:
     labelled = findings_of(root, "labelled")
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
-        temporary.write_text(render(found, labelled, designs_of(root)), encoding="utf-8")
+        temporary.write_text(render(found, labelled, designs_of(root), designs_of(root, "tries")), encoding="utf-8")
     parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
     readme = root / "README.md"
     if readme.is_file():
