@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.degraded_modes import LARGEST_TRAINED, SCORED
 from enhsim_tf.reproduce.figures import Figure
-from enhsim_tf.reproduce.replicates import ARMS
-from enhsim_tf.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, label_ends, new_sheet, panels
+from enhsim_tf.reproduce.replicates import ARMS, MIXED, SCALED
+from enhsim_tf.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, IN_PRINT, QUIET, REAL, label_ends, new_sheet, panels
 
 Findings = Mapping[str, Any]
 _NAMES = {
@@ -149,6 +149,7 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
         "enhanced + AR": (GENERATED, ":"),
         "ours + GAN": (ENHANCED, "-"),
     }
+    (only_scaled,) = (arm for arm in SCALED if arm not in MIXED)
 
     def curve(arm: str, x: str, fixed: Mapping[str, float], value: str) -> np.ndarray:
         points = [(row[x], row[value]) for row in rows if row["arm"] == arm and all(row[key] == each for key, each in fixed.items())]
@@ -170,8 +171,13 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
             for arm, (colour, style) in shown.items():
                 points = curve(arm, x, fixed, value)
                 if points.size and points.shape[1] > 2:
-                    axes.plot(points[0] * (100 if column else 1), 100 * points[1], style, color=colour, marker="o", markersize=2.5)
+                    marked = {"color": colour, "marker": "o", "markersize": 2.5, "clip_on": False}
+                    axes.plot(points[0] * (100 if column else 1), 100 * points[1], style, **marked)
                     ends[arm] = (100 * points[1], colour)
+                    if arm == only_scaled:  # its name is not beside the right panels
+                        axes.annotate(
+                            arm, (points[0][1], 100 * points[1][1]), (4, 3), textcoords="offset points", color=IN_PRINT.get(colour, colour)
+                        )
             axes.set_ylabel(label)
             axes.set_ylim(0, 104 if row == 0 else None)
             if column:
