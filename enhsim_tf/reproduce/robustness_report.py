@@ -70,6 +70,20 @@ def verdict_c8(found: Findings) -> str:
     return "holds" if kept == total else "holds in part" if kept else "does not hold"
 
 
+def first_trial(found: Findings) -> str:
+    """Whether the finding of the first trial is confirmed, environment by environment."""
+    from enhsim_tf.reproduce.findings import EVERYTHING
+
+    groups: dict[str, list[str]] = {"Confirmed": [], "In part": [], "Refuted": []}
+    for name, about in found["alarms_on_everything"].items():
+        word = "Confirmed" if about["replicates"] == about["of"] else "In part" if about["replicates"] else "Refuted"
+        groups[word].append(
+            f"{name} ({about['replicates']} of {about['of']} replicates; {per_cent(about['low'])} to {per_cent(about['high'])})"
+        )
+    said = [f"**{word}** on {', '.join(names)}" for word, names in groups.items() if names]
+    return f"{'; '.join(said)}. Everything: at least {per_cent(EVERYTHING, 0)} of the windows."
+
+
 def render(
     found: Findings,
     labelled: Findings | None = None,
@@ -112,6 +126,7 @@ def render(
         "noises": NOISES,
         "contrasts": findings.CONTRASTS,
         "verdict_c8": verdict_c8(found),
+        "first_trial": first_trial(found),
         "is_realistic": all(bar["measures_within"] == bar["num_measures"] for bar in asked),
     }
     return environment.get_template(template).render(
