@@ -77,9 +77,8 @@ def first_trial(found: Findings) -> str:
     groups: dict[str, list[str]] = {"Confirmed": [], "In part": [], "Refuted": []}
     for name, about in found["alarms_on_everything"].items():
         word = "Confirmed" if about["replicates"] == about["of"] else "In part" if about["replicates"] else "Refuted"
-        groups[word].append(
-            f"{name} ({about['replicates']} of {about['of']} replicates; {per_cent(about['low'])} to {per_cent(about['high'])})"
-        )
+        ends = dict.fromkeys(per_cent(about[end]) for end in ("low", "high"))  # one where they are the same
+        groups[word].append(f"{name} ({about['replicates']} of {about['of']} replicates; {' to '.join(ends)})")
     said = [f"**{word}** on {', '.join(names)}" for word, names in groups.items() if names]
     return f"{'; '.join(said)}. Everything: at least {per_cent(EVERYTHING, 0)} of the windows."
 
