@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from enhsim_tf.commands import parse
 from enhsim_tf.errors import InputError, printable
-from enhsim_tf.terminal import finish, tell
+from enhsim_tf.terminal import finish, leave, tell
 
 if TYPE_CHECKING:
     from enhsim_tf.cleaning import Cleaning
@@ -231,4 +231,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())

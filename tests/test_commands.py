@@ -409,3 +409,15 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
             os.killpg(process.pid, 0)
             time.sleep(0.1)
     assert not list((tmp_path / "models").iterdir())
+
+
+@pytest.mark.parametrize(("module", "said"), [("ray", "said"), ("json", "said, and more")])
+def test_a_process_that_used_ray_ends_at_once_with_all_it_said(module, said):
+    program = (
+        f"import atexit, sys, types; sys.modules[{module!r}] = types.ModuleType({module!r})\n"
+        "from enhsim_tf.terminal import leave\n"
+        "atexit.register(lambda: print(', and more', end=''))\n"
+        "print('said', end=''); leave(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stdout, done.stderr) == (3, said, "")
