@@ -13,22 +13,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.reproduce.__main__ import NOISES as ENVIRONMENTS
+from enhsim_tf.reproduce.robustness_report import designs_of
+
 if TYPE_CHECKING:
+    import keras
+
     from enhsim_tf.noise_gan import NoiseGAN
     from enhsim_tf.reproduce.replicates import Replicate
 
 ROOT = Path(__file__).parents[1]
-FROZEN = "as it is"
-DESIGNS = (FROZEN, "four times the iterations", "least squares loss")
-NOISES = ("real noise", *DESIGNS)
+REAL = "real noise"
+LONGER, LEAST_SQUARES, TAILS, MAXIMUM = (
+    "four times the iterations",
+    "least squares loss",
+    "heavier-tailed latent series",
+    "the paper's discriminator",
+)
+DESIGNS = ("as it is", LONGER, LEAST_SQUARES, TAILS, MAXIMUM)
 KEYS = ("environment", "seed", "noise")
+"""Columns that say which row it is."""
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.designs", description="Other trainings of the second generator.")
-    parser.add_argument("--environment", action="append", help="white, autoregressive, heteroscedastic or shot (default: the first two)")
-    parser.add_argument("--noise", action="append", choices=NOISES, help="these alone (default: all)")
+    parser.add_argument("--environment", action="append", choices=ENVIRONMENTS, help="these alone (default: white, autoregressive, shot)")
+    parser.add_argument("--noise", action="append", choices=(REAL, *DESIGNS), help="these alone (default: all)")
     parser.add_argument("--seed", type=int, action="append", help="a development seed, 100 to 199 (default: 110)")
     parser.add_argument("--budget", choices=("full", "smoke"), default="full", help="smoke: tiny counts, measures nothing")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "tries.csv", help="the table (default: %(default)s)")
@@ -53,86 +64,115 @@ def untrained(design: str, noise: np.ndarray, num_iterations: int, seed: int) ->
     import keras
 
     from enhsim_tf.convolutional_noise import convolutional_noise_gan
+    from enhsim_tf.noise_gan import build_discriminator
 
-    number = 4 * num_iterations if design == "four times the iterations" else num_iterations
+    number = 4 * num_iterations if design == LONGER else num_iterations
     gan = convolutional_noise_gan(noise, number, seed)
-    if design == "least squares loss":
+    if design == LEAST_SQUARES:
         gan.loss = keras.losses.MeanSquaredError()
+    elif design == TAILS:
+        gan.generator = heavy_tailed(gan.generator, len(gan.latent.slow_samples))
+    elif design == MAXIMUM:
+        gan.discriminator = build_discriminator(noise.shape[1], seed=seed)
+        settings = gan.discriminator_optimizer.get_config()
+        gan.discriminator_optimizer = keras.optimizers.Adam.from_config(settings)  # one optimizer cannot change its variables
+        gan.discriminator_optimizer.build(gan.discriminator.trainable_variables)
     return gan, number
 
 
-def measure(one: "Replicate", noise: str) -> dict[str, object]:
-    """Trains a design and measures its noise, or measures real noise that was held out.
+def heavy_tailed(generator: "keras.Model", num_slow: int, weight: float = 0.2) -> "keras.Model":
+    """The generator on white channels of Tukey's h distribution, z exp(h z²/2), in place of the normal one.
+
+    Args:
+        generator: From `(rows, samples, channels)`, the slow channels last.
+        num_slow: Channels that stay normal.
+        weight: The h of the distribution: moments of the order 1/h and above are infinite.
+    """
+    import keras
+
+    normal = keras.Input(generator.input_shape[1:])
+    white, slow = normal[:, :, :-num_slow], normal[:, :, -num_slow:]
+    heavy = white * keras.ops.exp(weight / 2 * white * white)
+    return keras.Model(normal, generator(keras.ops.concatenate([heavy, slow], axis=2)))
+
+
+class Bench:
+    """What the noises of one environment and seed learn from and are measured by.
 
     Args:
         one: Whose telemetry and whose settings.
-        noise: One of `NOISES`.
-
-    Returns:
-        A row: iterations of training, each measure's departure in units of its mean floor, and false alarms
-        and recall of the detectors that train in a second, with this noise and with another draw of real telemetry.
     """
-    from enhsim_tf import realism, robustness
-    from enhsim_tf.detectors import DETECTORS
-    from enhsim_tf.reproduce.replicates import QUICK_DETECTORS
 
-    data, settings = one.experiment.data, one.settings
-    chosen, draws = settings.robustness, np.random.default_rng([settings.seed, NOISES.index(noise)])
+    def __init__(self, one: "Replicate"):
+        from enhsim_tf import realism
 
-    def of(windows: dict[str, np.ndarray]) -> np.ndarray:
-        return windows["target"] - windows["truth"]
+        self.settings, data = one.settings, one.experiment.data
+        chosen = self.settings.robustness
 
-    real, again, third = (of(data.windows(part, None)) for part in ("test", "train", "calibration"))
-    size = min(chosen.num_windows, len(real), len(again), len(third))
-    training, threshold = (data.windows("train", chosen.num_windows, f"tries, {part}") for part in ("training", "threshold"))
-    number = 0
-    if noise == NOISES[0]:
-        generated = third[:size]
-        arms = [data.windows(part, chosen.num_windows, f"tries, real, {part}")["target"] for part in ("train", "calibration")]
-    else:
-        learnt = of(data.windows("train", settings.second.num_windows, "tries, noise"))
-        gan, number = untrained(noise, learnt, settings.adversarial.num_iterations, settings.seed)
-        gan.fit(learnt, number, verbose=False)
-        generated = gan.generate(size, draws)
-        arms = [windows["truth"] + gan.generate(chosen.num_windows, draws) for windows in (training, threshold)]
-    floor = realism.RealFloor(real[:size], again[:size], chosen.num_resplits, seed=settings.seed)
-    ratios = {row.measure: row.ratio for row in floor.judge(generated).rows}
-    quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
-    judged = robustness.judge_arm(*arms, one.trial(chosen.num_anomalous_varied), quick, settings.seed)
-    alarms, windows = (sum(row[name] for row in judged["alarms"]) for name in ("alarms", "windows"))
-    recall = float(np.mean([row["recall"] for row in judged["recall"]]))
-    return {"iterations": number, "false_alarms": alarms / windows, "recall": recall, **ratios}
+        def noise_of(windows: dict[str, np.ndarray]) -> np.ndarray:
+            return windows["target"] - windows["truth"]
 
+        real, again, third = (noise_of(data.windows(part, None)) for part in ("test", "train", "calibration"))
+        size = min(chosen.num_windows, len(real), len(again), len(third))
+        self.held_out = third[:size]
+        self.floor = realism.RealFloor(real[:size], again[:size], chosen.num_resplits, seed=self.settings.seed)
+        self.learnt = noise_of(data.windows("train", self.settings.second.num_windows, "tries, noise"))
+        # what detectors learn from, and what their thresholds are set on
+        self.waves = [data.windows("train", chosen.num_windows, f"tries, {part}")["truth"] for part in ("training", "threshold")]
+        self.telemetry = [data.windows(part, chosen.num_windows, f"tries, real, {part}")["target"] for part in ("train", "calibration")]
+        self.trial = one.trial(chosen.num_anomalous_varied)
 
-def written(path: Path) -> list[dict[str, str]]:
-    """The rows that a file holds, or none."""
-    if not path.is_file():
-        return []
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    def measure(self, noise: str) -> dict[str, object]:
+        """Trains a design and measures its noise, or measures real noise that was held out.
+
+        Args:
+            noise: `REAL` or one of `DESIGNS`.
+
+        Returns:
+            A row: iterations of training, false alarms and recall of the detectors that train in a second, mean over
+            them, trained on telemetry with this noise, and each measure's departure in units of its mean floor.
+        """
+        from enhsim_tf import robustness
+        from enhsim_tf.detectors import DETECTORS
+        from enhsim_tf.reproduce.replicates import QUICK_DETECTORS
+
+        number, generated, arms = 0, self.held_out, self.telemetry
+        if noise != REAL:
+            gan, number = untrained(noise, self.learnt, self.settings.adversarial.num_iterations, self.settings.seed)
+            gan.fit(self.learnt, number, verbose=False)
+            draws = np.random.default_rng([self.settings.seed, 1 + DESIGNS.index(noise)])
+            generated = gan.generate(len(self.held_out), draws)
+            arms = [waves + gan.generate(len(waves), draws) for waves in self.waves]
+        ratios = {row.measure: row.ratio for row in self.floor.judge(generated).rows}
+        quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
+        judged = robustness.judge_arm(*arms, self.trial, quick, self.settings.seed)
+        alarms, windows = (sum(row[name] for row in judged["alarms"]) for name in ("alarms", "windows"))
+        recall = float(np.mean([row["recall"] for row in judged["recall"]]))
+        return {"iterations": number, "false_alarms": alarms / windows, "recall": recall, **ratios}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Makes the rows that are missing, and writes the file after each."""
     options = parse(arguments)
     from enhsim_tf.files import replace_file
-    from enhsim_tf.reproduce.replicates import ENVIRONMENTS, Replicate
+    from enhsim_tf.reproduce.replicates import Replicate
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache
     from enhsim_tf.terminal import start_tensorflow, tell
 
     start_tensorflow()
-    rows = written(options.out)
+    rows = designs_of(options.out)
     for seed in options.seed or [110]:
-        for environment in options.environment or ENVIRONMENTS[:2]:
+        for environment in options.environment or ("white", "autoregressive", "shot"):
+            kept = {row["noise"] for row in rows if (row["environment"], row["seed"]) == (environment, str(seed))}
+            missing = [noise for noise in options.noise or (REAL, *DESIGNS) if noise not in kept]
+            if not missing:
+                continue
             settings = make_settings(options.budget, seed, telemetry__noise=environment)
-            one = Replicate(settings, Stages(options.cache or default_cache(), tell=tell))
-            for noise in options.noise or NOISES:
-                if any([row[key] for key in KEYS] == [environment, str(seed), noise] for row in rows):
-                    continue
-                found = measure(one, noise)
-                shown = {key: format(value, ".4g") if isinstance(value, float) else value for key, value in found.items()}
-                rows.append({"environment": environment, "seed": str(seed), "noise": noise, **shown})
+            bench = Bench(Replicate(settings, Stages(options.cache or default_cache(), tell=tell)))
+            for noise in missing:
+                found = {key: format(value, ".4g") for key, value in bench.measure(noise).items()}
+                rows.append(dict(zip(KEYS, (environment, str(seed), noise), strict=True)) | found)
                 with replace_file(options.out) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
                     writer = csv.DictWriter(file, list(rows[-1]))
                     writer.writeheader()

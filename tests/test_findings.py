@@ -258,7 +258,9 @@ def test_the_report_is_what_the_tables_say():
     again = findings.summarise(findings.KEPT.read(KEPT))
     assert json.loads(json.dumps(again)) == {key: kept[key] for key in again}
     assert robustness_report.render(
-        kept, robustness_report.findings_of(ROOT, "labelled"), *(robustness_report.designs_of(ROOT, name) for name in ("designs", "tries"))
+        kept,
+        robustness_report.findings_of(ROOT, "labelled"),
+        *(robustness_report.designs_of(ROOT / path) for path in robustness_report.TABLES),
     ) == (ROOT / robustness_report.PATH).read_text(encoding="utf-8")
     assert robustness_report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
     assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000

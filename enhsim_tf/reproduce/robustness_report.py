@@ -5,7 +5,7 @@ No number is written here: each comes from the findings, and a test renders the 
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,7 @@ from enhsim_tf.reproduce.caption import in_seeds
 
 Findings = Mapping[str, Any]
 PATH = Path("docs") / "REPORT.md"
-SURROGATES = ("bootstrap", "AR", "Gaussian")
-NOISES = (
-    "real",
-    *(f"{arm}{rest}" for arm in ("ours", "enhanced") for rest in (": extracted", " + GAN", *(f" + {name}" for name in SURROGATES))),
-)
-"""What the measures of realism judge, in the order of the report."""
+TABLES = (Path("docs") / "designs.csv", Path("docs") / "tries.csv")  # on the way to the second generator; where it misses a bar
 
 
 def number(value: float, digits: int = 1) -> str:
@@ -122,7 +117,7 @@ def render(
     words = {
         "arms": replicates.ARMS,
         "methods": degraded_modes.METHODS,
-        "noises": NOISES,
+        "noises": ["real", *(noise for pipeline in ("ours", "enhanced") for noise in _noises(pipeline, replicates.ARMS))],
         "contrasts": findings.CONTRASTS,
         "verdict_c8": verdict_c8(found),
         "first_trial": first_trial(found),
@@ -139,6 +134,11 @@ def render(
     )
 
 
+def _noises(pipeline: str, arms: Iterable[str]) -> list[str]:
+    """What the measures of realism judge of a pipeline: what its generators learn from, and what they make of it."""
+    return [f"{pipeline}: extracted", *(arm for arm in arms if arm.startswith(f"{pipeline} + "))]
+
+
 def findings_of(root: Path, name: str) -> Findings | None:
     """The findings that a project keeps of an experiment, or None.
 
@@ -150,14 +150,8 @@ def findings_of(root: Path, name: str) -> Findings | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
-def designs_of(root: Path, name: str = "designs") -> list[dict[str, str]]:
-    """What was tried, a row a training; none where the project keeps no such table.
-
-    Args:
-        root: Folder of the project.
-        name: `designs`, on the way to the second generator, or `tries`, where it misses a bar.
-    """
-    path = root / "docs" / f"{name}.csv"
+def designs_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a table of designs that were tried, a row a training; none where there is no such file."""
     if not path.is_file():
         return []
     with open(path, newline="", encoding="utf-8") as file:
@@ -193,7 +187,7 @@ def report(found: Findings, root: Path) -> None:
     labelled = findings_of(root, "labelled")
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
-        temporary.write_text(render(found, labelled, designs_of(root), designs_of(root, "tries")), encoding="utf-8")
+        temporary.write_text(render(found, labelled, *(designs_of(root / path) for path in TABLES)), encoding="utf-8")
     parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
     readme = root / "README.md"
     if readme.is_file():
