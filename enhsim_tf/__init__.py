@@ -21,6 +21,7 @@ _ROOMS = {
     "SquareWave": "simulator",
     "SquareWaveSimulator": "simulator",
     "Telemetry": "telemetry",
+    "TrustedRange": "trusted_range",
     "build_enhancer": "enhancer",
     "clean": "cleaning",
     "extract_noise": "noise",

@@ -75,6 +75,7 @@ def run_generate(options: argparse.Namespace) -> int:
     if options.continuous is not None:
         parse_length(options.continuous)
     from enhsim_tf.channels import chosen_of, models_of
+    from enhsim_tf.trusted_range import TrustedRange
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = outputs_of(options.out, models, (".parquet",))
@@ -90,6 +91,12 @@ def run_generate(options: argparse.Namespace) -> int:
             write_series_labelled(paths[channel], simulator, length, scenario, options.seed, start)
             what = f"{counted(length, 'sample')}, one every {simulator.interval_s:g} s"
         tell(f"{printable(channel)}: {what} in {paths[channel]}")
+        trusted = TrustedRange(simulator) if scenarios else None
+        for scenario in scenarios:
+            share = trusted.share_outside(scenario)
+            tell(
+                f"{printable(channel)}: {scenario.mode} at {scenario.severity:g}: {share:.0%} of such windows are beyond what its enhancer learnt from"
+            )
 
     return for_each(models, write)
 

@@ -1,6 +1,7 @@
 """The commands, end to end: from a dirty table to a simulator, training data and scores; what they refuse, in one line."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -158,7 +159,10 @@ def test_fit_tells_what_it_cleaned_and_what_it_found(fitted):
 def test_generate_makes_training_data_of_what_was_fitted(fitted, told, tmp_path):
     scenarios = ["--scenario", "stuck:0.5", "--scenario", "drift:1:0.5"]
     code, out, errors = told("generate", fitted[0], "--windows", 40, *scenarios, "--out", "deep/training.parquet", "--seed", 3)
-    assert (code, errors) == (0, []) and out == "volts: 40 windows of 64 samples in deep/training.parquet\n"
+    first, second, third = out.splitlines()
+    assert (code, errors) == (0, []) and first == "volts: 40 windows of 64 samples in deep/training.parquet"
+    assert re.fullmatch(r"volts: stuck at 0\.5: \d+% of such windows are beyond what its enhancer learnt from", second)
+    assert third.startswith("volts: drift at 1: 100% of such")
     frame = pd.read_parquet(tmp_path / "deep" / "training.parquet")
     assert frame["scenario"].value_counts().to_dict() == {"nominal": 20, "stuck": 10, "drift": 10}
     assert set(frame.loc[frame["scenario"] == "drift", "onset"]) == {32} and np.stack(frame["window"]).shape == (40, 64)
