@@ -74,30 +74,6 @@ def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarra
     return float(average_precision_score(labels, scores, sample_weight=weights))
 
 
-def wilson_interval(successes: int, trials: int, level: float = 0.95) -> tuple[float, float]:
-    """Interval of a share by Wilson's score: honest near 0 and 1, where false-alarm rates live.
-
-    Args:
-        successes: Number of alarms.
-        trials: Number of independent windows.
-        level: Confidence.
-
-    Returns:
-        `(low, high)`, from 0 to 1.
-
-    Raises:
-        InputError: If there are no trials, or more successes than trials.
-    """
-    from scipy.special import ndtri
-
-    if not 0 <= successes <= trials or trials < 1:
-        raise InputError(f"Expected from 0 to as many successes as trials. Received: {successes} of {trials}.")
-    share, square = successes / trials, float(ndtri((1 + level) / 2)) ** 2
-    centre = (share + square / (2 * trials)) / (1 + square / trials)
-    half = np.sqrt(square * (share * (1 - share) / trials + square / (4 * trials**2))) / (1 + square / trials)
-    return max(float(centre - half), 0.0), min(float(centre + half), 1.0)
-
-
 def gap_closed(rate: float, simulated_rate: float, real_rate: float) -> float:
     """Share of the gap between simulation and reality that an arm closes: 0 as the coarse simulation, 1 as real telemetry.
 

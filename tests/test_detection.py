@@ -15,7 +15,6 @@ from enhsim_tf.detection import (
     recall_at_real_rate,
     threshold,
     vus_pr,
-    wilson_interval,
 )
 
 
@@ -74,23 +73,6 @@ def test_area_of_a_random_score_is_the_prevalence(prevalence):
     assert auc_pr_at_prevalence(rng.random(20_000), rng.random(20_000), prevalence) == pytest.approx(prevalence, rel=0.1)
     assert auc_pr_at_prevalence(rng.random(50), 1 + rng.random(50), prevalence) == 1
     assert auc_pr_at_prevalence(np.ones(50), np.ones(70), prevalence) == pytest.approx(prevalence)  # flags all or none
-
-
-def test_wilson_interval():
-    assert wilson_interval(10, 1_000) == pytest.approx((0.0054, 0.0183), abs=1e-4)  # 1 %: from 0.5 to 1.8
-    for successes, trials in [(1, 7), (10, 1_000), (400, 500)]:
-        for limit in wilson_interval(successes, trials):  # where the score test is just at 1.96
-            assert abs(successes / trials - limit) / math.sqrt(limit * (1 - limit) / trials) == pytest.approx(1.959964)
-    assert wilson_interval(0, 10)[0] == 0 and wilson_interval(10, 10)[1] == 1
-    assert wilson_interval(0, 10)[1] == pytest.approx(1.959964**2 / (10 + 1.959964**2))
-    low, high = wilson_interval(5, 50, level=0.5)
-    assert wilson_interval(5, 50)[0] < low < 0.1 < high < wilson_interval(5, 50)[1]
-
-
-@pytest.mark.parametrize(("successes", "trials"), [(0, 0), (-1, 5), (6, 5)])
-def test_intervals_that_are_refused(refused, successes, trials):
-    with refused(f"{successes} of {trials}"):
-        wilson_interval(successes, trials)
 
 
 def test_gap_closed():
