@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.reproduce.__main__ import NOISES as ENVIRONMENTS
+from enhsim_tf.reproduce.report_words import DEVELOPMENT_SEEDS
 from enhsim_tf.reproduce.robustness_report import designs_of
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ LONGER, LEAST_SQUARES, TAILS, MAXIMUM = (
     "the paper's discriminator",
 )
 DESIGNS = ("as it is", LONGER, LEAST_SQUARES, TAILS, MAXIMUM)
+_FROM_TO = f"{DEVELOPMENT_SEEDS[0]} to {DEVELOPMENT_SEEDS[-1]}"
 KEYS = ("environment", "seed", "noise")
 """Columns that say which row it is."""
 
@@ -38,17 +40,17 @@ KEYS = ("environment", "seed", "noise")
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.designs", description="Other trainings of the second generator.")
-    parser.add_argument("--environment", action="append", choices=ENVIRONMENTS, help="these alone (default: white, autoregressive, shot)")
+    parser.add_argument("--environment", action="append", choices=ENVIRONMENTS, help="these alone (default: all)")
     parser.add_argument("--noise", action="append", choices=(REAL, *DESIGNS), help="these alone (default: all)")
-    parser.add_argument("--seed", type=int, action="append", help="a development seed, 100 to 199 (default: 110)")
+    parser.add_argument("--seed", type=int, action="append", help=f"a development seed, {_FROM_TO} (default: 110)")
     parser.add_argument("--budget", choices=("full", "smoke"), default="full", help="smoke: tiny counts, measures nothing")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "tries.csv", help="the table (default: %(default)s)")
     parser.add_argument("--cache", type=Path, help="folder of the telemetry (default: the user's cache)")
     options = parser.parse_args(arguments)
     if options.budget == "smoke" and options.out == parser.get_default("out"):
         parser.error("--budget smoke needs another --out: tries.csv holds measurements")
-    if not all(100 <= seed < 200 for seed in options.seed or ()):
-        parser.error("--seed must be a development seed, 100 to 199: no design is chosen on the others")
+    if not all(seed in DEVELOPMENT_SEEDS for seed in options.seed or ()):
+        parser.error(f"--seed must be a development seed, {_FROM_TO}: no design is chosen on the others")
     return options
 
 
@@ -163,7 +165,7 @@ def main(arguments: list[str] | None = None) -> int:
     start_tensorflow()
     rows = designs_of(options.out)
     for seed in options.seed or [110]:
-        for environment in options.environment or ("white", "autoregressive", "shot"):
+        for environment in options.environment or ENVIRONMENTS:
             kept = {row["noise"] for row in rows if (row["environment"], row["seed"]) == (environment, str(seed))}
             missing = [noise for noise in options.noise or (REAL, *DESIGNS) if noise not in kept]
             if not missing:

@@ -6,7 +6,7 @@ observation.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,19 +44,25 @@ class Contrast:
         first: The arm that is subtracted from.
         second: The arm that is subtracted.
         num_replicates: Pairs.
-        mean: Mean of the differences, with a hierarchical bootstrap interval.
+        num_clusters: Clusters of pairs that share draws.
+        mean: Mean of the differences, with a crossed bootstrap interval.
         median: Their median, with its interval.
-        p_value: Two-sided, of the Wilcoxon signed-rank test.
+        p_value: Two-sided, of the Wilcoxon signed-rank test of the clusters' means.
         adjusted_p_value: The same by Holm over all contrasts that were declared together.
+        pooled_p_value: That of the same test of all pairs, as if they shared nothing: too small where they do.
+        parts: Mean difference in each label of the first factor.
     """
 
     first: str
     second: str
     num_replicates: int
+    num_clusters: int
     mean: Interval
     median: Interval
     p_value: float
     adjusted_p_value: float
+    pooled_p_value: float
+    parts: Mapping[str, float]
 
 
 def log_odds(alarms: np.ndarray, trials: np.ndarray) -> np.ndarray:
@@ -119,6 +125,60 @@ def hierarchical_interval(
     labels = [table[name].to_numpy() for name in levels]
     found = [statistic(values[rows]) for rows in _resamples(labels, num_resamples, seed)]
     return _percentile_interval(statistic(values), found, level)
+
+
+def crossed_interval(
+    table: "pd.DataFrame",
+    value: str,
+    factors: Sequence[str],
+    statistic: Callable[..., np.ndarray] = np.mean,
+    num_resamples: int = 2_000,
+    level: float = 0.95,
+    seed: int = 0,
+) -> Interval:
+    """Percentile interval by a bootstrap over crossed factors, such as environments that all were run with the same seeds.
+
+    Each resample draws, with replacement, labels of every factor, each factor for itself; takes the cells in which they
+    meet; and draws as many rows of each cell as it has, such as blocks of time (the pigeonhole bootstrap of Owen 2007,
+    with rows). What a seed does in all environments then stays together, where the nested bootstrap would average it
+    away. It errs on the wide side, but for a factor of few labels: with four the interval is narrow.
+
+    Args:
+        table: The observations, the same number of rows in each cell.
+        value: Its column of values.
+        factors: Columns of labels that are crossed.
+        statistic: `numpy.mean`, or another that takes an axis.
+        num_resamples: Bootstrap resamples.
+        level: Confidence, between 0 and 1.
+        seed: Seed of the draws.
+
+    Returns:
+        The statistic of the table and its interval.
+
+    Raises:
+        InputError: If a value is not finite or a cell has fewer rows than another.
+    """
+    import pandas as pd
+
+    values = table[value].to_numpy(np.float64)
+    codes = [pd.factorize(table[name])[0] for name in factors]
+    sizes = [int(each.max(initial=-1)) + 1 for each in codes]
+    cell = np.ravel_multi_index(codes, sizes) if len(values) else np.zeros(0, int)
+    counts = np.bincount(cell, minlength=int(np.prod(sizes)))
+    if not len(values) or not np.isfinite(values).all() or np.ptp(counts) or not 0 < level < 1 or num_resamples < 1:
+        raise InputError(
+            f"Expected finite values, as many in each cell of {' x '.join(factors)}, 0 < level < 1 and num_resamples >= 1. Received: "
+            f"{counts.min(initial=0)} to {counts.max(initial=0)} rows a cell, {int((~np.isfinite(values)).sum())} not finite, "
+            f"level={level}, num_resamples={num_resamples}."
+        )
+    cells = values[np.argsort(cell, kind="stable")].reshape(*sizes, counts[0])
+    rng, shape = np.random.default_rng(seed), (num_resamples, *cells.shape)
+    drawn = []
+    for axis, size in enumerate(sizes, 1):
+        labels = rng.integers(0, size, (num_resamples, size))
+        drawn.append(labels.reshape([size if each == axis else num_resamples if not each else 1 for each in range(len(shape))]))
+    found = cells[(*drawn, rng.integers(0, counts[0], shape))].reshape(num_resamples, -1)
+    return _percentile_interval(statistic(values), statistic(found, axis=1), level)
 
 
 def wilcoxon_signed_rank(differences: np.ndarray) -> float:
@@ -204,13 +264,14 @@ def declared_contrasts(
     """Tests the contrasts that were declared before the experiment, all of them together.
 
     A difference is that of the detector-averaged log-odds of two arms in one replicate. Below zero the first arm has the
-    fewer false alarms. The test takes replicates as independent, so it speaks of the very environments that were tried;
-    the interval draws environments too, so it speaks of their like.
+    fewer false alarms. Replicates of one seed share draws (of telemetry, weights and places), so the test takes the mean
+    of each seed over the environments, and speaks of the very environments that were tried; the interval draws
+    environments too, so it speaks of their like.
 
     Args:
         table: As `detector_averaged_log_odds` takes it.
         contrasts: Pairs `(first, second)` of arms.
-        levels: Columns that name a replicate, the outermost cluster first.
+        levels: Columns that together name a replicate, crossed; the last names what shares draws.
         num_resamples: Bootstrap resamples of the intervals.
         level: Confidence of the intervals.
         seed: Seed of their draws.
@@ -226,14 +287,30 @@ def declared_contrasts(
     if unknown or not contrasts:
         raise InputError(f"Expected pairs of arms, of: {', '.join(averaged.columns)}. Received: {list(contrasts)}.")
     differences = [(averaged[first] - averaged[second]).rename("difference") for first, second in contrasts]
-    p_values = [wilcoxon_signed_rank(difference) for difference in differences]
+    clusters = [difference.groupby(level=levels[-1]).mean() for difference in differences]
+    p_values = [wilcoxon_signed_rank(means) for means in clusters]
     results = []
-    for (first, second), difference, p_value, adjusted in zip(contrasts, differences, p_values, holm(p_values), strict=True):
+    for (first, second), difference, means, p_value, adjusted in zip(
+        contrasts, differences, clusters, p_values, holm(p_values), strict=True
+    ):
         mean, median = (
-            hierarchical_interval(difference.reset_index(), "difference", levels, statistic, num_resamples, level, seed)
+            crossed_interval(difference.reset_index(), "difference", levels, statistic, num_resamples, level, seed)
             for statistic in (np.mean, np.median)
         )
-        results.append(Contrast(first, second, len(difference), mean, median, p_value, float(adjusted)))
+        results.append(
+            Contrast(
+                first=first,
+                second=second,
+                num_replicates=len(difference),
+                num_clusters=len(means),
+                mean=mean,
+                median=median,
+                p_value=p_value,
+                adjusted_p_value=float(adjusted),
+                pooled_p_value=wilcoxon_signed_rank(difference),
+                parts={str(label): float(each) for label, each in difference.groupby(level=levels[0]).mean().items()},
+            )
+        )
     return results
 
 

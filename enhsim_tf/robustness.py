@@ -31,7 +31,7 @@ class Trial:
         labels: Which samples of the trace are anomalous.
         rate: False-alarm rate that thresholds are set for.
         stride: Samples from one scored window of the trace to the next.
-        max_buffer: Largest buffer of VUS-PR in samples, for example the dominant period.
+        max_buffer: Largest buffer of VUS-PR in samples, for example a period of the signal.
     """
 
     nominal: np.ndarray

@@ -1,7 +1,7 @@
 """`python -m notebooks.build`: executes the sources `NN_name.py` and writes `NN_name.ipynb` beside them.
 
-Each notebook is stamped with the checksum of its source and the budget it ran at. `--check` executes nothing and says
-which notebooks are no longer what their sources are; exit code 1 if there is one.
+Each notebook is stamped with the checksums of its source and of the findings that it shows, and the budget it ran at.
+`--check` executes nothing and says which notebooks are no longer what these are; exit code 1 if there is one.
 """
 
 import argparse
@@ -19,6 +19,10 @@ from enhsim_tf.files import make_folder, replace_file, sha256
 FOLDER = Path(__file__).parent
 STAMP = "enhsim_tf"  # the notebook's metadata that hold its stamp
 MAX_BYTES = 1_000_000
+FINDINGS = {
+    "open_findings(": "robustness",
+    "open_labelled(": "labelled",
+}  # what a source calls, and whose findings it shows
 TIMEOUT_S = 1_800  # for one cell: a fresh clone trains in it
 
 
@@ -67,8 +71,19 @@ def execute(source: Path, budget: str, cache: Path | None = None) -> nbformat.No
     notebook.metadata["language_info"] = {
         "name": "python"
     }  # what the kernel says of itself differs from machine to machine
-    notebook.metadata[STAMP] = {"source": source.name, "sha256": sha256(source), "budget": budget}
+    notebook.metadata[STAMP] = {
+        "source": source.name,
+        "sha256": sha256(source),
+        "findings": findings(source),
+        "budget": budget,
+    }
     return notebook
+
+
+def findings(source: Path, figures: Path = FOLDER.parent / "figures") -> dict[str, str]:
+    """Checksums of the findings of experiments that a source shows, by the experiment's name."""
+    text = source.read_text(encoding="utf-8")
+    return {name: sha256(figures / name / "findings.json") for call, name in FINDINGS.items() if call in text}
 
 
 def faults(source: Path) -> list[str]:
@@ -82,6 +97,8 @@ def faults(source: Path) -> list[str]:
         cell.source for cell in expected.cells
     ]:
         found.append("stale: its source has changed")
+    if stamp.get("findings", {}) != findings(source):
+        found.append("stale: the findings that it shows have changed")
     if stamp.get("budget") != "full":
         found.append(f"executed at {stamp.get('budget', 'no')} budget")
     if not all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code"):

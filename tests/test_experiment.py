@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from enhsim_tf.realism import MEASURES
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.degraded_modes import METHODS, SEVERITIES
 from enhsim_tf.reproduce.findings import KEPT, TABLES
-from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, MIXED, QUICK_DETECTORS, SCALED, SCALES, SHARES
+from enhsim_tf.reproduce.negative_controls import NEGATIVE_CONTROLS
+from enhsim_tf.reproduce.replicates import ARMS, ENVIRONMENTS, NUM_BLOCKS, QUICK_DETECTORS, VARIATIONS
 from enhsim_tf.reproduce.robustness_figures import FIGURES
 from enhsim_tf.simulator import MODES
 
@@ -38,7 +40,11 @@ def test_every_table_has_every_row(done):
     assert len(alarms) == (7 * len(ARMS) + 3) * 10 and len(recall) == (7 * len(ARMS) + 3) * 8 * 5
     assert (alarms.groupby(["arm", "detector"])["windows"].sum() == 59).all()  # disjoint windows of a quarter of 120,000 samples
     assert ((alarms["alarms"] >= 0) & (alarms["alarms"] <= alarms["windows"])).all()
-    assert len(tables["variations"]) == (len(SCALED) * len(SCALES) + len(MIXED) * len(SHARES)) * len(QUICK_DETECTORS)
+    assert len(tables["variations"]) == len(VARIATIONS) * len(QUICK_DETECTORS)
+    noises = 1 + 2 + sum(" + " in arm for arm in ARMS)  # real, what both pipelines extract, and what they make of it
+    assert len(tables["realism"]) == noises * len(MEASURES)
+    assert len(tables["parameters"]) == noises * 3 * NUM_BLOCKS  # a shot process has three
+    assert len(tables["controls"]) == (1 + len(NEGATIVE_CONTROLS)) * len(MEASURES)
     assert len(tables["degraded"]) == len(METHODS) * (1 + len(MODES) * len(SEVERITIES))
 
 
@@ -52,8 +58,8 @@ def test_what_must_be_so_whatever_the_networks_learnt(done):
     assert traces["real", "oracle"] > 0.95 > traces["real", "random score"]
     realism = tables["realism"].set_index(["noise", "measure"])
     assert realism.loc[("enhanced + Gaussian", "kurtosis difference"), "value"] < -1  # shot noise has the heavier tails
-    share = tables["variations"].query("arm == 'enhanced' and real_share == 0.25")["alarms"].sum()
-    assert share < tables["alarms"].query("arm == 'enhanced'")["alarms"].sum()
+    mixed = tables["variations"].query("arm == 'enhanced'").groupby(["real_share", "real_threshold"])["alarms"].sum()
+    assert mixed[0.25, True] < mixed[0.0, True] and mixed[0.25, True] < mixed[0.25, False]  # most is done by the threshold
 
 
 def test_figures_are_marked_and_findings_are_json(done):
@@ -69,7 +75,7 @@ def test_figures_are_marked_and_findings_are_json(done):
 def test_a_second_run_trains_nothing_and_says_the_same(done):
     folder, first = done
     again = run(folder)
-    assert again.returncode == 0 and " ...\n" not in again.stdout and again.stdout.count("(from the cache)") == 8
+    assert again.returncode == 0 and " ...\n" not in again.stdout and again.stdout.count("(from the cache)") == 9
     assert again.stdout.split("\n\n")[1] == first.split("\n\n")[1]
 
 

@@ -8,6 +8,7 @@ import pytest
 import scipy.stats
 
 from enhsim_tf.inference import (
+    crossed_interval,
     declared_contrasts,
     detector_averaged_log_odds,
     hierarchical_interval,
@@ -131,6 +132,52 @@ def test_many_rows_are_drawn_in_batches(monkeypatch):
     assert half_width(parts) == pytest.approx(half_width(whole), rel=0.06)
 
 
+def test_the_interval_of_crossed_data_has_the_width_that_the_bootstrap_has_in_closed_form():
+    # weights of a factor of n labels are multinomial, so E[w_i w_k] = 1 - 1 / n, and one more for i = k; for cell means a
+    # less their mean the variance is (sum a^2 + (1 - 1/S) sum (sum_j a)^2 + (1 - 1/E) sum (sum_i a)^2) / (E S)^2, to which
+    # the draws of rows within the drawn cells add the mean variance within a cell over the number of rows
+    rng, (num_e, num_s, num_rows) = np.random.default_rng(5), (6, 8, 3)
+    by_environment, by_seed = rng.normal(size=(num_e, 1, 1)), 0.8 * rng.normal(size=(1, num_s, 1))
+    values = 3 + by_environment + by_seed + 0.7 * rng.normal(size=(num_e, num_s, num_rows))
+    cells = values.mean(axis=2) - values.mean()
+    rows, columns = (1 - 1 / num_s) * (cells.sum(axis=1) ** 2).sum(), (1 - 1 / num_e) * (cells.sum(axis=0) ** 2).sum()
+    variance = ((cells**2).sum() + rows + columns) / cells.size**2 + values.var(axis=2).mean() / values.size
+    labels = np.indices(values.shape).reshape(3, -1)
+    table = pd.DataFrame({**dict(zip(LEVELS, labels, strict=True)), "value": values.ravel()}).sample(frac=1, random_state=2)
+    interval = crossed_interval(table, "value", LEVELS[:2], num_resamples=20_000)
+    assert interval.estimate == pytest.approx(values.mean())
+    assert half_width(interval) == pytest.approx(scipy.stats.norm.ppf(0.975) * np.sqrt(variance), rel=0.04)
+    nested = hierarchical_interval(table, "value", LEVELS, num_resamples=20_000)  # takes what seeds share for chance
+    assert half_width(nested) < 0.9 * half_width(interval)
+
+
+def test_one_factor_with_one_row_a_label_is_the_plain_bootstrap():
+    table = pd.DataFrame({"seed": np.arange(30), "value": np.random.default_rng(1).normal(size=30)})
+    interval = crossed_interval(table, "value", ["seed"], num_resamples=20_000)
+    assert half_width(interval) == pytest.approx(scipy.stats.norm.ppf(0.975) * table["value"].std(ddof=0) / np.sqrt(30), rel=0.04)
+    assert crossed_interval(table, "value", ["seed"], seed=3) == crossed_interval(table, "value", ["seed"], seed=3)
+    assert crossed_interval(table, "value", ["seed"], seed=3) != crossed_interval(table, "value", ["seed"], seed=4)
+    assert crossed_interval(table, "value", ["seed"], np.median).estimate == table["value"].median()
+
+
+def test_a_factor_whose_labels_all_do_the_same_leaves_the_others_scatter():
+    table = pd.DataFrame({"environment": [0, 1] * 2, "seed": [0, 0, 1, 1], "value": [1.0, 1.0, 3.0, 3.0]})
+    found = crossed_interval(table, "value", ["environment", "seed"])
+    assert (found.estimate, found.low, found.high) == (2, 1, 3)
+
+
+def test_crossed_intervals_refuse_what_is_not_crossed(refused):
+    table = pd.DataFrame({"environment": [0, 1, 0, 1], "seed": [0, 0, 1, 1], "value": 1.0})
+    with refused("0 to 1 rows a cell"):
+        crossed_interval(table[:3], "value", ["environment", "seed"])
+    with refused("1 not finite"):
+        crossed_interval(table.assign(value=[1, np.nan, 2, 3]), "value", ["environment", "seed"])
+    with refused("0 to 0 rows"):
+        crossed_interval(table[:0], "value", ["seed"])
+    with refused("level=95"):
+        crossed_interval(table, "value", ["seed"], level=95)
+
+
 def test_the_interval_refuses_a_table_it_cannot_read(refused):
     table = nested((3, 2), (1.0, 1.0))
     with refused("'nothing'"):
@@ -216,15 +263,28 @@ def test_declared_contrasts_find_the_effects_that_are_there():
     averaged = detector_averaged_log_odds(table)
     for (first, second), result in zip(contrasts, results, strict=True):
         differences = averaged[first] - averaged[second]
-        assert (result.first, result.second, result.num_replicates) == (first, second, 20)
+        assert (result.first, result.second, result.num_replicates, result.num_clusters) == (first, second, 20, 10)
         assert result.mean.estimate == pytest.approx(differences.mean()) and result.median.estimate == pytest.approx(differences.median())
-        assert result.p_value == pytest.approx(scipy.stats.wilcoxon(differences, method="exact").pvalue)
+        by_seed = differences.unstack("environment").mean(axis=1)
+        assert result.p_value == pytest.approx(scipy.stats.wilcoxon(by_seed, method="exact").pvalue)
+        assert result.pooled_p_value == pytest.approx(scipy.stats.wilcoxon(differences, method="exact").pvalue)
+        assert result.parts == pytest.approx({name: differences.loc[name].mean() for name in ("shot", "white")})
         # a difference has sd sqrt(0.05^2 + 1 / (8,000 p q)) < 0.07 over two detectors, as p q > 0.07
         assert result.mean.estimate == pytest.approx(effects[first] - effects[second], abs=4 * 0.07 / np.sqrt(20))
         assert result.mean.low <= result.mean.estimate <= result.mean.high and result.mean.high - result.mean.low < 0.1
     np.testing.assert_allclose([result.adjusted_p_value for result in results], holm([result.p_value for result in results]))
     assert [result.adjusted_p_value < 0.05 for result in results] == [True, True, False]
     assert results[0].mean.high < 0 and results[1].median.high < 0
+
+
+def test_what_one_seed_does_in_all_environments_is_one_finding():
+    """Ten seeds by four environments that only repeat them: as sure as ten, where the pooled test takes them for forty."""
+    once = alarms({"a1": 0.1, "a2": 0.0}).query("environment == 'white'")
+    (single,) = declared_contrasts(once, [("a1", "a2")])
+    (repeated,) = declared_contrasts(pd.concat([once.assign(environment=name) for name in "abcd"]), [("a1", "a2")])
+    assert repeated.p_value == single.p_value and repeated.pooled_p_value < single.pooled_p_value == single.p_value
+    assert half_width(repeated.mean) == pytest.approx(half_width(single.mean), rel=0.05)
+    assert repeated.parts == pytest.approx(dict.fromkeys("abcd", single.mean.estimate))
 
 
 def test_contrasts_refuse_replicates_that_are_not_paired(refused):

@@ -194,6 +194,25 @@ def test_an_edited_notebook_is_found(tiny):
     assert build.faults(tiny) == ["stale: its source has changed"]
 
 
+def test_findings_that_changed_since_are_found(tiny, tmp_path):
+    figures = tmp_path / "figures"
+    for name in ("robustness", "labelled"):
+        (figures / name).mkdir(parents=True)
+        (figures / name / "findings.json").write_text("{}", encoding="utf-8")
+    tiny.write_text("# %%\nfound, tables = open_findings()\n", encoding="utf-8")
+    before = build.findings(tiny, figures)
+    assert list(before) == ["robustness"]
+    (figures / "labelled" / "findings.json").write_text("[]", encoding="utf-8")
+    assert build.findings(tiny, figures) == before
+    (figures / "robustness" / "findings.json").write_text("[]", encoding="utf-8")
+    assert build.findings(tiny, figures) != before
+
+
+def test_a_notebook_of_other_findings_is_stale(tiny):
+    rewrite(tiny, lambda notebook: notebook.metadata["enhsim_tf"].update(findings={"robustness": "0" * 64}))
+    assert build.faults(tiny) == ["stale: the findings that it shows have changed"]
+
+
 def test_a_notebook_that_was_not_executed_is_found(tiny):
     rewrite(tiny, lambda notebook: notebook.cells[1].update(execution_count=None))
     assert build.faults(tiny) == ["not executed from first to last cell"]

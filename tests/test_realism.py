@@ -9,11 +9,10 @@ import pickle
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from enhsim_tf import fidelity
-from enhsim_tf.noise_processes import AutoregressiveNoise
 from enhsim_tf.realism import MEASURES, RealFloor, judge
+from enhsim_tf.reproduce import negative_controls
 
 NUM_WINDOWS, SAMPLES = 200, 500
 NAMES = [measure.name for measure in MEASURES]
@@ -22,38 +21,7 @@ QUICK = [measure for measure in MEASURES if measure.name != "classifier AUC, boo
 
 
 def process(seed, num_windows=NUM_WINDOWS, samples=SAMPLES):
-    rng = np.random.default_rng(seed)
-    values = lfilter([1.0], [1.0, -0.7], rng.standard_t(5, (num_windows, samples + 100)), axis=1)[:, 100:]
-    scale = np.exp(0.3 * rng.standard_normal((num_windows, 1)))
-    return (scale * values).astype(np.float32)
-
-
-def iid_gauss(real, rng):
-    return rng.normal(0, np.std(real), real.shape)
-
-
-def fitted_autoregressive(real, rng):
-    fitted = AutoregressiveNoise(**AutoregressiveNoise.estimate(real))
-    return np.stack([fitted.draw(real.shape[1], rng) for _ in real])
-
-
-def phase_randomised(real, rng):
-    transformed = np.fft.rfft(real, axis=1)
-    return np.fft.irfft(transformed * np.exp(2j * np.pi * rng.random(transformed.shape)), real.shape[1], axis=1)
-
-
-def stretched(real, rng):
-    return 1.5 * real
-
-
-def memorised(real, rng):
-    return real[rng.integers(0, 20, len(real))]
-
-
-def linear_latent(real, rng):
-    _, energy, directions = np.linalg.svd(real - real.mean(axis=0), full_matrices=False)
-    latent = rng.standard_normal((len(real), 16)) * energy[:16] / np.sqrt(len(real))
-    return real.mean(axis=0) + latent @ directions[:16]
+    return negative_controls.process(num_windows, samples, np.random.default_rng(seed))
 
 
 @pytest.fixture(scope="module")
@@ -65,27 +33,34 @@ def floor():
 def judged(floor):
     """The rows of each control, made from windows that the floor has not seen."""
     real = process(3)
-    controls = (iid_gauss, fitted_autoregressive, phase_randomised, stretched, memorised, linear_latent)
-    return {"real": floor.judge(real)} | {control.__name__: floor.judge(control(real, np.random.default_rng(4))) for control in controls}
+    return {"real": floor.judge(real)} | {
+        name: floor.judge(make(real, np.random.default_rng(4))) for name, make in negative_controls.NEGATIVE_CONTROLS.items()
+    }
 
 
 SPECTRUM, WITH_SCALE = {"geodesic distance"}, {"log spectral distance", "scale difference", "log scale distance", "marginal distance"}
 TAILS = {"kurtosis difference", "tail ratio"}
 SEEN_BY = {
-    "iid_gauss": set(NAMES) - {"scale difference"},
-    "fitted_autoregressive": {*TAILS, *CLASSIFIERS, "marginal distance", "log scale distance", "coverage", "MMD squared"},
-    "phase_randomised": {*TAILS, *CLASSIFIERS, "coverage", "MMD squared"},
-    "stretched": {*WITH_SCALE, *CLASSIFIERS, "tail ratio", "coverage", "MMD squared"},
-    "memorised": {*SPECTRUM, *CLASSIFIERS, "coverage", "MMD squared", "effective rank ratio"},
-    "linear_latent": set(NAMES),
+    "Gaussian of the same scale": set(NAMES) - {"scale difference"},
+    "fitted Gaussian AR(1)": {*TAILS, *CLASSIFIERS, "marginal distance", "log scale distance", "coverage", "MMD squared"},
+    "real, phases randomised": {*TAILS, *CLASSIFIERS, "coverage", "MMD squared"},
+    "real, 1.5 times as loud": {*WITH_SCALE, *CLASSIFIERS, "tail ratio", "coverage", "MMD squared"},
+    "twenty windows memorised": {*SPECTRUM, *CLASSIFIERS, "coverage", "MMD squared", "effective rank ratio"},
+    "sixteen linear dimensions": set(NAMES),
 }
 BLIND = {
-    "iid_gauss": {"scale difference"},
-    "fitted_autoregressive": {"geodesic distance", "autocorrelation distance", "scale difference", "density"},
-    "phase_randomised": {"geodesic distance", "log spectral distance", "autocorrelation distance", "effective rank ratio", "density"},
-    "stretched": {"geodesic distance", "autocorrelation distance", "kurtosis difference", "effective rank ratio"},
-    "memorised": {"density"},
-    "linear_latent": set(),
+    "Gaussian of the same scale": {"scale difference"},
+    "fitted Gaussian AR(1)": {"geodesic distance", "autocorrelation distance", "scale difference", "density"},
+    "real, phases randomised": {
+        "geodesic distance",
+        "log spectral distance",
+        "autocorrelation distance",
+        "effective rank ratio",
+        "density",
+    },
+    "real, 1.5 times as loud": {"geodesic distance", "autocorrelation distance", "kurtosis difference", "effective rank ratio"},
+    "twenty windows memorised": {"density"},
+    "sixteen linear dimensions": set(),
 }
 
 
@@ -108,15 +83,15 @@ def test_a_control_is_not_seen_by_those_that_cannot(judged, control):
 def test_controls_have_the_values_that_theory_or_the_published_practice_gives(judged):
     frequency = np.arange(1, 250) / 500
     of_the_filter = np.std(np.log(np.abs(1 - 0.7 * np.exp(-2j * np.pi * frequency)) ** 2))
-    assert judged["iid_gauss"]["geodesic distance"].value == pytest.approx(of_the_filter, rel=0.05)
-    assert judged["iid_gauss"]["autocorrelation distance"].value == pytest.approx(0.7, abs=0.03)
+    assert judged["Gaussian of the same scale"]["geodesic distance"].value == pytest.approx(of_the_filter, rel=0.05)
+    assert judged["Gaussian of the same scale"]["autocorrelation distance"].value == pytest.approx(0.7, abs=0.03)
     for measure in ("scale difference", "log scale distance"):
-        assert judged["stretched"][measure].value == pytest.approx(np.log(1.5), abs=0.06)
-    assert judged["stretched"]["tail ratio"].value == pytest.approx(1.5, rel=0.1)
-    assert judged["memorised"]["density"].value == pytest.approx(1, abs=0.15)  # density alone looks fine
-    assert judged["memorised"]["coverage"].value < 0.5
-    assert judged["memorised"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 20
-    assert judged["linear_latent"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 16.5
+        assert judged["real, 1.5 times as loud"][measure].value == pytest.approx(np.log(1.5), abs=0.06)
+    assert judged["real, 1.5 times as loud"]["tail ratio"].value == pytest.approx(1.5, rel=0.1)
+    assert judged["twenty windows memorised"]["density"].value == pytest.approx(1, abs=0.15)  # density alone looks fine
+    assert judged["twenty windows memorised"]["coverage"].value < 0.5
+    assert judged["twenty windows memorised"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 20
+    assert judged["sixteen linear dimensions"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 16.5
 
 
 def test_verdicts(judged):
@@ -151,7 +126,7 @@ CHEAP = [measure for measure in QUICK if measure.section not in ("A5", "rank")]
 
 def mixed(grade, real, rng):
     """From real noise to white noise of its scale."""
-    return np.sqrt(1 - grade) * real + np.sqrt(grade) * iid_gauss(real, rng)
+    return np.sqrt(1 - grade) * real + np.sqrt(grade) * negative_controls.NEGATIVE_CONTROLS["Gaussian of the same scale"](real, rng)
 
 
 def scaled(grade, real, rng):

@@ -18,7 +18,7 @@ import numpy as np
 
 from enhsim_tf.errors import InputError
 from enhsim_tf.files import replace_file
-from enhsim_tf.reproduce import robustness_figures, robustness_report, robustness_run
+from enhsim_tf.reproduce import report_words, robustness_figures, robustness_run
 from enhsim_tf.reproduce.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed, title_verdict
 from enhsim_tf.reproduce.figures import FIGURES, Figure
 from enhsim_tf.reproduce.report import PAPER, disagreement, read_spread, short
@@ -88,8 +88,8 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     )
     environment.filters |= {
         "short": short,
-        "interval": robustness_report.interval,
-        "per_cent": robustness_report.per_cent,
+        "interval": report_words.interval,
+        "per_cent": report_words.per_cent,
         "kind": lambda verdict: _KINDS.get(verdict, "none"),
     }
     rows, spread = deviations(), read_spread(folder, found)
@@ -129,8 +129,8 @@ def _experiment(folder: Path) -> dict[str, Any] | None:
     return {
         "found": found,
         "pictures": pictures,
-        "verdict": robustness_report.verdict_c8(found),
-        "share": robustness_report.share_c8(found),
+        "verdict": report_words.verdict_c8(found),
+        "share": report_words.share_c8(found),
     }
 
 

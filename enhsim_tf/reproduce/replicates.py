@@ -14,6 +14,7 @@ import numpy as np
 from enhsim_tf import realism, robustness
 from enhsim_tf.detectors import CONTROLS, DETECTORS
 from enhsim_tf.noise import BlockBootstrap, GaussianAutoregression, GaussianNoise, noise_unit
+from enhsim_tf.noise_processes import NOISES
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
@@ -25,7 +26,11 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 ENVIRONMENTS = ("white", "autoregressive", "heteroscedastic", "shot")
-TABLES = {"arms": ("alarms", "recall", "traces"), "variations": ("variations",), "realism": ("realism", "iterations")}  # by stage
+TABLES = {  # by stage
+    "arms": ("alarms", "recall", "traces"),
+    "variations": ("variations",),
+    "realism": ("realism", "parameters", "iterations"),
+}
 PAPER, OURS = "paper", "ours"  # the two pipelines: moving average and the paper's GAN; residual and the convolutional one
 ARMS = {
     "coarse": "the coarse simulator",
@@ -43,8 +48,21 @@ ARMS = {
     "real": "real nominal telemetry",
 }
 """What detectors are trained on, in the order of the figures."""
-SCALES, SCALED = (0.5, 0.75, 1.5, 2.0), ("enhanced + GAN", "enhanced + AR", "ours + GAN")
-SHARES, MIXED = (0.01, 0.05, 0.25), ("enhanced", "enhanced + GAN", "ours + GAN")
+SCALES, SCALED = (0.5, 0.75, 1.0, 1.5, 2.0), ("enhanced + GAN", "enhanced + AR", "ours + GAN", "ours + AR")
+SHARES, MIXED = (0.0, 0.01, 0.05, 0.25), ("enhanced", "enhanced + GAN", "ours", "ours + GAN")
+VARIATIONS = tuple(
+    dict.fromkeys(
+        [
+            *((arm, scale, 0.0, True) for arm in SCALED for scale in SCALES),
+            *((arm, 1.0, share, True) for arm in MIXED for share in SHARES),
+            *((arm, 1.0, share, False) for arm in MIXED for share in SHARES[1:]),
+            ("real", 1.0, 1.0, True),
+        ]
+    )
+)
+"""Arm, scale of its noise, share of its training windows that real ones replace (which are the same for all arms), and
+whether they replace as many of the windows that set the threshold."""
+NUM_BLOCKS = 10  # of windows, in each of which the parameters of a noise are estimated
 QUICK_DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest", "one-class SVM")
 
 
@@ -130,19 +148,15 @@ class Replicate:
         chosen, seed = self.settings.robustness, self.settings.seed
         trial = self.trial(chosen.num_anomalous_varied)
         quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
-        training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
-        draws = self.experiment.data.draw("mixed windows")
+        learnt, limiting = self.arms("arms, training"), self.arms("arms, threshold")
         rows = []
-        for arm, scale, share in (
-            *((arm, scale, 0.0) for arm in SCALED for scale in SCALES),
-            *((a, 1.0, s) for a in MIXED for s in SHARES),
-        ):
-
-            def vary(arms: Mapping[str, np.ndarray], arm: str = arm, scale: float = scale, share: float = share) -> np.ndarray:
-                clean = arms[arm.split(" + ")[0]]
-                return robustness.mixed(clean + np.float32(scale) * (arms[arm] - clean), arms["real"], share, draws)
-
-            judged = robustness.judge_arm(vary(training), vary(held_out), trial, quick, seed)
+        for arm, scale, share, both in VARIATIONS:
+            draws = self.experiment.data.draw(f"mixed windows, {arm}, {scale}, {share}")
+            training, held_out = (
+                robustness.mixed(_scaled(arms, arm, scale), arms["real"], part, draws)
+                for arms, part in ((learnt, share), (limiting, share if both else 0.0))
+            )
+            judged = robustness.judge_arm(training, held_out, trial, quick, seed)
             recall, alarms = ({name: [] for name in quick} for _ in range(2))
             for row in judged["recall"]:
                 recall[row["detector"]].append(row["recall"])
@@ -150,12 +164,12 @@ class Replicate:
                 alarms[row["detector"]].append((row["alarms"], row["windows"]))
             for name in quick:
                 raised, windows = np.sum(alarms[name], axis=0).tolist()
-                about = {"arm": arm, "scale": scale, "real_share": share, "detector": name}
+                about = {"arm": arm, "scale": scale, "real_share": share, "real_threshold": both, "detector": name}
                 rows.append({**about, "alarms": raised, "windows": windows, "recall": float(np.mean(recall[name]))})
         self._save(folder, {"variations": rows})
 
     def _make_realism(self, folder: Path) -> None:
-        """Measures A1 to A7 of every noise against the true noise, and what an iteration of either GAN takes."""
+        """Measures A1 to A7 of every noise against the true noise, its parameters, and what an iteration of either GAN takes."""
         data, number = self.experiment.data, self.settings.robustness.num_windows
 
         def true_noise(part: str) -> np.ndarray:
@@ -168,11 +182,18 @@ class Replicate:
         seed = int(data.draw("realism").integers(2**31))
         judged = {"real": third[:number]}
         for pipeline, name in ((PAPER, "enhanced"), (OURS, "ours")):
-            extracted = self.extracted[pipeline]
+            extracted = self.disjoint_extracted[pipeline]
             judged[f"{name}: extracted"] = extracted[np.arange(number) % len(extracted)]
             judged |= {f"{name} + {noise}": model.generate(number, seed) for noise, model in self.surrogates[pipeline].items()}
         rows = [{"noise": noise, **dataclasses.asdict(row)} for noise, windows in judged.items() for row in floor.judge(windows).rows]
-        self._save(folder, {"realism": rows, "iterations": self._iterations()})
+        process = NOISES[self.settings.telemetry.noise]
+        parameters = [
+            {"noise": noise, "block": block, "parameter": parameter, "value": value}
+            for noise, windows in judged.items()
+            for block, part in enumerate(np.array_split(windows, NUM_BLOCKS))
+            for parameter, value in process.estimate(part).items()
+        ]
+        self._save(folder, {"realism": rows, "parameters": parameters, "iterations": self._iterations()})
 
     def _iterations(self, rounds: int = 7, steps: int = 5) -> list[dict]:
         """Seconds an iteration of both GANs, untrained and in turns."""
@@ -230,8 +251,14 @@ class Replicate:
         draws = np.random.default_rng([self.settings.seed, 1])
         return {
             PAPER: data.noise_windows("train", number, "noise windows"),
-            OURS: self.second_simulator.residual_windows(data.channels[0].train, number, draws),
+            OURS: self.second_simulator.residual_windows(data.channels[0].train, self.settings.second.num_windows, draws),
         }
+
+    @property
+    def disjoint_extracted(self) -> dict[str, np.ndarray]:
+        """The same noise in windows that share no sample, as the measures of realism want them."""
+        data, windows = self.experiment.data, self.experiment.data.windows("train", None)
+        return {PAPER: data.noise_windows("train", None), OURS: windows["target"] - self.second_simulator.enhance(windows["coarse"])}
 
     @functools.cached_property
     def surrogates(self) -> Mapping[str, Mapping[str, object]]:
@@ -262,6 +289,12 @@ class Replicate:
         part = "train" if purpose == "arms, training" else "calibration"
         arms["real"] = data.windows(part, number, f"{purpose}, real")["target"]
         return {arm: arms[arm] for arm in ARMS}
+
+
+def _scaled(arms: Mapping[str, np.ndarray], arm: str, scale: float) -> np.ndarray:
+    """Windows of an arm with its noise at another scale; an arm without noise stays as it is."""
+    clean = arms[arm.split(" + ")[0]]
+    return clean + np.float32(scale) * (arms[arm] - clean)
 
 
 def replicate(settings: Settings, stages: Stages, environment: str, number: int, verbose: int = 0) -> Replicate:

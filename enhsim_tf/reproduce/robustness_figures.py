@@ -11,7 +11,7 @@ from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.degraded_modes import LARGEST_TRAINED, SCORED
 from enhsim_tf.reproduce.figures import Figure
 from enhsim_tf.reproduce.replicates import ARMS, MIXED, SCALED
-from enhsim_tf.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, IN_PRINT, QUIET, REAL, label_ends, new_sheet, panels
+from enhsim_tf.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, label_ends, new_sheet, panels
 
 Findings = Mapping[str, Any]
 _NAMES = {
@@ -35,7 +35,7 @@ def _per_cent(axes: Axes, ticks: Sequence[float]) -> None:
 
 
 def _scope(found: Findings) -> str:
-    return f"{in_seeds(found['seeds'])}, {found['num_windows']:,} real nominal windows each"
+    return f"{in_seeds(found['seeds'])}, {found['num_windows']:,} nominal windows each"
 
 
 def false_alarms(found: Findings) -> matplotlib.figure.Figure:
@@ -44,14 +44,15 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
         [found["arms"][name] for name in ARMS],
         *(found["arms"][n] for n in ("enhanced + GAN", "ours + GAN", "real")),
     )
+    environments = found["environments"]
     figure, down = new_sheet(
         DOUBLE,
         6.4,
-        f"Detectors trained with the paper's generated noise alarm on {100 * paper['false_alarms']['mean']:.0f} % of real nominal telemetry, "
+        f"Detectors trained with the paper's generated noise alarm on {100 * paper['false_alarms']['mean']:.0f} % of nominal telemetry on average, "
         f"with the second generator's on {100 * ours['false_alarms']['mean']:.1f} %; trained on real telemetry, on {100 * real['false_alarms']['mean']:.1f} %",
-        f"Set for 1 % (line). Dot and bar: mean over seven detectors, with its 95 % interval over seeds; small marks: each detector. {_scope(found)}.",
+        f"Set for 1 % (line). Dot and bar: mean over {len(real['by_environment'][environments[0]]['detectors'])} detectors with its 95 % interval over "
+        f"seeds; small marks: each detector, none at all at {100 * _LEAST:g} %. Real: example telemetry in its part; {_scope(found)}.",
     )
-    environments = found["environments"]
     rows = -(-len(environments) // 2)
     grid = panels(figure, down + 0.22, rows, min(2, len(environments)), gap=(0.42, 0.16), sharey=True, sharex=True)
     left = 1.5 / DOUBLE
@@ -77,13 +78,14 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     return figure
 
 
+# colours that a grey printer makes alike differ in their dashes or marks
 _SHOWN = {
-    "real": (REAL, "-"),
-    "ours + GAN": (ENHANCED, "-"),
-    "ours + AR": (ENHANCED, ":"),
-    "enhanced + GAN": (GENERATED, "-"),
-    "enhanced + AR": (GENERATED, ":"),
-    "coarse": (COARSE, "--"),
+    "real": {"color": REAL, "linestyle": "-", "linewidth": 1.8},
+    "ours + GAN": {"color": ENHANCED, "linestyle": "-", "marker": "o", "markersize": 2.5},
+    "ours + AR": {"color": ENHANCED, "linestyle": ":"},
+    "enhanced + GAN": {"color": GENERATED, "linestyle": "--", "marker": "s", "markersize": 2.5},
+    "enhanced + AR": {"color": GENERATED, "linestyle": ":"},
+    "coarse": {"color": COARSE, "linestyle": "-."},
 }
 
 
@@ -96,18 +98,19 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
         4.4,
         f"With the threshold set on real telemetry, detectors trained on the second generator's noise find {100 * at['ours + GAN']:.0f} % "
         f"of anomalies, on real telemetry {100 * at['real']:.0f} %, on the paper's generated noise {100 * at['enhanced + GAN']:.0f} %",
-        f"Recall at 1 % false alarms on real nominal windows, whatever the arm's own threshold; means over detectors, environments and {_scope(found)}.",
+        "Recall at 1 % false alarms on real nominal windows, whatever the arm's own threshold; means over detectors, environments and "
+        f"{in_seeds(found['seeds'])}.",
     )
     grid = panels(figure, down + 0.22, 2, 4, right=1.1, gap=(0.42, 0.16), sharex=True, sharey=True)
     for axes, (kind, arms) in zip(grid.ravel(), curves.items(), strict=True):
-        for arm, (colour, style) in _SHOWN.items():
-            axes.plot(arms[arm]["severity"], arms[arm]["recall_at_real_rate"], style, color=colour)
+        for arm, style in _SHOWN.items():
+            axes.plot(arms[arm]["severity"], arms[arm]["recall_at_real_rate"], **style)
         axes.set_title(kind.replace("_", " "))
         axes.set_xscale("log")
         axes.set_xticks([0.5, 1, 2, 4, 8], ["0.5", "1", "2", "4", "8"])
         axes.minorticks_off()
         axes.set_ylim(0, 1.02)
-    label_ends(grid[0, -1], {arm: (curves[list(curves)[3]][arm]["recall_at_real_rate"], colour) for arm, (colour, _) in _SHOWN.items()})
+    label_ends(grid[0, -1], {arm: (curves[list(curves)[3]][arm]["recall_at_real_rate"], style["color"]) for arm, style in _SHOWN.items()})
     for axes in grid[-1]:
         axes.set_xlabel("severity (sd of the noise)")
     for axes in grid[:, 0]:
@@ -118,13 +121,14 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
 def realism_value(found: Findings) -> matplotlib.figure.Figure:
     """Which measure of realism predicts what noise is worth to a detector."""
     measures = sorted(found["measures"]["predicts"].items(), key=lambda each: each[1]["rho"])
-    (best, strongest), (_, weakest) = measures[0], measures[-1]
+    (best, strongest), (within, inside) = measures[0], min(measures, key=lambda each: each[1]["within"])
+    inside_too = "inside them too" if within == best else f"inside them, {within} ({inside['within']:.2f})"
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        f"The measure that best predicts a noise's value to detectors: {best} (rank correlation {strongest['rho']:.2f}); the worst reaches {weakest['rho']:.2f}",
-        f"Spearman's rho between the departure from real noise and the share of the false-alarm gap closed, over {found['measures']['num_rows']} "
-        "noises of all environments and seeds, with 95 % intervals; −1 would be perfect.",
+        f"Over all environments, {best} follows a noise's value to detectors best (rank correlation {strongest['rho']:.2f}); {inside_too}",
+        f"Dot and bar: Spearman's rho between the departure from real noise and the share of the false-alarm gap closed, over {found['measures']['num_rows']} "
+        "noises of all environments and seeds, with its 95 % interval; cross: mean of the correlations inside each environment. −1 would be perfect.",
     )
     axes = panels(figure, down + 0.12, 1, 1)[0, 0]
     place = axes.get_position()
@@ -133,67 +137,76 @@ def realism_value(found: Findings) -> matplotlib.figure.Figure:
         colour = ENHANCED if about["high"] < 0 else COARSE
         axes.plot([about["low"], about["high"]], [-height] * 2, color=colour, linewidth=2, alpha=0.5)
         axes.plot(about["rho"], -height, "o", color=colour, markersize=4)
+        axes.plot(about["within"], -height, "x", color=REAL, markersize=4)
     axes.set_yticks(-np.arange(len(measures)), [f"{about['section']}  {name}" for name, about in measures])
     axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
-    axes.set_xlim(-1.02, max(0.02, axes.get_xlim()[1]))
+    axes.set_xlim(-1.02, max(0.02, *(about[end] + 0.03 for _, about in measures for end in ("high", "within"))))
     axes.set_xlabel("rank correlation with the gap closed")
     return figure
+
+
+_FEATURES = ("isolation forest", "one-class SVM")  # detectors that look at features of a window
 
 
 def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
     """False alarms and recall against the scale of the noise, and against the share of real windows mixed in."""
     rows = found["variations"]
-    shown = {
-        "enhanced": (GENERATED, "--"),
-        "enhanced + GAN": (GENERATED, "-"),
-        "enhanced + AR": (GENERATED, ":"),
-        "ours + GAN": (ENHANCED, "-"),
-    }
-    (only_scaled,) = (arm for arm in SCALED if arm not in MIXED)
-
-    def curve(arm: str, x: str, fixed: Mapping[str, float], value: str) -> np.ndarray:
-        points = [(row[x], row[value]) for row in rows if row["arm"] == arm and all(row[key] == each for key, each in fixed.items())]
-        return np.array(sorted(points)).T
-
     scaled = {row["scale"]: row for row in rows if row["arm"] == "ours + GAN" and row["real_share"] == 0}
-    low, own, high = (scaled[scale] for scale in (0.75, 1.0, 1.5))
+    quiet, own, loud = (scaled[scale] for scale in (0.75, 1.0, 1.5))
+
+    def mean_of(row: Mapping[str, Any], value: str, by_features: bool) -> float:
+        return 100 * float(np.mean([about[value] for name, about in row["by_detector"].items() if (name in _FEATURES) == by_features]))
+
     figure, down = new_sheet(
         DOUBLE,
-        4.6,
-        f"Noise has to have the right scale: the second generator's, at {low['scale']:g} times its own, leaves {100 * low['false_alarms']:.0f} % "
-        f"false alarms, at its own {100 * own['false_alarms']:.1f} %, at {high['scale']:g} times {100 * high['false_alarms']:.0f} %",
-        f"Means over the five detectors that are no networks, environments and {_scope(found)}.",
+        4.8,
+        f"The second generator's noise at {quiet['scale']:g} of its scale leaves {100 * quiet['false_alarms']:.0f} % false alarms. At {loud['scale']:g} of it, detectors "
+        f"that look at features alarm on {mean_of(loud, 'rate', True):.0f} %; the others on {mean_of(loud, 'rate', False):.1f} %, but they find "
+        f"{mean_of(loud, 'recall', False):.0f} % of anomalies instead of {mean_of(own, 'recall', False):.0f} %",
+        f"Means over {len(loud['by_detector'])} detectors (no networks), environments and {in_seeds(found['seeds'])}. Right, solid: real windows in training and where the "
+        "threshold is set; dashed: in training alone; dotted: what 1 % of a threshold set on so many real windows leaves at most.",
     )
-    grid = panels(figure, down + 0.2, 2, 2, right=1.15, gap=(0.2, 0.62), sharex="col")
+    grid = panels(figure, down + 0.2, 2, 2, right=1.15, gap=(0.2, 1.5), sharex="col")
+    shares = [arm for arm in MIXED if arm != "ours"]
     for row, (value, label) in enumerate((("false_alarms", "false alarms (%)"), ("recall", "recall (%)"))):
-        for column, (x, fixed) in enumerate((("scale", {"real_share": 0.0}), ("real_share", {"scale": 1.0}))):
-            axes, ends = grid[row, column], {}
-            for arm, (colour, style) in shown.items():
-                points = curve(arm, x, fixed, value)
-                if points.size and points.shape[1] > 2:
-                    marked = {"color": colour, "marker": "o", "markersize": 2.5, "clip_on": False}
-                    axes.plot(points[0] * (100 if column else 1), 100 * points[1], style, **marked)
-                    ends[arm] = (100 * points[1], colour)
-                    if arm == only_scaled:  # its name is not beside the right panels
-                        axes.annotate(
-                            arm, (points[0][1], 100 * points[1][1]), (4, 3), textcoords="offset points", color=IN_PRINT.get(colour, colour)
-                        )
+        left, right = grid[row]
+        ends: dict[str, Any] = {}
+        for arm in SCALED:
+            points = sorted((each["scale"], 100 * each[value]) for each in rows if each["arm"] == arm and each["real_share"] == 0)
+            left.plot(*np.transpose(points), **_SHOWN[arm])
+            ends[arm] = ([points[-1][1]], _SHOWN[arm]["color"])
+        right_ends: dict[str, Any] = {}
+        for arm in shares:
+            colour = COARSE if arm == "enhanced" else _SHOWN[arm]["color"]
+            for both, style in ((True, "-"), (False, "--")):
+                points = sorted(
+                    (100 * each["real_share"], 100 * each[value])
+                    for each in rows
+                    if each["arm"] == arm and each["scale"] == 1 and (each["real_threshold"] == both or each["real_share"] == 0)
+                )
+                right.plot(*np.transpose(points), style, color=colour, marker="o", markersize=2.5, clip_on=False)
+                if not both:
+                    right_ends[arm] = ([points[-1][1]], colour)
+        if not row:
+            share = np.geomspace(1, 100, 50)
+            right.plot(share, 100 / share, ":", color=QUIET)
+        right.set_xscale("symlog", linthresh=1)
+        right.set_xticks([0, 1, 5, 25, 100], ["0", "1", "5", "25", "100"])
+        right.minorticks_off()
+        for axes in grid[row]:
             axes.set_ylabel(label)
-            axes.set_ylim(0, 104 if row == 0 else None)
-            if column:
-                axes.set_xscale("symlog", linthresh=1)
-                axes.set_xticks([0, 1, 5, 25, 100], ["0", "1", "5", "25", "100"])
-                axes.minorticks_off()
-                label_ends(axes, ends)
+            axes.set_ylim(0, 104)
+        label_ends(left, ends)
+        label_ends(right, right_ends)
     grid[1, 0].set_xlabel("scale of the noise (1: as generated)")
     grid[1, 1].set_xlabel("real windows mixed in (%)")
     return figure
 
 
 _METHODS = {
-    "identity": (COARSE, "--", "coarse"),
-    "ridge": (AVERAGE, ":", "ridge"),
-    "paper": (GENERATED, "-", "paper's enhancer"),
+    "identity": (COARSE, "-.", "coarse"),
+    "ridge, randomised": (AVERAGE, ":", "ridge, randomised"),
+    "paper": (GENERATED, "--", "paper's enhancer"),
     "more windows": (ENHANCED, ":", "more windows"),
     "randomised": (ENHANCED, "-", "randomised"),
 }
@@ -206,9 +219,9 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.2,
-        f"The paper's enhancer errs by {errors['paper']['inside']:.2f} up to severity {found['modes']['largest_trained']} and by "
-        f"{errors['paper']['outside']:.2f} beyond; trained over randomised configurations up to there, by {errors['randomised']['inside']:.2f} and "
-        f"{errors['randomised']['outside']:.2f}",
+        f"Beyond severity {found['modes']['largest_trained']} the paper's enhancer errs by {errors['paper']['outside']:.2f}, the untouched coarse signal by "
+        f"{errors['identity']['outside']:.2f}; trained over randomised configurations up to there, a network errs by {errors['randomised']['outside']:.2f}, "
+        f"linear regression by {errors['ridge, randomised']['outside']:.2f}",
         f"Root mean square error of the enhanced signal against the true degraded one, in units of the nominal signal's standard deviation; grey: severities "
         f"that the randomised enhancer was trained on; {in_seeds(found['modes']['seeds'])}.",
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.files import make_folder, write_json
+from enhsim_tf.reproduce.negative_controls import judge_controls
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import VERSIONS, Stages
 
@@ -80,4 +81,20 @@ def collect(
             import keras
 
             keras.backend.clear_session()  # hundreds of networks would fill the memory
-    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}
+    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()} | {
+        "controls": _controls(settings, cache, fresh, tell)
+    }
+
+
+def _controls(settings: Settings, cache: Path, fresh: bool, tell: Callable[[str], None]) -> "pd.DataFrame":
+    """What the measures of realism make of noises whose fault is known; one process, no network."""
+    import pandas as pd
+
+    chosen = settings.robustness
+    numbers = (chosen.num_windows, settings.telemetry.window, chosen.num_resplits, chosen.first_seed)
+
+    def make(folder: Path) -> None:
+        judge_controls(*numbers).to_parquet(folder / "controls.parquet")
+
+    folder = Stages(cache, fresh, tell).run("controls", make, ("reproduce.negative_controls",), numbers)
+    return pd.read_parquet(folder / "controls.parquet")
