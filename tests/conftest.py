@@ -29,3 +29,17 @@ def refused():
             assert word in message
 
     return refused
+
+
+@pytest.fixture
+def near():
+    """`found == near(kept)`: the same findings, but for the last digits that another processor computes otherwise."""
+
+    def near(value):
+        if isinstance(value, dict):
+            return {key: near(each) for key, each in value.items()}
+        if isinstance(value, list):
+            return [near(each) for each in value]
+        return pytest.approx(value, rel=1e-9, abs=1e-12) if isinstance(value, float) else value
+
+    return near
