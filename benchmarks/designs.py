@@ -106,19 +106,11 @@ class Bench:
     """
 
     def __init__(self, one: "Replicate"):
-        from enhsim_tf import realism
-
         self.settings, data = one.settings, one.experiment.data
         chosen = self.settings.robustness
-
-        def noise_of(windows: dict[str, np.ndarray]) -> np.ndarray:
-            return windows["target"] - windows["truth"]
-
-        real, again, third = (noise_of(data.windows(part, None)) for part in ("test", "train", "calibration"))
-        size = min(chosen.num_windows, len(real), len(again), len(third))
-        self.held_out = third[:size]
-        self.floor = realism.RealFloor(real[:size], again[:size], chosen.num_resplits, seed=self.settings.seed)
-        self.learnt = noise_of(data.windows("train", self.settings.second.num_windows, "tries, noise"))
+        self.floor, self.held_out = one.floor()
+        windows = data.windows("train", self.settings.second.num_windows, "tries, noise")
+        self.learnt = windows["target"] - windows["truth"]
         # what detectors learn from, and what their thresholds are set on
         self.waves = [data.windows("train", chosen.num_windows, f"tries, {part}")["truth"] for part in ("training", "threshold")]
         self.telemetry = [data.windows(part, chosen.num_windows, f"tries, real, {part}")["target"] for part in ("train", "calibration")]

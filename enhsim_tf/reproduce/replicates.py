@@ -170,17 +170,9 @@ class Replicate:
 
     def _make_realism(self, folder: Path) -> None:
         """Measures A1 to A7 of every noise against the true noise, its parameters, and what an iteration of either GAN takes."""
-        data, number = self.experiment.data, self.settings.robustness.num_windows
-
-        def true_noise(part: str) -> np.ndarray:
-            windows = data.windows(part, None)
-            return windows["target"] - windows["truth"]
-
-        real, again, third = (true_noise(part) for part in ("test", "train", "calibration"))
-        number = min(number, len(real), len(again), len(third))
-        floor = realism.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
-        seed = int(data.draw("realism").integers(2**31))
-        judged = {"real": third[:number]}
+        floor, held_out = self.floor()
+        number, seed = len(held_out), int(self.experiment.data.draw("realism").integers(2**31))
+        judged = {"real": held_out}
         for pipeline, name in ((PAPER, "enhanced"), (OURS, "ours")):
             extracted = self.disjoint_extracted[pipeline]
             judged[f"{name}: extracted"] = extracted[np.arange(number) % len(extracted)]
@@ -243,6 +235,19 @@ class Replicate:
             rate=chosen.false_alarm_rate,
             max_buffer=round(min(channel.periods_s) / channel.telemetry.interval_s),
         )
+
+    def floor(self) -> tuple[realism.RealFloor, np.ndarray]:
+        """What two samples of true noise differ by, and windows of a third that are held out."""
+        data, number = self.experiment.data, self.settings.robustness.num_windows
+
+        def true_noise(part: str) -> np.ndarray:
+            windows = data.windows(part, None)
+            return windows["target"] - windows["truth"]
+
+        real, again, held_out = (true_noise(part) for part in ("test", "train", "calibration"))
+        number = min(number, len(real), len(again), len(held_out))
+        floor = realism.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
+        return floor, held_out[:number]
 
     @functools.cached_property
     def extracted(self) -> dict[str, np.ndarray]:
