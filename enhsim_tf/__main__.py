@@ -75,7 +75,6 @@ def run_generate(options: argparse.Namespace) -> int:
     if options.continuous is not None:
         parse_length(options.continuous)
     from enhsim_tf.channels import chosen_of, models_of
-    from enhsim_tf.trusted_range import TrustedRange
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = outputs_of(options.out, models, (".parquet",))
@@ -91,7 +90,11 @@ def run_generate(options: argparse.Namespace) -> int:
             write_series_labelled(paths[channel], simulator, length, scenario, options.seed, start)
             what = f"{counted(length, 'sample')}, one every {simulator.interval_s:g} s"
         tell(f"{printable(channel)}: {what} in {paths[channel]}")
-        trusted = TrustedRange(simulator) if scenarios else None
+        if not scenarios:
+            return
+        from enhsim_tf.trusted_range import TrustedRange
+
+        trusted = TrustedRange(simulator)
         for scenario in scenarios:
             share = trusted.share_outside(scenario)
             tell(
