@@ -98,7 +98,7 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
         4.4,
         f"With the threshold set on real telemetry, detectors trained on the second generator's noise find {100 * at['ours + GAN']:.0f} % "
         f"of anomalies, on real telemetry {100 * at['real']:.0f} %, on the paper's generated noise {100 * at['enhanced + GAN']:.0f} %",
-        "Recall at 1 % false alarms on real nominal windows, whatever the arm's own threshold; means over detectors, environments and "
+        "Recall at 1 % false alarms on real windows, whatever the arm's own threshold; means over detectors, environments and "
         f"{in_seeds(found['seeds'])}.",
     )
     grid = panels(figure, down + 0.22, 2, 4, right=1.1, gap=(0.42, 0.16), sharex=True, sharey=True)
