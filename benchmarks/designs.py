@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.reproduce.__main__ import NOISES as ENVIRONMENTS
-from enhsim_tf.reproduce.report_words import DEVELOPMENT_SEEDS
+from enhsim_tf.reproduce.report_words import AS_IT_IS, DEVELOPMENT_SEEDS, REAL_NOISE
 from enhsim_tf.reproduce.robustness_report import designs_of
 
 if TYPE_CHECKING:
@@ -24,14 +24,13 @@ if TYPE_CHECKING:
     from enhsim_tf.reproduce.replicates import Replicate
 
 ROOT = Path(__file__).parents[1]
-REAL = "real noise"
 LONGER, LEAST_SQUARES, TAILS, MAXIMUM = (
     "four times the iterations",
     "least squares loss",
     "heavier-tailed latent series",
     "the paper's discriminator",
 )
-DESIGNS = ("as it is", LONGER, LEAST_SQUARES, TAILS, MAXIMUM)
+DESIGNS = (AS_IT_IS, LONGER, LEAST_SQUARES, TAILS, MAXIMUM)
 _FROM_TO = f"{DEVELOPMENT_SEEDS[0]} to {DEVELOPMENT_SEEDS[-1]}"
 KEYS = ("environment", "seed", "noise")
 """Columns that say which row it is."""
@@ -41,7 +40,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.designs", description="Other trainings of the second generator.")
     parser.add_argument("--environment", action="append", choices=ENVIRONMENTS, help="these alone (default: all)")
-    parser.add_argument("--noise", action="append", choices=(REAL, *DESIGNS), help="these alone (default: all)")
+    parser.add_argument("--noise", action="append", choices=(REAL_NOISE, *DESIGNS), help="these alone (default: all)")
     parser.add_argument("--seed", type=int, action="append", help=f"a development seed, {_FROM_TO} (default: 110)")
     parser.add_argument("--budget", choices=("full", "smoke"), default="full", help="smoke: tiny counts, measures nothing")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "tries.csv", help="the table (default: %(default)s)")
@@ -120,7 +119,7 @@ class Bench:
         """Trains a design and measures its noise, or measures real noise that was held out.
 
         Args:
-            noise: `REAL` or one of `DESIGNS`.
+            noise: `REAL_NOISE` or one of `DESIGNS`.
 
         Returns:
             A row: iterations of training, false alarms and recall of the detectors that train in a second, mean over
@@ -131,7 +130,7 @@ class Bench:
         from enhsim_tf.reproduce.replicates import QUICK_DETECTORS
 
         number, generated, arms = 0, self.held_out, self.telemetry
-        if noise != REAL:
+        if noise != REAL_NOISE:
             gan, number = untrained(noise, self.learnt, self.settings.adversarial.num_iterations, self.settings.seed)
             gan.fit(self.learnt, number, verbose=False)
             draws = np.random.default_rng([self.settings.seed, 1 + DESIGNS.index(noise)])
@@ -159,7 +158,7 @@ def main(arguments: list[str] | None = None) -> int:
     for seed in options.seed or [110]:
         for environment in options.environment or ENVIRONMENTS:
             kept = {row["noise"] for row in rows if (row["environment"], row["seed"]) == (environment, str(seed))}
-            missing = [noise for noise in options.noise or (REAL, *DESIGNS) if noise not in kept]
+            missing = [noise for noise in options.noise or (REAL_NOISE, *DESIGNS) if noise not in kept]
             if not missing:
                 continue
             settings = make_settings(options.budget, seed, telemetry__noise=environment)

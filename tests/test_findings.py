@@ -244,6 +244,26 @@ def test_tries_are_counted_and_the_furthest_measure_is_named(found):
     assert "Tries where" not in robustness_report.render({**found, "budget": "full"})
 
 
+def test_what_the_tries_show_is_counted():
+    counts = (
+        ("white", "real noise", 15),
+        ("white", "as it is", 6),
+        ("white", "as it is", 7),
+        ("white", "louder", 8),
+        ("white", "longer", 9),
+    )
+    rows = [
+        {"environment": where, "noise": noise, "within": within, "number": 15}
+        for where, noise, within in (*counts, ("shot", "as it is", 5))
+    ]
+    said = "Measures kept, of 15: on white noise 6.5 as it is, 9 at best otherwise (longer); on shot noise 5 as it is. "
+    assert report_words.tries_found(rows) == said + "None of the 5 trainings keeps all."
+    assert report_words.tries_found([*rows, {**rows[3], "within": 15}]).endswith(
+        "11.5 at best otherwise (louder); on shot noise 5 as it is. 1 of the 6 trainings keeps all."
+    )
+    assert report_words.tries_found([]) == report_words.tries_found(rows[:1]) == ""
+
+
 @pytest.mark.parametrize("value, text", [(-0.0004, "0.0 %"), (0.0004, "0.0 %"), (-0.0006, "-0.1 %"), (0.123, "12.3 %"), (1.0, "100.0 %")])
 def test_what_rounds_to_nought_has_no_sign(value, text):
     assert report_words.per_cent(value) == text

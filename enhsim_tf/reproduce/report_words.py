@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
 Findings = Mapping[str, Any]
 DEVELOPMENT_SEEDS = range(100, 200)  # designs are chosen on these, and nothing is reported of them
+REAL_NOISE, AS_IT_IS = "real noise", "as it is"  # of the tries: what no generator made, and the design that nothing was changed in
 
 
 def number(value: float, digits: int = 1) -> str:
@@ -155,6 +156,28 @@ def modes_found(found: Findings) -> str:
         f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {len(network)} pairs of mode and severity the regression is nearer than that "
         f"network, in {coarse} the untouched coarse signal."
     )
+
+
+def tries_found(tries: Sequence[Mapping[str, Any]]) -> str:
+    """How many measures the tries keep within twice their floor: the design as it is and the best other, environment by environment.
+
+    Args:
+        tries: Rows of the tries with how many measures are `within`, of which `number`.
+    """
+    kept: dict[str, dict[str, list[int]]] = {}
+    for row in tries:
+        if row["noise"] != REAL_NOISE:
+            kept.setdefault(row["environment"], {}).setdefault(row["noise"], []).append(row["within"])
+    said, most = [], tries[0]["number"] if tries else 0
+    for environment, counts in kept.items():
+        mean = {noise: sum(each) / len(each) for noise, each in counts.items()}
+        other = max(mean.keys() - {AS_IT_IS}, key=lambda noise: (mean[noise], noise), default=None)
+        before = f"{mean[AS_IT_IS]:.3g} as it is" if AS_IT_IS in mean else ""
+        after = f"{mean[other]:.3g} at best otherwise ({other})" if other else ""
+        said.append(f"on {environment} noise {', '.join(filter(None, (before, after)))}")
+    full = sum(row["within"] == row["number"] for row in tries if row["noise"] != REAL_NOISE)
+    trained = sum(row["noise"] != REAL_NOISE for row in tries)
+    return f"Measures kept, of {most}: {'; '.join(said)}. {full or 'None'} of the {trained} trainings keeps all." if said else ""
 
 
 def _noises(pipeline: str, arms: Iterable[str]) -> list[str]:

@@ -21,6 +21,7 @@ from enhsim_tf.reproduce.report_words import (
     reached,
     share,
     share_c8,
+    tries_found,
     verdict_c8,
     words,
 )
@@ -67,12 +68,13 @@ def render(
         "in_seeds": in_seeds,
         "share": share,
     }
-    settings = make_settings(found["budget"])
+    settings, tried = make_settings(found["budget"]), [_tried(row) for row in tries]
     return environment.get_template(template).render(
         found=found,
         labelled=labelled,
         designs=designs,
-        tries=[_tried(row) for row in tries],
+        tries=tried,
+        tries_found=tries_found(tried),
         timing=timing,
         controls=found["negative_controls"],
         settings=settings,
