@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 KINDS_OF_NOISE = {"Gaussian": ("white", "autoregressive"), "not Gaussian": ("heteroscedastic", "shot")}
 BARS = {"white": (0.01, 0.02), "autoregressive": (0.01, 0.02), "heteroscedastic": (0.01, 0.02), "shot": (0.03, None)}
 """Largest excess of the second generator's false-alarm rate over the real-trained arm's, and of its upper 95 % bound."""
-LARGEST_RECALL_DIFFERENCE, LARGEST_RATIO, LARGEST_TIME = 0.02, 2.0, 2.0
+LARGEST_RECALL_DIFFERENCE, LARGEST_RATIO = 0.02, 2.0
 MARGIN = 0.005
 """False alarms by which an arm may be above another and still count as not worse, at its upper 95 % bound."""
 
@@ -57,10 +57,3 @@ def not_inferior(alarms: "pd.DataFrame") -> dict[str, Any]:
         about = interval(rate[f"{pipeline} + GAN"] - rate[f"{pipeline} + bootstrap"])
         found[pipeline] = {"difference": about, "margin": MARGIN, "reached": bool(about["high"] <= MARGIN)}
     return found
-
-
-def iterations(table: "pd.DataFrame") -> dict[str, float]:
-    """Time of an iteration of the second GAN over one of the paper's, beside each replicate: median of their medians, and range."""
-    seconds = table.pivot_table("seconds", ["environment", "seed", "round"], "noise")
-    ratio = (seconds["convolutional"] / seconds["paper"]).groupby(["environment", "seed"]).median()
-    return {"median": float(ratio.median()), "low": float(ratio.min()), "high": float(ratio.max()), "largest": LARGEST_TIME}

@@ -26,7 +26,6 @@ TABLES = (
     "realism",
     "parameters",
     "controls",
-    "iterations",
     "degraded",
     "trust",
     "trust_correlation",
@@ -78,7 +77,6 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         "variations": _variations(tables["variations"]),
         "modes": _modes(tables),
         "trust_curves": _trust_curves(tables["trust"]),
-        "iterations": bars.iterations(tables["iterations"]),
     }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from enhsim_tf import realism, robustness
 from enhsim_tf.detectors import CONTROLS, DETECTORS
-from enhsim_tf.noise import BlockBootstrap, GaussianAutoregression, GaussianNoise, noise_unit
+from enhsim_tf.noise import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.noise_processes import NOISES
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.settings import Settings
@@ -29,7 +29,7 @@ ENVIRONMENTS = ("white", "autoregressive", "heteroscedastic", "shot")
 TABLES = {  # by stage
     "arms": ("alarms", "recall", "traces"),
     "variations": ("variations",),
-    "realism": ("realism", "parameters", "iterations"),
+    "realism": ("realism", "parameters"),
 }
 PAPER, OURS = "paper", "ours"  # the two pipelines: moving average and the paper's GAN; residual and the convolutional one
 ARMS = {
@@ -169,7 +169,7 @@ class Replicate:
         self._save(folder, {"variations": rows})
 
     def _make_realism(self, folder: Path) -> None:
-        """Measures A1 to A7 of every noise against the true noise, its parameters, and what an iteration of either GAN takes."""
+        """Measures A1 to A7 of every noise against the true noise, and its parameters."""
         floor, held_out = self.floor()
         number, seed = len(held_out), int(self.experiment.data.draw("realism").integers(2**31))
         judged = {"real": held_out}
@@ -185,29 +185,7 @@ class Replicate:
             for block, part in enumerate(np.array_split(windows, NUM_BLOCKS))
             for parameter, value in process.estimate(part).items()
         ]
-        self._save(folder, {"realism": rows, "parameters": parameters, "iterations": self._iterations()})
-
-    def _iterations(self, rounds: int = 7, steps: int = 5) -> list[dict]:
-        """Seconds an iteration of both GANs, untrained and in turns."""
-        import time
-
-        import tensorflow as tf
-
-        from enhsim_tf.convolutional_noise import convolutional_noise_gan
-        from enhsim_tf.noise_gan import NoiseGAN
-
-        noise = self.extracted[OURS]
-        gans = {"paper": NoiseGAN(scale=noise_unit(noise)), "convolutional": convolutional_noise_gan(noise)}
-        windows = {name: tf.constant(noise[:, :, None] / np.float32(gan.scale)) for name, gan in gans.items()}
-        rows = []
-        for round_ in range(rounds + 1):
-            for name, gan in gans.items():
-                began = time.perf_counter()
-                for _ in range(steps):
-                    gan._step(windows[name])
-                if round_:  # the first builds the graph
-                    rows.append({"noise": name, "round": round_, "seconds": (time.perf_counter() - began) / steps})
-        return rows
+        self._save(folder, {"realism": rows, "parameters": parameters})
 
     def _save(self, folder: Path, tables: Mapping[str, list[dict]]) -> None:
         import pandas as pd
