@@ -57,15 +57,13 @@ def build_convolutional_generator(
         shaped = layers.Conv1D(channels, width, activation="leaky_relu", kernel_initializer=kernel(number))(shaped)
     # units that fire at one to four standard deviations, and large when they do: tails that begin small grow too slowly
     rarely = keras.initializers.RandomUniform(-4.0, -1.0, seed=seed * 1000 + 402)
-    rare = layers.Conv1D(rare_units, 1, activation="relu", kernel_initializer=kernel(403), bias_initializer=rarely)(
-        aligned[:, :, :num_white]
-    )
+    rare = layers.Dense(rare_units, "relu", kernel_initializer=kernel(403), bias_initializer=rarely)(aligned[:, :, :num_white])
     paths = layers.Concatenate()([shaped, aligned[:, :, :num_white], rare, 2 * rare * rare])
-    noise = layers.Conv1D(1, 1, kernel_initializer=kernel(404))(paths)
+    noise = layers.Dense(1, kernel_initializer=kernel(404))(paths)
     if num_slow:
-        gain = layers.Conv1D(8, 1, activation="tanh", kernel_initializer=kernel(405))(aligned[:, :, num_white:])
+        gain = layers.Dense(8, "tanh", kernel_initializer=kernel(405))(aligned[:, :, num_white:])
         near_one = keras.initializers.RandomNormal(0, 0.1, seed=seed * 1000 + 406)
-        noise = noise * layers.Conv1D(1, 1, activation="exponential", kernel_initializer=near_one)(gain)
+        noise = noise * layers.Dense(1, "exponential", kernel_initializer=near_one)(gain)
     return keras.Model(latent, noise, name="generator")
 
 
@@ -133,9 +131,10 @@ def _statistics(values: keras.KerasTensor) -> tuple[keras.KerasTensor, keras.Ker
     window = values.shape[1]
     scale = ops.sqrt(mean(values * values) + _TINY)
     unit = values / scale
+    square = unit * unit  # powers by products: a power's gradient takes logarithms
     steps = ops.diff(values, axis=1)
     bends = ops.diff(steps, axis=1)
-    moments = [mean(values), ops.log(scale), mean(unit**3), ops.log(mean(unit**4)), ops.log(mean(ops.abs(unit)) + _TINY)]
+    moments = [mean(values), ops.log(scale), mean(square * unit), ops.log(mean(square * square)), ops.log(mean(ops.abs(unit)) + _TINY)]
     roughness = [ops.log(mean(each * each) + _TINY) for each in (steps, bends)]
     correlations = [mean(unit[:, lag:] * unit[:, :-lag]) for lag in _LAGS if lag < window]
     exceedances = [mean(ops.relu(sign * each - threshold)) for each in (values, unit) for sign in (1, -1) for threshold in _THRESHOLDS]
