@@ -209,6 +209,7 @@ def test_a_measure_that_follows_the_alarms_predicts_them(found):
     shifted["realism"].loc[far, "departure"] += 1000.0
     about = findings.summarise(shifted)["measures"]["predicts"]["follows"]
     assert about["within"] == pytest.approx(-1) and about["rho"] > -0.9
+    assert about["within_low"] == pytest.approx(-1) and about["within_high"] == pytest.approx(-1)
     assert found["measures"]["num_rows"] == 12 * sum(" + " in arm for arm in ARMS)
 
 
@@ -302,6 +303,7 @@ def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
     assert report_words.kept_c8(some) == f"{first} on shot and white noise"
     assert len(some["arms"]["ours + GAN"]["c8"]["kept"]) == 28
     assert (some["arms"]["ours + GAN"]["c8"]["replicates"], some["arms"]["ours + GAN"]["c8"]["of_replicates"]) == (83, 84)
+    assert some["arms"]["ours + GAN"]["c8"]["missed"] == dict.fromkeys(ENVIRONMENTS, 0) | {"white": 1}
 
 
 def test_sentences_follow_from_their_comparison(found):

@@ -28,10 +28,10 @@ METHODS = {
     "identity": "the coarse signal as it is",
     "moving average": "the coarse signal, smoothed",
     "ridge": "linear regression from nominal coarse windows",
-    "ridge, randomised": "the same from windows of all modes",
+    "ridge, randomised": "the same from windows of all modes, with their true response",
     "paper": "the paper's enhancer: 1,500 nominal windows, 40 epochs",
     "more windows": "15,000 nominal windows, 2 epochs, a rate that falls",
-    "randomised": "the same over nominal and degraded configurations",
+    "randomised": "the same over nominal and degraded configurations, with their true response",
 }
 """From coarse windows to an estimate of the true ones."""
 SCORED = {"paper": "nominal", "more windows": "nominal", "randomised": "randomised"}

@@ -117,6 +117,7 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
             "of": int(len(pairs)),
             "replicates": int(each.sum()),
             "of_replicates": int(len(each)),
+            "missed": {name: int((~each.xs(name, level="environment")).sum()) for name in environments},
         }
     return arms
 

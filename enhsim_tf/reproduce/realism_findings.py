@@ -49,6 +49,8 @@ def measures(mean_rate: "pd.DataFrame", realism: "pd.DataFrame") -> dict[str, An
             "low": correlation.low,
             "high": correlation.high,
             "within": float(np.mean(inside)),
+            "within_low": float(np.min(inside)),
+            "within_high": float(np.max(inside)),
         }
     counts = (floor_ratios(realism) <= LARGEST_RATIO).sum(axis=1)
     is_all = realism.groupby(["noise", *REPLICATE])["is_within"].all()

@@ -98,6 +98,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     gaussian = [name for name in bars.KINDS_OF_NOISE["Gaussian"] if name in found["bars"]]
     asked, controls = [found["bars"][name] for name in gaussian], found["controls"].values()
     trial = inspect.signature(robustness.make_trial).parameters
+    scaled = [row for row in found["variations"] if row["arm"] == "ours + GAN" and row["real_share"] == 0 and row["scale"] < 1]
     confirmed = [name for name, about in found["alarms_on_everything"].items() if about["replicates"] == about["of"]]
     return {
         "arms": replicates.ARMS,
@@ -127,6 +128,8 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         "largest_ratio": number(bars.LARGEST_RATIO, 0),
         "best_control": max(about["recall_at_real_rate"] for about in controls if "recall_at_real_rate" in about),
         "modes_found": modes_found(found),
+        "least_p": 2 * 0.5 ** len(found["seeds"]),  # of signed ranks that all have one sign
+        "quieter": max(scaled, key=lambda row: row["scale"]),
     }
 
 
@@ -151,7 +154,8 @@ def modes_found(found: Findings) -> str:
     worse = "above" if errors["paper"]["outside"] > errors["identity"]["outside"] else "below"
     return (
         f"Outside, the paper's enhancer errs by {at['paper']['outside']}, {worse} the coarse signal left as it is ({at['identity']['outside']}) "
-        f"and against {at['moving average']['outside']} of the smoothed one. Training over random configurations is what helps: linear regression over them "
+        f"and against {at['moving average']['outside']} of the smoothed one. Training over random configurations is what helps, where the true response to them is known "
+        f"as it is here (their targets are the true degraded signal with noise): linear regression over them "
         f"errs by {at['ridge, randomised']['inside']} inside and {at['ridge, randomised']['outside']} outside, the network that learnt from the same by "
         f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {len(network)} pairs of mode and severity the regression is nearer than that "
         f"network, in {coarse} the untouched coarse signal."

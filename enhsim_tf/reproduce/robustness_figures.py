@@ -51,7 +51,7 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
         f"Detectors trained with the paper's generated noise alarm on {100 * paper['false_alarms']['mean']:.0f} % of nominal telemetry on average, "
         f"with the second generator's on {100 * ours['false_alarms']['mean']:.1f} %; trained on real telemetry, on {100 * real['false_alarms']['mean']:.1f} %",
         f"Set for 1 % (line). Dot and bar: mean over {len(real['by_environment'][environments[0]]['detectors'])} detectors with its 95 % interval over "
-        f"seeds; small marks: each detector, none at all at {100 * _LEAST:g} %. Real: example telemetry in its part; {_scope(found)}.",
+        f"seeds; small marks: each detector, {100 * _LEAST:g} % or less at {100 * _LEAST:g} %. Real: example telemetry that plays its part; {_scope(found)}.",
     )
     rows = -(-len(environments) // 2)
     grid = panels(figure, down + 0.22, rows, min(2, len(environments)), gap=(0.42, 0.16), sharey=True, sharex=True)
@@ -122,7 +122,9 @@ def realism_value(found: Findings) -> matplotlib.figure.Figure:
     """Which measure of realism predicts what noise is worth to a detector."""
     measures = sorted(found["measures"]["predicts"].items(), key=lambda each: each[1]["rho"])
     (best, strongest), (within, inside) = measures[0], min(measures, key=lambda each: each[1]["within"])
-    inside_too = "inside them too" if within == best else f"inside them, {within} ({inside['within']:.2f})"
+    there = f"{inside['within']:.2f}"
+    is_tie = f"{measures[0][1]['within']:.2f}" == there
+    inside_too = "inside them too" if within == best else f"inside them, {'it and ' if is_tie else ''}{within} ({there})"
     figure, down = new_sheet(
         DOUBLE,
         3.9,
@@ -154,17 +156,17 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
     scaled = {row["scale"]: row for row in rows if row["arm"] == "ours + GAN" and row["real_share"] == 0}
     quiet, own, loud = (scaled[scale] for scale in (0.75, 1.0, 1.5))
 
-    def mean_of(row: Mapping[str, Any], value: str, by_features: bool) -> float:
-        return 100 * float(np.mean([about[value] for name, about in row["by_detector"].items() if (name in _FEATURES) == by_features]))
+    def found_by_values(row: Mapping[str, Any]) -> float:
+        return 100 * float(np.mean([about["recall"] for name, about in row["by_detector"].items() if name not in _FEATURES]))
 
+    in_environments = ", ".join(f"{100 * quiet['by_environment'][name]:.0f} % ({name})" for name in found["environments"])
     figure, down = new_sheet(
         DOUBLE,
         4.8,
-        f"The second generator's noise at {quiet['scale']:g} of its scale leaves {100 * quiet['false_alarms']:.0f} % false alarms. At {loud['scale']:g} of it, detectors "
-        f"that look at features alarm on {mean_of(loud, 'rate', True):.0f} %; the others on {mean_of(loud, 'rate', False):.1f} %, but they find "
-        f"{mean_of(loud, 'recall', False):.0f} % of anomalies instead of {mean_of(own, 'recall', False):.0f} %",
+        f"At {quiet['scale']:g} of its scale, the second generator's noise leaves false alarms of {in_environments}; at {loud['scale']:g} of it, detectors "
+        f"that look at values find {found_by_values(loud):.0f} % of anomalies instead of {found_by_values(own):.0f} %",
         f"Means over {len(loud['by_detector'])} detectors (no networks), environments and {in_seeds(found['seeds'])}. Right, solid: real windows in training and where the "
-        "threshold is set; dashed: in training alone; dotted: what 1 % of a threshold set on so many real windows leaves at most.",
+        "threshold is set; dashed: in training alone; dotted: the most that arithmetic allows, 1 % over the share of real windows.",
     )
     grid = panels(figure, down + 0.2, 2, 2, right=1.15, gap=(0.2, 1.5), sharex="col")
     shares = [arm for arm in MIXED if arm != "ours"]
