@@ -104,7 +104,7 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
     grid = panels(figure, down + 0.22, 2, 4, right=1.1, gap=(0.42, 0.16), sharex=True, sharey=True)
     for axes, (kind, arms) in zip(grid.ravel(), curves.items(), strict=True):
         for arm, style in _SHOWN.items():
-            axes.plot(arms[arm]["severity"], arms[arm]["recall_at_real_rate"], **style)
+            axes.plot(arms[arm]["severity"], arms[arm]["recall_at_real_rate"], **style, clip_on=False)
         axes.set_title(kind.replace("_", " "))
         axes.set_xscale("log")
         axes.set_xticks([0.5, 1, 2, 4, 8], ["0.5", "1", "2", "4", "8"])
@@ -175,7 +175,7 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
         ends: dict[str, Any] = {}
         for arm in SCALED:
             points = sorted((each["scale"], 100 * each[value]) for each in rows if each["arm"] == arm and each["real_share"] == 0)
-            left.plot(*np.transpose(points), **_SHOWN[arm])
+            left.plot(*np.transpose(points), **_SHOWN[arm], clip_on=False)
             ends[arm] = ([points[-1][1]], _SHOWN[arm]["color"])
         right_ends: dict[str, Any] = {}
         for arm in shares:
