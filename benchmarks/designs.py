@@ -108,8 +108,7 @@ class Bench:
         self.settings, data = one.settings, one.experiment.data
         chosen = self.settings.robustness
         self.floor, self.held_out = one.floor()
-        windows = data.windows("train", self.settings.second.num_windows, "tries, noise")
-        self.learnt = windows["target"] - windows["truth"]
+        self.learnt = one.true_noise("train", self.settings.second.num_windows, "tries, noise")
         # what detectors learn from, and what their thresholds are set on
         self.waves = [data.windows("train", chosen.num_windows, f"tries, {part}")["truth"] for part in ("training", "threshold")]
         self.telemetry = [data.windows(part, chosen.num_windows, f"tries, real, {part}")["target"] for part in ("train", "calibration")]

@@ -216,16 +216,21 @@ class Replicate:
 
     def floor(self) -> tuple[realism.RealFloor, np.ndarray]:
         """What two samples of true noise differ by, and windows of a third that are held out."""
-        data, number = self.experiment.data, self.settings.robustness.num_windows
-
-        def true_noise(part: str) -> np.ndarray:
-            windows = data.windows(part, None)
-            return windows["target"] - windows["truth"]
-
-        real, again, held_out = (true_noise(part) for part in ("test", "train", "calibration"))
-        number = min(number, len(real), len(again), len(held_out))
+        real, again, held_out = (self.true_noise(part) for part in ("test", "train", "calibration"))
+        number = min(self.settings.robustness.num_windows, len(real), len(again), len(held_out))
         floor = realism.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
         return floor, held_out[:number]
+
+    def true_noise(self, part: str, num_windows: int | None = None, purpose: str = "") -> np.ndarray:
+        """Windows of the noise itself: what the telemetry has beside the noiseless signal.
+
+        Args:
+            part: `train`, `calibration` or `test`.
+            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
+            purpose: Names the draw of the offsets.
+        """
+        windows = self.experiment.data.windows(part, num_windows, purpose)
+        return windows["target"] - windows["truth"]
 
     @functools.cached_property
     def extracted(self) -> dict[str, np.ndarray]:

@@ -92,13 +92,13 @@ def first_trial(found: Findings) -> str:
 
 def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     """What the template says that is no number of the findings: names, what was fixed before, and what follows from a comparison."""
-    from enhsim_tf import detectors, injections, robustness
+    from enhsim_tf import detectors, inference, injections, robustness
     from enhsim_tf.reproduce import bars, degraded_modes, replicates
 
     gaussian = [name for name in bars.KINDS_OF_NOISE["Gaussian"] if name in found["bars"]]
     asked, controls = [found["bars"][name] for name in gaussian], found["controls"].values()
     trial = inspect.signature(robustness.make_trial).parameters
-    scaled = [row for row in found["variations"] if row["arm"] == "ours + GAN" and row["real_share"] == 0 and row["scale"] < 1]
+    scaled = by_scale(found)
     confirmed = [name for name, about in found["alarms_on_everything"].items() if about["replicates"] == about["of"]]
     return {
         "arms": replicates.ARMS,
@@ -128,9 +128,14 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         "largest_ratio": number(bars.LARGEST_RATIO, 0),
         "best_control": max(about["recall_at_real_rate"] for about in controls if "recall_at_real_rate" in about),
         "modes_found": modes_found(found),
-        "least_p": 2 * 0.5 ** len(found["seeds"]),  # of signed ranks that all have one sign
-        "quieter": max(scaled, key=lambda row: row["scale"]),
+        "least_p": inference.wilcoxon_signed_rank([1.0] * len(found["seeds"])),  # where all signs are the same
+        "quieter": scaled[max(scale for scale in scaled if scale < 1)],
     }
+
+
+def by_scale(found: Findings) -> dict[float, Findings]:
+    """What the second generator's noise does at each scale, without any real window."""
+    return {row["scale"]: row for row in found["variations"] if row["arm"] == "ours + GAN" and row["real_share"] == 0}
 
 
 def opposite_signs(found: Findings, least: float = 0.1) -> str:
@@ -155,7 +160,7 @@ def modes_found(found: Findings) -> str:
     return (
         f"Outside, the paper's enhancer errs by {at['paper']['outside']}, {worse} the coarse signal left as it is ({at['identity']['outside']}) "
         f"and against {at['moving average']['outside']} of the smoothed one. Training over random configurations is what helps, where the true response to them is known "
-        f"as it is here (their targets are the true degraded signal with noise): linear regression over them "
+        "as it is here (their targets are the true degraded signal with noise): linear regression over them "
         f"errs by {at['ridge, randomised']['inside']} inside and {at['ridge, randomised']['outside']} outside, the network that learnt from the same by "
         f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {len(network)} pairs of mode and severity the regression is nearer than that "
         f"network, in {coarse} the untouched coarse signal."
@@ -168,20 +173,21 @@ def tries_found(tries: Sequence[Mapping[str, Any]]) -> str:
     Args:
         tries: Rows of the tries with how many measures are `within`, of which `number`.
     """
+    trainings = [row for row in tries if row["noise"] != REAL_NOISE]
+    if not trainings:
+        return ""
     kept: dict[str, dict[str, list[int]]] = {}
-    for row in tries:
-        if row["noise"] != REAL_NOISE:
-            kept.setdefault(row["environment"], {}).setdefault(row["noise"], []).append(row["within"])
-    said, most = [], tries[0]["number"] if tries else 0
+    for row in trainings:
+        kept.setdefault(row["environment"], {}).setdefault(row["noise"], []).append(row["within"])
+    said = []
     for environment, counts in kept.items():
         mean = {noise: sum(each) / len(each) for noise, each in counts.items()}
         other = max(mean.keys() - {AS_IT_IS}, key=lambda noise: (mean[noise], noise), default=None)
         before = f"{mean[AS_IT_IS]:.3g} as it is" if AS_IT_IS in mean else ""
         after = f"{mean[other]:.3g} at best otherwise ({other})" if other else ""
         said.append(f"on {environment} noise {', '.join(filter(None, (before, after)))}")
-    full = sum(row["within"] == row["number"] for row in tries if row["noise"] != REAL_NOISE)
-    trained = sum(row["noise"] != REAL_NOISE for row in tries)
-    return f"Measures kept, of {most}: {'; '.join(said)}. {full or 'None'} of the {trained} trainings keeps all." if said else ""
+    full = sum(row["within"] == row["number"] for row in trainings)
+    return f"Measures kept, of {trainings[0]['number']}: {'; '.join(said)}. {full or 'None'} of the {len(trainings)} trainings keeps all."
 
 
 def _noises(pipeline: str, arms: Iterable[str]) -> list[str]:

@@ -11,6 +11,7 @@ from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.degraded_modes import LARGEST_TRAINED, SCORED
 from enhsim_tf.reproduce.figures import Figure
 from enhsim_tf.reproduce.replicates import ARMS, MIXED, SCALED
+from enhsim_tf.reproduce.report_words import by_scale
 from enhsim_tf.sheet import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, label_ends, new_sheet, panels
 
 Findings = Mapping[str, Any]
@@ -153,7 +154,7 @@ _FEATURES = ("isolation forest", "one-class SVM")  # detectors that look at feat
 def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
     """False alarms and recall against the scale of the noise, and against the share of real windows mixed in."""
     rows = found["variations"]
-    scaled = {row["scale"]: row for row in rows if row["arm"] == "ours + GAN" and row["real_share"] == 0}
+    scaled = by_scale(found)
     quiet, own, loud = (scaled[scale] for scale in (0.75, 1.0, 1.5))
 
     def found_by_values(row: Mapping[str, Any]) -> float:
