@@ -18,8 +18,7 @@ from enhsim_tf.reproduce.report_words import AS_IT_IS, DEVELOPMENT_SEEDS, REAL_N
 from enhsim_tf.reproduce.robustness_report import designs_of
 
 if TYPE_CHECKING:
-    import keras
-
+    from enhsim_tf.backend import keras
     from enhsim_tf.noise_gan import NoiseGAN
     from enhsim_tf.reproduce.replicates import Replicate
 
@@ -62,8 +61,7 @@ def untrained(design: str, noise: np.ndarray, num_iterations: int, seed: int) ->
         num_iterations: Those of the frozen design.
         seed: Seed of the weights and of every draw.
     """
-    import keras
-
+    from enhsim_tf.backend import keras
     from enhsim_tf.convolutional_noise import convolutional_noise_gan
     from enhsim_tf.noise_gan import build_discriminator
 
@@ -89,7 +87,7 @@ def heavy_tailed(generator: "keras.Model", num_slow: int, weight: float = 0.2) -
         num_slow: Channels that stay normal.
         weight: The h of the distribution: moments of the order 1/h and above are infinite.
     """
-    import keras
+    from enhsim_tf.backend import keras
 
     normal = keras.Input(generator.input_shape[1:])
     white, slow = normal[:, :, :-num_slow], normal[:, :, -num_slow:]
@@ -150,9 +148,8 @@ def main(arguments: list[str] | None = None) -> int:
     from enhsim_tf.reproduce.replicates import Replicate
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache
-    from enhsim_tf.terminal import start_tensorflow, tell
+    from enhsim_tf.terminal import tell
 
-    start_tensorflow()
     rows = designs_of(options.out)
     for seed in options.seed or [110]:
         for environment in options.environment or ENVIRONMENTS:

@@ -151,7 +151,7 @@ def measure_parts(options: argparse.Namespace) -> dict:
 
 def _matrix_product() -> tuple[float, float]:
     """Seconds and operations of the best of some matrix products of the enhancer's size, in this process' one thread."""
-    import tensorflow as tf
+    from enhsim_tf.backend import tf
 
     first, second = (tf.random.stateless_uniform(shape, (1, 2)) for shape in ((1_024, 3_200), (3_200, 3_200)))
     product, times = tf.function(tf.matmul), []

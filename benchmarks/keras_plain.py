@@ -1,15 +1,11 @@
 """Plain Keras 3, as its guides teach it: `fit` and `predict` with numpy arrays, and one `tf.function` step for the GAN."""
 
-from collections.abc import Callable
-
 import keras
 import numpy as np
 import tensorflow as tf
 from keras import layers
 
-from benchmarks.ours import example_windows, seconds_of_epoch
-
-Work = tuple[Callable[[], object], int]
+from benchmarks.examples import Work, example_windows, seconds_of_epoch
 
 
 def enhancer(window: int, hidden_units: int) -> keras.Model:

@@ -2,29 +2,16 @@
 
 import os
 import tempfile
-import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-import keras
 import numpy as np
-import tensorflow as tf
 
+from benchmarks.examples import Work, example_windows, seconds_of_epoch
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+from enhsim_tf.backend import keras, tf
 from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.enhancer import batches, build_enhancer, fit_windows
 from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
-
-Work = tuple[Callable[[], object], int]
-
-
-def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coarse and noisy target windows like the paper's: float32 arrays of shape `(num_windows, window)`."""
-    rng = np.random.default_rng(0)
-    phase = 2 * np.pi * (rng.integers(0, 480, num_windows)[:, None] + np.arange(window)) / 480
-    coarse = 0.5 * np.sign(np.sin(phase)) + 0.25 * np.sign(np.sin(4 * phase))
-    truth = 0.5 * np.sin(phase) + 0.25 * np.sin(4 * phase)
-    return coarse.astype(np.float32), (truth + rng.normal(0, 0.1, truth.shape)).astype(np.float32)
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -35,17 +22,6 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
     # a second call of fit_windows would compile anew: go on with what it compiled, fed as it feeds
     data = batches(source, target, np.random.default_rng(0).permutation(len(source))[None], 15)
     return lambda: seconds_of_epoch(model, data, shuffle=False), num_steps
-
-
-def seconds_of_epoch(model: keras.Model, *data: object, **settings: object) -> float:
-    """Seconds of one epoch of `fit`, from its begin to its end: what `fit` does before and after is paid once a training."""
-    times = []
-    clock = keras.callbacks.LambdaCallback(
-        on_epoch_begin=lambda epoch, logs: times.append(time.perf_counter()),
-        on_epoch_end=lambda epoch, logs: times.append(time.perf_counter()),
-    )
-    model.fit(*data, epochs=1, verbose=0, callbacks=[clock], **settings)
-    return times[1] - times[0]
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:

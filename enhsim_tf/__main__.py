@@ -227,9 +227,6 @@ def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) ->
 
 def load(folder: Path) -> "EnhancedSimulator":
     """The simulator of a folder."""
-    from enhsim_tf.terminal import start_tensorflow
-
-    start_tensorflow()
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
     return EnhancedSimulator.load(folder)

@@ -73,8 +73,7 @@ class ConvolutionalAutoencoder:
         return np.mean((predict_windows(self._network, scaled, 1_024) - scaled) ** 2, axis=1)
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a name
-        import keras
-
+        from enhsim_tf.backend import keras
         from enhsim_tf.enhancer import seeded_initialiser
 
         missing = -samples % self.stride**2  # zeros at the end, taken away again

@@ -19,7 +19,6 @@ from enhsim_tf.files import encoded, make_folder, remove_leftovers, replace_fold
 from enhsim_tf.fit_options import FitOptions
 from enhsim_tf.local_engine import ProcessesDiedError, num_cpus
 from enhsim_tf.saved_simulator import MANIFEST, is_foreign
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -231,7 +230,6 @@ def fit_job(job: Job) -> list[str]:
         InputError: If the channel cannot be used.
     """
     cleaned = clean(job.series, job.cleaning)
-    start_tensorflow()
     from enhsim_tf.channel_figure import channel_figure
     from enhsim_tf.fitting import fit_channel
 

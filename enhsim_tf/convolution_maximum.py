@@ -16,8 +16,7 @@ The same numbers as the Keras layers in about a third of the time. For a row x, 
 Inside a `tf.function` the gradient that nobody asks for is not computed: nothing hangs on its products.
 """
 
-import keras
-import tensorflow as tf
+from enhsim_tf.backend import keras, tf
 
 _USUAL = (keras.activations.relu, "valid", (1,), 1, True)  # activation, padding, dilation, groups, bias of the Conv1D
 _ROWS = 10  # of a block, whose products take 2.4 MB at 500 filters

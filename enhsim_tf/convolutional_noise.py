@@ -13,12 +13,13 @@ discriminator looks at nothing but the largest response of each filter. Here
 Both are trained by `noise_gan.NoiseGAN` as the paper's are.
 """
 
-import keras
 import numpy as np
-from keras import layers, ops
 
+from enhsim_tf.backend import keras
 from enhsim_tf.enhancer import predict_windows, seeded_initialiser
 from enhsim_tf.noise_gan import NoiseGAN
+
+layers, ops = keras.layers, keras.ops
 
 SLOW_SAMPLES = (500.0, 2_000.0, 8_000.0)  # correlation times of the slow channels: from a window to sixteen
 _THRESHOLDS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 9.0)  # of the exceedances, in standard deviations

@@ -11,10 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-import keras
 import numpy as np
 
 from enhsim_tf import enhancer as enhancer_room
+from enhsim_tf.backend import keras
 from enhsim_tf.convolutional_noise import convolutional_noise_gan
 from enhsim_tf.errors import InputError
 from enhsim_tf.noise import extract_noise, noise_unit

@@ -5,10 +5,9 @@ It knows windows and nothing of noise or of where windows come from.
 
 from collections.abc import Sequence
 
-import keras
 import numpy as np
-import tensorflow as tf
 
+from enhsim_tf.backend import keras, tf
 from enhsim_tf.fused_adam import fused_adam
 
 

@@ -11,9 +11,9 @@ The one difference is that the operation computes 1 - beta_2 from a float32 beta
 That scales v and is taken out of the learning rate and epsilon, so the weights move as under Keras' Adam.
 """
 
-import keras
 import numpy as np
-import tensorflow as tf
+
+from enhsim_tf.backend import keras, tf
 
 
 def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSchedule, **settings: object) -> keras.optimizers.Adam:

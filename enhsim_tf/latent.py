@@ -5,9 +5,9 @@ Each is drawn in two ways that have the same distribution: inside a training ste
 
 from collections.abc import Iterator, Sequence
 
-import keras
 import numpy as np
-import tensorflow as tf
+
+from enhsim_tf.backend import keras, tf
 
 _STRETCH = 100_000  # samples of a series made at a time
 

@@ -6,10 +6,9 @@ two networks `(windows, samples, 1)`.
 
 from collections.abc import Callable, Sequence
 
-import keras
 import numpy as np
-import tensorflow as tf
 
+from enhsim_tf.backend import keras, tf
 from enhsim_tf.convolution_maximum import convolution_maximum, num_layers_computed
 from enhsim_tf.enhancer import predict_windows, seeded_initialiser
 from enhsim_tf.fused_adam import fused_adam

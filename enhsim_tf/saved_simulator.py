@@ -15,7 +15,7 @@ from enhsim_tf.files import replace_folder, sha256, write_json
 from enhsim_tf.saved_network import check_network
 
 if TYPE_CHECKING:
-    import keras
+    from enhsim_tf.backend import keras
 
 MANIFEST, SETTINGS = "manifest.json", "settings.json"
 MOST_SETTINGS = 50_000_000  # bytes of a JSON file; ours have some ten thousand
@@ -117,8 +117,7 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
     Raises:
         InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
     """
-    import keras  # here: what only looks at a folder should not wait for it
-    import tensorflow as tf
+    from enhsim_tf.backend import keras, tf  # here: what only looks at a folder should not wait for it
 
     folder = Path(folder)
     check_saved(folder)

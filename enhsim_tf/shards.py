@@ -21,7 +21,6 @@ from enhsim_tf.fleet_plan import FORMAT, Plan
 from enhsim_tf.pairs import at_level
 from enhsim_tf.saved_simulator import MANIFEST
 from enhsim_tf.simulator import Degraded
-from enhsim_tf.terminal import start_tensorflow
 from enhsim_tf.training_sets import NOMINAL, columns_of
 
 if TYPE_CHECKING:
@@ -167,7 +166,6 @@ class ShardMaker:
         if self.plan.key != self.key:
             versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
             raise InputError(f"Expected every machine to have {versions}. Received: others on {os.uname().nodename}.")
-        start_tensorflow()
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
         simulators = []

@@ -12,6 +12,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background jo
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
 
 from enhsim_tf.errors import InputError  # noqa: E402
+from enhsim_tf.tensorflow_settings import apply_settings  # noqa: E402
+
+apply_settings()  # a test that imports Keras itself computes as the package does
 
 
 @pytest.fixture

@@ -82,6 +82,8 @@ FLOORS = {
     "saved_network": 0,
     "errors": 0,
     "terminal": 0,
+    "backend": 1,
+    "tensorflow_settings": 0,
     "commands": 0,
     "__init__": 4,  # the door: it may name every room
 }
@@ -118,6 +120,7 @@ WITHOUT_TENSORFLOW = [
     "scoring",
     "training_sets",
     "terminal",
+    "tensorflow_settings",
     "commands",
     "fit_options",
     "__main__",
@@ -331,6 +334,7 @@ def test_every_room_has_its_tests():
     with_others = {
         "periodicity": "simulator",
         "terminal": "house",
+        "tensorflow_settings": "backend",
         "fused_adam": "fast_paths",
         "autoencoders": "detectors",
         "tables": "sources",
@@ -373,13 +377,3 @@ def test_a_bar_of_a_process_that_is_ended_leaves_no_word_of_semaphores():
     script = "import os\nfrom enhsim_tf.terminal import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
     assert (ended.stdout, ended.stderr) == ("", "")
-
-
-def test_tensorflow_starts_without_notes_and_standard_error_is_given_back():
-    script = (
-        "import sys\nfrom enhsim_tf.terminal import start_tensorflow\nstart_tensorflow()\n"
-        "print('tensorflow' in sys.modules)\nprint('heard', file=sys.stderr)\nstart_tensorflow()\nimport os\nos.write(2, b'again')"
-    )
-    quiet = {name: value for name, value in os.environ.items() if name != "TF_CPP_MIN_LOG_LEVEL"}
-    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, env=quiet)
-    assert (ended.stdout, ended.stderr, ended.returncode) == ("True\n", "heard\nagain", 0)

@@ -15,11 +15,11 @@ from enhsim_tf import detection, fidelity, inference
 from enhsim_tf.out_of_range import OutOfRange
 from enhsim_tf.reproduce.replicates import Replicate
 from enhsim_tf.simulator import MODES, Degraded, degrade
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
-    import keras
     import pandas as pd
+
+    from enhsim_tf.backend import keras
 
 SEVERITIES = (0.1, 0.25, 0.5, 0.75, 1.0)
 LARGEST_TRAINED = 0.5  # severity up to which the randomised enhancer has seen each mode
@@ -148,7 +148,6 @@ class DegradedModes:
         from scipy.ndimage import uniform_filter1d
         from sklearn.linear_model import Ridge
 
-        start_tensorflow()
         from enhsim_tf import enhancer
 
         def smooth(width: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -169,8 +168,7 @@ class DegradedModes:
 
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """The second pipeline's enhancer, as it is trained there, on other windows."""
-        import keras
-
+        from enhsim_tf.backend import keras
         from enhsim_tf.enhancer import build_enhancer, fit_windows
 
         seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.enhancer.batch_size

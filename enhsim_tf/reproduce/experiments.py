@@ -19,7 +19,6 @@ from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.simulator import MODES, Degraded
 from enhsim_tf.store import ParquetStore
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
@@ -85,7 +84,6 @@ class Experiment:
         return self.stages.run("enhancer", self._make_enhancer, _ENHANCER, depends, after=("telemetry",))
 
     def _make_enhancer(self, folder: Path) -> None:
-        start_tensorflow()
         from enhsim_tf.enhancer import build_enhancer, fit_windows
 
         chosen, seed, number = self.settings.enhancer, self.settings.seed, self.settings.telemetry.num_windows
@@ -119,7 +117,6 @@ class Experiment:
         return self.stages.run("noise GAN", self._make_noise, _NOISE, depends, after=("telemetry",))
 
     def _make_noise(self, folder: Path) -> None:
-        start_tensorflow()
         from enhsim_tf import fidelity
         from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 
@@ -169,9 +166,7 @@ class Experiment:
     @functools.cached_property
     def simulator(self) -> "EnhancedSimulator":
         """The `EnhancedSimulator` of the first channel, put together from both networks."""
-        start_tensorflow()
-        import keras
-
+        from enhsim_tf.backend import keras
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
         from enhsim_tf.noise_gan import NoiseGAN
 

@@ -10,7 +10,6 @@ from enhsim_tf.files import make_folder, write_json
 from enhsim_tf.labelled import load_channel, read_labels
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import VERSIONS, Stages
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,8 +86,7 @@ def collect(
             continue
         for each, table in tables.items():
             parts.setdefault(each, []).append(table)
-        start_tensorflow()
-        import keras
+        from enhsim_tf.backend import keras
 
         keras.backend.clear_session()  # dozens of networks would fill the memory
     if not parts:

@@ -21,7 +21,6 @@ from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.simulator import MODES, Degraded
 from enhsim_tf.telemetry import disjoint_offsets
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,13 +71,11 @@ class ChannelStudy:
     def simulator(self) -> "EnhancedSimulator":
         """The simulator that `python -m enhsim_tf fit --held-out 0` fits to the train part."""
         folder = self.stages.run(f"fit {self.name}", self._make_simulator, ("fitting",), self._depends)
-        start_tensorflow()
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
         return EnhancedSimulator.load(folder / "simulator")
 
     def _make_simulator(self, folder: Path) -> None:
-        start_tensorflow()
         from enhsim_tf.fit_options import FitOptions
         from enhsim_tf.fitting import fit_simulator
 
@@ -127,7 +124,6 @@ class ChannelStudy:
     @functools.cached_property
     def noises(self) -> dict[str, Any]:
         """Every model of the noise that the enhancer leaves of the train part, by name."""
-        start_tensorflow()
         from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
 
         window, chosen = self.simulator.window, self.settings.labelled

@@ -18,7 +18,6 @@ from enhsim_tf.noise_processes import NOISES
 from enhsim_tf.reproduce.experiments import Experiment
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,13 +86,11 @@ class Replicate:
         depends = (chosen.telemetry, chosen.split, chosen.adversarial, chosen.second, chosen.seed)
         rooms = ("reproduce.data", "enhanced_simulator")
         folder = self.stages.run("second", self._make_second, rooms, depends, after=("telemetry",))
-        start_tensorflow()
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
         return EnhancedSimulator.load(folder / "simulator")
 
     def _make_second(self, folder: Path) -> None:
-        start_tensorflow()
         from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
         channel, chosen = self.experiment.data.channels[0], self.settings.second

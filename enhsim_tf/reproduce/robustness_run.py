@@ -63,7 +63,6 @@ def collect(
 
     from enhsim_tf.reproduce.degraded_modes import DegradedModes
     from enhsim_tf.reproduce.replicates import replicate
-    from enhsim_tf.terminal import start_tensorflow
 
     parts: dict[str, list[pd.DataFrame]] = {}
     total, began = settings.robustness.num_seeds * len(environments), time.perf_counter()
@@ -77,8 +76,7 @@ def collect(
                 parts.setdefault(name, []).append(table)
             spent = time.perf_counter() - began
             tell(f"{done + 1} of {total} replicates in {spent:.0f} s; about {spent / (done + 1) * (total - done - 1) / 60:.0f} min left")
-            start_tensorflow()
-            import keras
+            from enhsim_tf.backend import keras
 
             keras.backend.clear_session()  # hundreds of networks would fill the memory
     return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()} | {

@@ -6,9 +6,9 @@ function that writes `figures/`, sentences and verdicts from the ledger.
 
 import contextlib
 import functools
+import importlib
 import io
 import json
-import logging
 import os
 import tempfile
 from collections.abc import Iterator
@@ -38,7 +38,6 @@ from enhsim_tf.reproduce.figure_data import FIGURE_DATA
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages, default_cache
 from enhsim_tf.sheet import STYLE
-from enhsim_tf.terminal import start_tensorflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,8 +93,7 @@ def open_experiment(budget: str | None = None) -> Experiment:
     todo = [f"{stage} (about {known[stage]:.0f} s)" if stage in known else f"{stage} ({_TAKES[budget]})" for stage in missing]
     print(f"{budget.capitalize()} budget, seed {settings.seed}.", end=" ")
     print(f"Still to do, when first needed: {', '.join(todo)}." if todo else "Everything is ready.")
-    start_tensorflow()
-    logging.getLogger("tensorflow").setLevel("ERROR")  # its advice on speed is for loops, not for notebooks
+    importlib.import_module("enhsim_tf.backend")  # a notebook that imports Keras itself then computes with the package's settings
     return Experiment(settings, Stages(cache, tell=lambda line: None if line.endswith("(from the cache)") else print(line)), verbose=1)
 
 

@@ -1,0 +1,63 @@
+"""Starts TensorFlow, in one place: `from enhsim_tf.backend import keras, tf`.
+
+Every module that holds a network imports both from here, so that commands, worker processes, notebooks and programs which
+use the package as a library compute with the same settings, and read the same two lines less of start-up messages:
+
+- oneDNN's kernels are switched on. TensorFlow does so itself on processors with AVX-512 and leaves them off on all others,
+  where its plain kernels take three times as long.
+- glibc keeps memory that TensorFlow frees. By default it returns every block above 32 MB to the system, which then clears
+  the same pages again for each gradient of the enhancer's widest layer.
+
+A variable that the user has set keeps its value: see `docs/environment.md`. If TensorFlow was imported before, it keeps the
+settings that it started with.
+"""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+
+from enhsim_tf.errors import InputError
+from enhsim_tf.tensorflow_settings import SETTINGS, apply_settings
+
+
+@contextlib.contextmanager
+def _without_standard_error() -> Iterator[None]:
+    """Turns the file descriptor itself away: TensorFlow writes to it before any of its own log levels counts."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _start() -> None:
+    apply_settings()
+    _check_backend("Expected KERAS_BACKEND", os.environ["KERAS_BACKEND"])
+    with _without_standard_error():
+        import tensorflow
+
+        tensorflow.config.list_physical_devices()  # the messages about devices come with the first look at them
+    tensorflow.get_logger().setLevel("ERROR")  # its warnings are about how often a graph is built, and name no remedy a user has
+
+
+def _check_backend(expected: str, received: str) -> None:
+    if received != SETTINGS["KERAS_BACKEND"]:
+        raise InputError(
+            f"{expected} tensorflow. Received: {received}. The networks are trained by TensorFlow's operations: choose it, or unset the variable."
+        )
+
+
+if "tensorflow" not in sys.modules:
+    _start()
+
+import keras  # noqa: E402  after the settings
+import tensorflow as tf  # noqa: E402
+
+_check_backend("Expected Keras with the backend", keras.backend.backend())
+
+__all__ = ["keras", "tf"]
