@@ -1,15 +1,8 @@
 """Starts TensorFlow, in one place: `from enhsim_tf.backend import keras, tf`.
 
 Every module that holds a network imports both from here, so that commands, worker processes, notebooks and programs which
-use the package as a library compute with the same settings, and read the same two lines less of start-up messages:
-
-- oneDNN's kernels are switched on. TensorFlow does so itself on processors with AVX-512 and leaves them off on all others,
-  where its plain kernels take three times as long.
-- glibc keeps memory that TensorFlow frees. By default it returns every block above 32 MB to the system, which then clears
-  the same pages again for each gradient of the enhancer's widest layer.
-
-A variable that the user has set keeps its value: see `docs/environment.md`. If TensorFlow was imported before, it keeps the
-settings that it started with.
+use the package as a library compute with the same settings (`tensorflow_settings`), and none of TensorFlow's start-up
+messages reaches the user. If TensorFlow was imported before, it keeps the settings that it started with.
 """
 
 import contextlib

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.backend import keras, tf
+from enhsim_tf.blockwise_training import BlockwiseTraining, is_wide_dense_stack
 from enhsim_tf.fused_adam import fused_adam
 
 
@@ -94,11 +95,12 @@ def fit_windows(
     Returns:
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
     """
-    model.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile)
+    trained = BlockwiseTraining(model) if is_wide_dense_stack(model) and not jit_compile else model
+    trained.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile)
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
     held_out = None if validation is None else _untuned(tf.data.Dataset.from_tensor_slices(validation).batch(256))
-    history = model.fit(
+    history = trained.fit(
         batches(inputs, targets, orders, batch_size),
         epochs=epochs,
         steps_per_epoch=-(-len(inputs) // batch_size),
@@ -107,6 +109,8 @@ def fit_windows(
         verbose=verbose,
         shuffle=False,  # the data set shuffles, with its own seed
     )
+    if trained is not model:
+        trained.write_back()
     return {key: np.array(values) for key, values in history.history.items()}
 
 

@@ -26,26 +26,48 @@ def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSch
         **settings: Other settings of Keras' Adam, where they are not its defaults.
     """
     adam = keras.optimizers.Adam(learning_rate, **settings)
-    # beta_2 as float32 gives another 1 - beta_2, see above
-    rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
 
     def update_step(gradient: tf.Tensor, variable: tf.Variable, learning_rate: tf.Tensor) -> None:
         index = adam._get_variable_index(variable)
-        step = tf.cast(adam.iterations + 1, tf.float32)
         # Keras wraps TensorFlow's variables; the operation wants the handles of those
-        weight, momentum, velocity = (getattr(each, "_value", each) for each in (variable, adam._momentums[index], adam._velocities[index]))
-        tf.raw_ops.ResourceApplyAdam(
-            var=weight.handle,
-            m=momentum.handle,
-            v=velocity.handle,
-            beta1_power=tf.pow(adam.beta_1, step),
-            beta2_power=tf.pow(adam.beta_2, step),
-            lr=tf.cast(learning_rate, tf.float32) * rounding,
-            beta1=adam.beta_1,
-            beta2=adam.beta_2,
-            epsilon=adam.epsilon * rounding,
-            grad=gradient,
-        )
+        held = (getattr(each, "_value", each) for each in (variable, adam._momentums[index], adam._velocities[index]))
+        apply_adam(adam, *held, gradient, learning_rate)
 
     adam.update_step = update_step
     return adam
+
+
+def apply_adam(
+    adam: keras.optimizers.Adam,
+    weight: tf.Variable,
+    momentum: tf.Variable,
+    velocity: tf.Variable,
+    gradient: tf.Tensor,
+    learning_rate: tf.Tensor | None = None,
+) -> tf.Operation:
+    """Updates a variable and its two moments by one operation; the optimiser's count of iterations stays as it is.
+
+    Args:
+        adam: The optimiser whose settings and count of iterations are used.
+        weight: The variable.
+        momentum: Its first moment.
+        velocity: Its second moment.
+        gradient: Its gradient.
+        learning_rate: The learning rate; None takes the optimiser's at this iteration.
+    """
+    # beta_2 as float32 gives another 1 - beta_2, see above
+    rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
+    step = tf.cast(adam.iterations + 1, tf.float32)
+    rate = adam.learning_rate if learning_rate is None else learning_rate
+    return tf.raw_ops.ResourceApplyAdam(
+        var=weight.handle,
+        m=momentum.handle,
+        v=velocity.handle,
+        beta1_power=tf.pow(adam.beta_1, step),
+        beta2_power=tf.pow(adam.beta_2, step),
+        lr=tf.cast(rate, tf.float32) * rounding,
+        beta1=adam.beta_1,
+        beta2=adam.beta_2,
+        epsilon=adam.epsilon * rounding,
+        grad=gradient,
+    )

@@ -3,6 +3,7 @@
 Each is drawn in two ways that have the same distribution: inside a training step, and by NumPy for generating.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -10,6 +11,22 @@ import numpy as np
 from enhsim_tf.backend import keras, tf
 
 _STRETCH = 100_000  # samples of a series made at a time
+
+
+def standard_normal(shape: Sequence[int], seed: tf.Tensor) -> tf.Tensor:
+    """Draws from the standard normal distribution by the Box-Muller transform, float32 of the given shape.
+
+    TensorFlow's own operation computes the same transform number by number; here logarithm, sine and cosine are those of
+    whole arrays, which takes half the time. A training step of the convolutional generator draws 1.5 million numbers.
+
+    Args:
+        shape: Shape of the draws.
+        seed: Two integers.
+    """
+    number = math.prod(shape)
+    first, second = tf.unstack(tf.random.stateless_uniform((2, -(-number // 2)), seed))
+    radius, angle = tf.sqrt(-2 * tf.math.log(1 - first)), 2 * math.pi * second  # 1 - first is never 0
+    return tf.reshape(tf.concat([radius * tf.cos(angle), radius * tf.sin(angle)], 0)[:number], shape)
 
 
 class Latent:
@@ -41,7 +58,9 @@ class Latent:
 
     def draw(self, num_rows: int, seeds: keras.random.SeedGenerator) -> tf.Tensor:
         """Draws for a training step, of shape `(num_rows, *input shape)`."""
-        draws = keras.random.normal((num_rows, *self._shape), seed=seeds)
+        if not self.is_series:
+            return self.span * keras.random.normal((num_rows, *self._shape), seed=seeds)
+        draws = standard_normal((num_rows, *self._shape), seeds.next())
         if not self.slow_samples:
             return self.span * draws
         num_white = self._shape[1] - len(self.slow_samples)

@@ -48,6 +48,7 @@ FLOORS = {
     "convolutional_noise": 1,
     "latent": 1,
     "fused_adam": 1,
+    "blockwise_training": 1,
     "noise": 1,
     "detectors": 1,
     "autoencoders": 1,

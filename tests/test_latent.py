@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf import latent as room
-from enhsim_tf.latent import Latent
+from enhsim_tf.latent import Latent, standard_normal
 
 SLOW = (30.0, 200.0)
 
@@ -46,6 +46,24 @@ def test_channels_have_their_correlation(way):
             # 4,000 rows: the standard error is below 1 / sqrt(4,000) = 0.016
             assert abs(correlation(draws[:, :, channel], lag) - np.exp(-lag / samples)) < 0.05
         assert abs(np.mean(draws[:, :, channel] * draws[:, :, 0])) < 0.05
+
+
+@pytest.mark.parametrize("shape", [(400_001,), (500, 400, 2)])
+def test_standard_normal_draws_have_the_distribution_and_its_tails(shape):
+    from scipy.stats import kstest, norm
+
+    draws = np.asarray(standard_normal(shape, (3, 4)))
+    assert draws.shape == shape and draws.dtype == np.float32
+    values = draws.ravel()
+    assert kstest(values, norm.cdf).pvalue > 0.001
+    for limit in (2.0, 3.0, 4.0):
+        expected = len(values) * 2 * norm.sf(limit)
+        assert abs(np.sum(np.abs(values) > limit) - expected) < 4 * np.sqrt(expected)  # a count, four standard deviations
+    half = len(values) // 2  # sines and cosines of the same angles
+    assert abs(np.mean(values[:half] * values[-half:])) < 4 / np.sqrt(half)
+    assert abs(np.mean(values[:half] ** 2 * values[-half:] ** 2) - 1) < 4 * np.sqrt(8 / half)
+    np.testing.assert_array_equal(standard_normal(shape, (3, 4)), draws)
+    assert np.any(np.asarray(standard_normal(shape, (3, 5))) != draws)
 
 
 def test_rows_do_not_depend_on_how_many_are_drawn():
