@@ -3,14 +3,14 @@
 import argparse
 import dataclasses
 import json
-import os
-import platform
 import sys
 import time
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-ROWS = ("enhancer", "gan", "second", "generation", "loading", "starting", "growth")
+ROWS = ("enhancer", "gan", "second", "generation", "loading", "starting", "growth", "reproduce")
+FOLDER = Path(__file__).parent
+RESULTS = ("results.json", "results_avx2.json")
+"""Files of the results: with the instructions that the processor has, and without AVX-512."""
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
@@ -18,36 +18,26 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
     parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
     parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
+    parser.add_argument(
+        "--avx2",
+        action="store_true",
+        help="compute as a processor without AVX-512 does, and compare with what plain Keras is there; into results_avx2.json",
+    )
     parser.add_argument("--redraw", action="store_true", help="measure nothing: figures and table anew from the results that are there")
     parser.add_argument("--repetitions", type=int, help="of each comparison, instead of the budget's 7")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results.json", help="the results (default: %(default)s)")
+    parser.add_argument("--out", type=Path, help="the results (default: results.json or results_avx2.json beside this program)")
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder of the figures (default: %(default)s)")
     options = parser.parse_args(arguments)
-    if options.quick and options.out == parser.get_default("out"):
+    if options.quick and options.out is None:
         parser.error("--quick needs another --out: results.json holds measurements")
     if options.repetitions is not None and options.repetitions < 1:
         parser.error(f"--repetitions must be 1 or more, not {options.repetitions}")
+    options.out = options.out or FOLDER / RESULTS[options.avx2]
     if options.redraw and (options.quick or options.only or options.repetitions):
         parser.error("--redraw measures nothing: leave out --quick, --only and --repetitions")
     if options.redraw and not options.out.is_file():
         parser.error(f"--redraw needs the results of a run, and {options.out} is none")
     return options
-
-
-def machine() -> dict:
-    """What the measurements were made on."""
-    versions = {}
-    for name in ("tensorflow", "keras", "tf_keras", "torch", "numpy", "pyarrow"):
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = None
-    return {
-        "processor": platform.processor() or platform.machine(),
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        **versions,
-    }
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -59,23 +49,28 @@ def main(arguments: list[str] | None = None) -> int:
 
     if options.redraw:
         kept = json.loads(options.out.read_text())
-        made = kept | {"rows": with_words(kept["rows"])}
+        made = kept | {"rows": with_words(kept)}
     else:
         made = measure(options)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     write_json(options.out, made)
-    for file in [options.out, *draw(made, options.figures)]:
+    drawn = [] if options.avx2 else draw(made, options.figures)
+    for file in [options.out, *drawn]:
         print(file)
-    if options.out == Path(__file__).parent / "results.json":
-        fill_readme(Path(__file__).parents[1] / "README.md", made)
+    if options.out == FOLDER / RESULTS[options.avx2]:
+        fill_readme(FOLDER.parent / "README.md", [json.loads((FOLDER / name).read_text()) for name in RESULTS if (FOLDER / name).is_file()])
     return 0
 
 
 def measure(options: argparse.Namespace) -> dict:
     """Measures the rows that the options ask for, and prints each; what `results.json` is to hold."""
     from benchmarks import rows as room
+    from benchmarks.machine import AVX2, PLAIN_KERNELS, machine
     from benchmarks.report import line_of
+    from benchmarks.worker import Worker
 
+    if options.avx2:
+        Worker.processor, Worker.of_comparisons = AVX2, PLAIN_KERNELS
     budget, began = room.QUICK if options.quick else room.Budget(), time.time()
     if options.repetitions:
         budget = dataclasses.replace(budget, repetitions=options.repetitions)
@@ -88,10 +83,11 @@ def measure(options: argparse.Namespace) -> dict:
         for row in room.ROWS[name](budget):
             found.append({"of": name, **row})
             print(line_of(row), flush=True)
-    for row in room.reproduction(found):
+    about = machine() | {"as_without_avx512": options.avx2}
+    for row in room.reproduction(found, room.bar_of_reproduction(about)):
         found.append({"of": "reproduction", **row})
         print(line_of(row), flush=True)
-    return {"quick": options.quick, "minutes": round((time.time() - began) / 60, 1), "machine": machine(), "rows": found}
+    return {"quick": options.quick, "minutes": round((time.time() - began) / 60, 1), "machine": about, "rows": found}
 
 
 if __name__ == "__main__":

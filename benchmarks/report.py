@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from benchmarks.rows import reproduction
+from benchmarks.rows import bar_of_reproduction, reproduction
 from enhsim_tf.files import replace_file
 from enhsim_tf.reproduce.report import fill_parts
 
@@ -14,6 +14,9 @@ def line_of(row: dict) -> str:
     if "growth" in row:
         ends = [", ".join(f"{key} {value:.4g}" for key, value in each.items() if not isinstance(value, dict)) for each in row["growth"]]
         return "\n    ".join([row["work"], *ends])
+    if "bar_faults" in row:
+        words = "reached" if row["reached"] else "NOT REACHED"
+        return f"{row['work']:60} {row['faults']:,} faults in {row['seconds']:.0f} s, <= {row['bar_faults']:,} {words}"
     ours, unit, ratio = row["ours"], row["unit"], row["ratio"]
     bar = f"<= {row['bar']:.2f}" if row.get("bar") else f"< {row['bar_s']} s" if "bar_s" in row else ""
     words = {True: "reached", False: "NOT REACHED", None: ""}[row["reached"]]
@@ -21,31 +24,62 @@ def line_of(row: dict) -> str:
     return f"{row['work']:60} {row['comparison']:28} {measured:32} {bar:8} {words}"
 
 
-def markdown(results: dict) -> str:
-    """The comparisons as a Markdown table, with the machine they were measured on."""
-    lines = ["| work | ours | compared with | ours / theirs: median (range) | bar | |", "|---|---|---|---|---|---|"]
+def markdown(results: list[dict]) -> str:
+    """The comparisons as Markdown tables, one for each file of results, with what they were measured on."""
+    return "\n\n".join(_table(each) for each in results)
+
+
+def _table(results: dict) -> str:
+    lines = [
+        "| work | ours | compared with | ours / theirs: median (range) | bar | | page faults, ours / theirs |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for row in results["rows"]:
+        words = {True: "reached", False: "**not reached**", None: ""}[row.get("reached")]
         if "skipped" in row:
-            lines.append(f"| {row['work']} | | {row['comparison']} | skipped: {row['skipped']} | | |")
+            lines.append(f"| {row['work']} | | {row['comparison']} | skipped: {row['skipped']} | | | |")
+        elif "bar_faults" in row:
+            lines.append(f"| {row['work']} | {row['seconds']:.0f} s | | | at most {row['bar_faults']:,} | {words} | {row['faults']:,} |")
         elif "ratio" in row and "bar_s" not in row:
             ratio, bar = row["ratio"], f"at most {row['bar']:.2f}" if row["bar"] else ""
-            words = {True: "reached", False: "**not reached**", None: ""}[row["reached"]]
+            faults = " / ".join(_few(row[key]) for key in ("faults", "their_faults") if key in row)
             figures = f"{row['ours']['median']:.3g} {row['unit']} | {row['comparison']} | {ratio['median']:.2f} ({ratio['low']:.2f} to {ratio['high']:.2f})"
-            lines.append(f"| {row['work']} | {figures} | {bar} | {words} |")
+            lines.append(f"| {row['work']} | {figures} | {bar} | {words} | {faults} |")
         elif "bar_s" in row:
-            words = "reached" if row["reached"] else "**not reached**"
-            lines.append(f"| {row['work']} | {row['ours']['median']:.2g} s | | | below {row['bar_s']} s | {words} |")
-    machine = results["machine"]
-    return "\n".join(lines) + f"\n\n{machine['cores']} cores, TensorFlow {machine['tensorflow']}. From `benchmarks/results.json`."
+            lines.append(f"| {row['work']} | {row['ours']['median']:.2g} s | | | below {row['bar_s']} s | {words} | |")
+    return "\n".join(lines) + f"\n\n{machine_in_words(results['machine'])} From `benchmarks/{file_of(results['machine'])}`."
 
 
-def with_words(rows: list[dict]) -> list[dict]:
+def _few(number: float) -> str:
+    return f"{number:,.0f}" if number >= 10 else f"{number:.2g}"
+
+
+def machine_in_words(about: dict) -> str:
+    """The machine in a sentence."""
+    sets = [
+        each
+        for each in ("avx2", "avx_vnni", "avx512f", "avx512_vnni", "avx512_bf16", "amx_tile")
+        if each in about.get("instruction_sets", ())
+    ]
+    instructions = f" ({', '.join(sets)})" if sets else ""
+    words = f"{about['cores']} cores{instructions}, TensorFlow {about['tensorflow']}."
+    if about.get("as_without_avx512"):
+        words += " Kept to AVX2; the comparisons with oneDNN off, as TensorFlow has it on such a processor."
+    return words
+
+
+def file_of(about: dict) -> str:
+    """The file of the results on a machine."""
+    return "results_avx2.json" if about.get("as_without_avx512") else "results.json"
+
+
+def with_words(results: dict) -> list[dict]:
     """Kept rows with what is put together from the others put together anew: the same numbers, in today's words."""
-    measured = [row for row in rows if row.get("of") != "reproduction"]
-    return measured + [{"of": "reproduction", **row} for row in reproduction(measured)]
+    measured = [row for row in results["rows"] if row.get("of") != "reproduction"]
+    return measured + [{"of": "reproduction", **row} for row in reproduction(measured, bar_of_reproduction(results["machine"]))]
 
 
-def fill_readme(path: Path, results: dict) -> None:
+def fill_readme(path: Path, results: list[dict]) -> None:
     """Writes the table between the README's speed markers."""
     text = path.read_text(encoding="utf-8")
     with replace_file(path) as temporary:

@@ -11,7 +11,11 @@ import os
 import subprocess
 import sys
 import time
-from typing import Any
+from typing import Any, ClassVar
+
+from benchmarks.examples import minor_faults
+
+COMMAND = (sys.executable, "-m", "benchmarks.worker")
 
 
 class Worker:
@@ -21,11 +25,18 @@ class Worker:
         module: Module of this package.
         function: Its function, which prepares the work.
         **settings: What the function gets, in plain JSON types.
+
+    The worker runs in the user's environment, with `Worker.processor` on top, and a comparison with `Worker.of_comparisons`
+    besides (see `benchmarks.machine`). `faults` holds the minor page faults a unit of work, a number for each repetition.
     """
 
+    processor: ClassVar[dict[str, str]] = {}
+    of_comparisons: ClassVar[dict[str, str]] = {}
+
     def __init__(self, module: str, function: str, **settings: Any):
-        command = [sys.executable, "-m", "benchmarks.worker", module, function, json.dumps(settings)]
-        quiet = os.environ | {"TF_CPP_MIN_LOG_LEVEL": "3"}
+        command = [*COMMAND, module, function, json.dumps(settings)]
+        quiet = os.environ | {"TF_CPP_MIN_LOG_LEVEL": "3"} | self.processor | ({} if module == "ours" else self.of_comparisons)
+        self.faults: list[float] = []
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=quiet
         )
@@ -35,7 +46,9 @@ class Worker:
         """Does one repetition, of the size `argument` where the work takes one; seconds a unit of work."""
         self._process.stdin.write("\n" if argument is None else f"{argument}\n")
         self._process.stdin.flush()
-        return self._answer()["seconds"]
+        answer = self._answer()
+        self.faults.append(answer["faults"])
+        return answer["seconds"]
 
     def close(self) -> float:
         """Ends the process; its peak of memory in MB."""
@@ -72,10 +85,12 @@ def main(module: str, function: str, settings: str) -> None:
     answers.write("{}\n")
     for line in sys.stdin:
         arguments = [int(word) for word in line.split()]
-        began = time.perf_counter()
+        began, faults = time.perf_counter(), minor_faults()
         timed = run(*arguments)
-        seconds = timed if isinstance(timed, float) else time.perf_counter() - began  # a work may hold the clock itself
-        answers.write(json.dumps({"seconds": seconds / units}) + "\n")
+        seconds, faults = time.perf_counter() - began, minor_faults() - faults
+        if isinstance(timed, tuple):  # a work may hold the clock itself
+            seconds, faults = timed
+        answers.write(json.dumps({"seconds": seconds / units, "faults": faults / units}) + "\n")
     answers.write(json.dumps({"peak_mb": peak_mb()}) + "\n")
 
 
