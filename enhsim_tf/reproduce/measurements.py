@@ -10,6 +10,7 @@ from enhsim_tf import fidelity
 from enhsim_tf.detectors import DenseAutoencoder, IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.reproduce.settings import DetectorSettings
 from enhsim_tf.simulator import Degraded
+from enhsim_tf.terminal import SILENT, Progress
 from enhsim_tf.two_sample import two_sample_auc
 
 if TYPE_CHECKING:
@@ -87,7 +88,9 @@ def speed(simulator: "EnhancedSimulator", num_windows: int, repeats: int = 5) ->
     return rates | {"cost_ratio": rates["coarse_rate"] / rates["generate_rate"]}
 
 
-def false_alarms(arms: Mapping, test: np.ndarray, degraded: Mapping, settings: DetectorSettings, seed: int) -> dict[str, np.ndarray]:
+def false_alarms(
+    arms: Mapping, test: np.ndarray, degraded: Mapping, settings: DetectorSettings, seed: int, progress: Progress = SILENT
+) -> dict[str, np.ndarray]:
     """False alarms and recall of detectors trained on each arm; the threshold comes from held-out windows of the arm.
 
     Args:
@@ -96,18 +99,20 @@ def false_alarms(arms: Mapping, test: np.ndarray, degraded: Mapping, settings: D
         degraded: From a degraded mode to real degraded windows.
         settings: The detectors' settings.
         seed: Seed of the detectors.
+        progress: Tells how many arms are done.
 
     Returns:
         Arrays `false_alarm_rate` and `recall` (mean over the modes) of shape `(arms, detectors)`, and the names
         `arms`, `detectors`.
     """
-    rate, found = [], []
-    for training, threshold_windows in arms.values():
+    rate, found, told = [], [], progress.loop("arm", len(arms))
+    for number, (training, threshold_windows) in enumerate(arms.values()):
         detectors = make_detectors(settings, seed)
-        for detector in detectors.values():
+        for done, detector in enumerate(detectors.values(), 1):
             threshold = np.quantile(detector.fit(training).score(threshold_windows), 1 - settings.false_alarm_rate)
             rate.append(np.mean(detector.score(test) > threshold))
             found.append(np.mean([np.mean(detector.score(windows) > threshold) for windows in degraded.values()]))
+            told(number + done / len(detectors))
     shape = (len(arms), len(detectors))
     return {
         "false_alarm_rate": np.reshape(rate, shape),
