@@ -235,13 +235,13 @@ class Experiment:
         return self._measure("resemblance", self._make_resemblance)
 
     def _make_resemblance(self, folder: Path) -> None:
-        seed, noise_of = self.settings.seed, self.simulator.noise.generate
+        seed, noise_of, told = self.settings.seed, self.simulator.noise.generate, self.stages.progress.loop("comparison", 4)
         # windows that share no sample, in the order of time: an overlap across the classifier's folds would give itself away
         real, again = (self.data.noise_windows(part, None) for part in ("test", "train"))
-        noise = measurements.resemblance(noise_of(len(real), seed + 1), real, again, seed)
+        noise = measurements.resemblance(noise_of(len(real), seed + 1), real, again, seed, told.within(0))
         real, again = (self.data.windows(part, None) for part in ("test", "train"))
         combined = self.simulator.enhance(real["coarse"]) + noise_of(len(real["coarse"]), seed + 2)
-        combined = measurements.resemblance(combined, real["target"], again["target"], seed)
+        combined = measurements.resemblance(combined, real["target"], again["target"], seed, told.within(2))
         save_arrays(
             folder, {f"noise_{key}": value for key, value in noise.items()} | {f"sum_{key}": value for key, value in combined.items()}
         )

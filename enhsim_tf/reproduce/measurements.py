@@ -44,7 +44,9 @@ def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, f
     }
 
 
-def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray, seed: int) -> dict[str, float]:
+def resemblance(
+    generated: np.ndarray, real: np.ndarray, real_again: np.ndarray, seed: int, on_comparison: Callable[[int], None] = lambda done: None
+) -> dict[str, float]:
     """How close generated windows are to real ones, each measure beside its real-against-real floor.
 
     Args:
@@ -52,9 +54,10 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
         real: As many held-out real windows.
         real_again: At least as many other real windows: what the floor compares with `real`.
         seed: Seed of the two-sample classifier's folds.
+        on_comparison: Called after each of the two comparisons with how many are done.
     """
     measures = {}
-    for name, other in (("", generated), ("floor_", real_again[: len(real)])):
+    for done, (name, other) in enumerate((("", generated), ("floor_", real_again[: len(real)])), 1):
         lag_one = fidelity.autocorrelation(other, 1)[1] - fidelity.autocorrelation(real, 1)[1]
         measures |= {
             f"{name}scale_difference": fidelity.scale_difference(other, real),
@@ -64,6 +67,7 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
             f"{name}roughness_ratio": fidelity.roughness(other) / fidelity.roughness(real),
             f"{name}classifier_auc": two_sample_auc(other, real, seed),
         }
+        on_comparison(done)
     ranks = {"rank": fidelity.effective_rank(generated), "real_rank": fidelity.effective_rank(real)}
     return measures | ranks | {"num_windows": float(len(real))}
 
