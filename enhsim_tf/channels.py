@@ -237,13 +237,13 @@ def fit_job(job: Job) -> list[str]:
     Raises:
         InputError: If the channel cannot be used.
     """
+    progress = Progress(_tell_if_heard, f"{printable(job.channel)}: ") if job.speaks else SILENT
     cleaned = clean(job.series, job.cleaning)
     start_tensorflow()
     from enhsim_tf.channel_figure import channel_figure
     from enhsim_tf.fitting import fit_channel
 
     parts = [dataclasses.replace(part, name=job.channel) for part in cleaned.parts]
-    progress = Progress(_tell_if_heard, f"{printable(job.channel)}: ") if job.speaks else SILENT
     simulator, report = fit_channel(parts, job.options, "auto" if job.verbose else 0, progress)
     refuse_foreign(job.folder)  # it has been minutes
     with replace_folder(job.folder) as temporary:

@@ -81,6 +81,8 @@ class Progress:
 class Loop:
     """A loop of long work, called with how many of its units are done; the one under way may be done in part.
 
+    How long the rest takes is judged by all steps but the first, which builds the graph of a network.
+
     Args:
         progress: Whose lines tell of it.
         unit: What is counted.
@@ -88,19 +90,23 @@ class Loop:
     """
 
     def __init__(self, progress: Progress, unit: str, total: int):
-        self.progress, self.unit, self.total, self.began = progress, unit, total, progress.clock()
+        self.progress, self.unit, self.total = progress, unit, total
+        self.first: tuple[float, float] | None = None  # when the first step ended, and what was done then
 
     def __call__(self, done: float) -> None:
         """Tells a line if it is time for one: 6.2 done of 40 are in number 7."""
         if self.progress.tell is None or not 0 < done < self.total:
             return
         now = self.progress.clock()
+        self.first = self.first or (now, done)
         if now - self.progress.told < INTERVAL_S:
             return
         self.progress.told = now
-        left = time_left((now - self.began) / done * (self.total - done))
-        share = math.floor(100 * done / self.total)
-        self.progress.tell(f"{self.progress.before}{self.unit} {math.ceil(done):,} of {self.total:,}, {share} %, {left}")
+        line = f"{self.progress.before}{self.unit} {math.ceil(done):,} of {self.total:,}, {math.floor(100 * done / self.total)} %"
+        began, before = self.first
+        if done > before:
+            line += f", {time_left((now - began) / (done - before) * (self.total - done))}"
+        self.progress.tell(line)
 
     def within(self, before: int, steps: int = 1) -> Callable[[float], None]:
         """What is called with the steps that are done of one unit, or of some where a unit is a step.
