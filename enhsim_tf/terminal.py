@@ -33,7 +33,8 @@ def tell(line: str) -> None:
         line: Names of channels and folders in it may hold anything.
     """
     text, encoding = "\n".join(printable(each) for each in line.split("\n")), getattr(sys.stdout, "encoding", None) or "utf-8"
-    print(text.encode(encoding, "replace").decode(encoding), flush=True)  # a narrow terminal shows what it can
+    text = text.encode(encoding, "replace").decode(encoding)  # a narrow terminal shows what it can
+    print(f"{text}\n", end="", flush=True)  # in one piece with its end: other processes may write lines of theirs meanwhile
 
 
 def progress(*arguments: Any, **options: Any) -> "tqdm":
