@@ -37,7 +37,8 @@ def run_fit(options: argparse.Namespace) -> int:
 
     cleaning = cleaning_of(options, options.window or 64)
     series = read_source(options.source, options.column, options.time, cleaning)
-    failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, sys.stdout.isatty(), options.engine)
+    is_terminal = sys.stdout.isatty()
+    failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, speaks=not is_terminal)
     return tell_failed(failed)
 
 

@@ -7,6 +7,7 @@ MODEL_DIR/volts/report.json, report.png
 import contextlib
 import dataclasses
 import os
+import sys
 import urllib.parse
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from enhsim_tf.files import encoded, make_folder, remove_leftovers, replace_fold
 from enhsim_tf.fit_options import FitOptions
 from enhsim_tf.local_engine import ProcessesDiedError, num_cpus
 from enhsim_tf.saved_simulator import MANIFEST, is_foreign
+from enhsim_tf.terminal import SILENT, Progress, tell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +39,7 @@ class Job:
         options: How it is fitted.
         cleaning: What to do with dirty values.
         verbose: Whether to show progress bars.
+        speaks: Whether to print lines on how far it is, each with the channel's name.
     """
 
     channel: str
@@ -45,6 +48,7 @@ class Job:
     options: FitOptions
     cleaning: Cleaning
     verbose: bool = False
+    speaks: bool = False
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
@@ -114,6 +118,7 @@ def fit_channels(
     tell: Callable[[str], None],
     verbose: bool = False,
     engine: str = "local",
+    speaks: bool = False,
 ) -> dict[str, str]:
     """Fits a simulator to each channel, writes it with its report, and tells what was found.
 
@@ -127,6 +132,7 @@ def fit_channels(
         tell: Called with each line.
         verbose: Whether to show progress bars, where one channel is fitted at a time.
         engine: Who runs the processes: `local` or `ray`. It changes no bit either.
+        speaks: Whether each process of this machine prints a line about every fifteen seconds on how far its channel is.
 
     Returns:
         For each channel that could not be fitted, why.
@@ -140,7 +146,9 @@ def fit_channels(
         raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
     verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
     here = Path(os.path.abspath(out))
-    jobs = [Job(name, each, folder_of(here, name), options, cleaning, verbose) for name, each in series.items()]
+    jobs = [
+        Job(name, each, folder_of(here, name), options, cleaning, verbose, speaks and engine == "local") for name, each in series.items()
+    ]
     for job in jobs:
         refuse_foreign(job.folder)
     remove_leftovers(out)
@@ -229,15 +237,24 @@ def fit_job(job: Job) -> list[str]:
     Raises:
         InputError: If the channel cannot be used.
     """
+    progress = Progress(_tell_if_heard, f"{printable(job.channel)}: ") if job.speaks else SILENT
     cleaned = clean(job.series, job.cleaning)
     from enhsim_tf.channel_figure import channel_figure
     from enhsim_tf.fitting import fit_channel
 
     parts = [dataclasses.replace(part, name=job.channel) for part in cleaned.parts]
-    simulator, report = fit_channel(parts, job.options, "auto" if job.verbose else 0)
+    simulator, report = fit_channel(parts, job.options, "auto" if job.verbose else 0, progress)
     refuse_foreign(job.folder)  # it has been minutes
     with replace_folder(job.folder) as temporary:
         simulator.save(temporary)
         write_json(temporary / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
         channel_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
     return [*cleaned.report.lines(), *report.lines()]
+
+
+def _tell_if_heard(line: str) -> None:
+    """Prints a line; whoever has stopped reading stops no fit."""
+    try:
+        tell(line)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it once more at its end

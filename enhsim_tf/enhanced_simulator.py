@@ -4,6 +4,7 @@ It puts the rooms below together and trains none of their networks by hand.
 """
 
 import dataclasses
+import itertools
 import operator
 import os
 import sys
@@ -24,6 +25,7 @@ from enhsim_tf.saved_simulator import read_saved, write_saved
 from enhsim_tf.simulator import Degraded, SquareWaveSimulator, units_of
 from enhsim_tf.store import write_windows
 from enhsim_tf.telemetry import Telemetry, check_telemetry, check_values, cut_windows
+from enhsim_tf.terminal import SILENT, Progress
 
 _NUM_PHASES, _ROUNDS = 400, 3  # of a period, at which shapes are compared; trainings between which the clock is set anew
 _NUM_LEVELS = 500  # times at which level and amplitude are remembered, at most
@@ -96,6 +98,7 @@ class EnhancedSimulator:
         decay: bool = True,
         follow: bool = False,
         verbose: int | str = "auto",
+        progress: Progress = SILENT,
     ) -> "EnhancedSimulator":
         """Trains both networks on nominal telemetry.
 
@@ -128,6 +131,7 @@ class EnhancedSimulator:
                 learns it, for telemetry that drifts away from a fixed simulator. The epochs are done in three rounds; from
                 the second on, clock and levels are set by the enhanced shape. The levels are kept and drawn from again.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
+            progress: Tells in lines how far both trainings are.
 
         Returns:
             The trained simulator.
@@ -154,13 +158,15 @@ class EnhancedSimulator:
         pairs = cut_pairs(learnt, coarse, random_places(learnt, window, num_windows, rng), window, follow)
         network = enhancer_room.build_enhancer(window, seed=seed)
         simulator = cls(coarse, network, None, parts[0].interval_s, offset, scale, levels=[[0.0, 1.0]] if follow else None)
-        rounds = min(_ROUNDS, epochs) if follow else 1
-        for number, epochs_now in enumerate(np.diff(np.linspace(0, epochs, rounds + 1).astype(int)).tolist()):
+        rounds, told = min(_ROUNDS, epochs) if follow else 1, progress.loop("enhancer, epoch", epochs)
+        ends = np.linspace(0, epochs, rounds + 1).astype(int).tolist()
+        for number, (begin, end) in enumerate(itertools.pairwise(ends)):
+            epochs_now, callbacks = end - begin, [enhancer_room.EpochsDone(told.within(begin))]
             pairs = simulator._set_by_shape(pairs) if number else pairs
             pairs = pairs.clear() if follow else pairs
             rate = keras.optimizers.schedules.CosineDecay(0.001, epochs_now * -(-len(pairs) // 15)) if decay else 0.001
             source, target = ((windows - offset) / scale for windows in (pairs.coarse, pairs.target_in_unit))
-            enhancer_room.fit_windows(network, source, target, epochs_now, 15, seed + number, rate, verbose=bars)
+            enhancer_room.fit_windows(network, source, target, epochs_now, 15, seed + number, rate, callbacks=callbacks, verbose=bars)
         if follow:
             seen = simulator.pairs(parts, even_places(parts, window, _NUM_LEVELS)).clear()
             simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
@@ -189,7 +195,8 @@ class EnhancedSimulator:
             noise_scale = noise_unit(noise_windows) if normalise else 1.0
             pair = build_generator(window, seed=seed), build_discriminator(window, seed=seed)
             simulator.noise = NoiseGAN(*pair, scale=noise_scale, seed=seed)
-        simulator.noise.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose))
+        told = progress.loop("noise GAN, iteration", num_iterations)
+        simulator.noise.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose), on_iteration=told)
         return simulator
 
     def residual_windows(self, telemetry: Telemetry | Sequence[Telemetry], num_windows: int, rng: np.random.Generator) -> np.ndarray:

@@ -3,7 +3,7 @@
 It knows windows and nothing of noise or of where windows come from.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -112,6 +112,26 @@ def fit_windows(
     if trained is not model:
         trained.write_back()
     return {key: np.array(values) for key, values in history.history.items()}
+
+
+class EpochsDone(keras.callbacks.Callback):
+    """Calls a function with the epochs that are done, the part of the one under way included, after each step.
+
+    Args:
+        on_progress: The function.
+    """
+
+    def __init__(self, on_progress: Callable[[float], None]):
+        super().__init__()
+        self._on_progress, self._epoch = on_progress, 0
+
+    def on_epoch_begin(self, epoch: int, logs: dict | None = None) -> None:
+        """Notes which epoch it is, counted from 0."""
+        self._epoch = epoch
+
+    def on_train_batch_end(self, batch: int, logs: dict | None = None) -> None:
+        """Says how far it is after a step, counted from 0."""
+        self._on_progress(self._epoch + (batch + 1) / self.params["steps"])
 
 
 def batches(inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_size: int) -> tf.data.Dataset:

@@ -14,6 +14,7 @@ from enhsim_tf.fit_options import FitOptions
 from enhsim_tf.pairs import num_places, split_off
 from enhsim_tf.simulator import SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
+from enhsim_tf.terminal import SILENT, Progress
 
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # samples of the window that is chosen; the paper's is 500
 _LEAST_EXPLAINED = 0.05  # of the variance, by one square wave that runs free; of white noise the best explains one per cent
@@ -21,7 +22,7 @@ _LEAST_LEARNT = 8  # windows that the networks learn from, at least
 
 
 def fit_channel(
-    parts: Sequence[Telemetry], options: FitOptions | None = None, verbose: int | str = "auto"
+    parts: Sequence[Telemetry], options: FitOptions | None = None, verbose: int | str = "auto", progress: Progress = SILENT
 ) -> tuple[EnhancedSimulator, ChannelReport]:
     """Fits an enhanced simulator to a channel and reports on what was held out.
 
@@ -29,6 +30,7 @@ def fit_channel(
         parts: Regular stretches of nominal telemetry on one clock, as `cleaning.clean` makes them.
         options: Every choice.
         verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
+        progress: Tells in lines how far the trainings are.
 
     Returns:
         The simulator and the report.
@@ -38,13 +40,15 @@ def fit_channel(
     """
     options = options or FitOptions()
     learnt, held_out = split_off(parts, options.held_out)
-    simulator = fit_simulator(learnt, options, verbose)
+    simulator = fit_simulator(learnt, options, verbose, progress)
     usable = [part for part in learnt if len(part) >= simulator.window]
     is_held_out = bool(options.held_out) and num_places(held_out, simulator.window) >= simulator.window
     return simulator, report_on(simulator, usable, held_out if is_held_out else usable, is_held_out, options.seed)
 
 
-def fit_simulator(parts: Sequence[Telemetry], options: FitOptions, verbose: int | str = "auto") -> EnhancedSimulator:
+def fit_simulator(
+    parts: Sequence[Telemetry], options: FitOptions, verbose: int | str = "auto", progress: Progress = SILENT
+) -> EnhancedSimulator:
     """Fits an enhanced simulator to all that is given.
 
     The coarse simulator is one square wave, set to the clock and the levels of each window; the noise is what the
@@ -54,6 +58,7 @@ def fit_simulator(parts: Sequence[Telemetry], options: FitOptions, verbose: int 
         parts: Regular stretches of nominal telemetry on one clock.
         options: Every choice but `held_out`.
         verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
+        progress: Tells in lines how far the trainings are.
 
     Raises:
         InputError: If the telemetry is too short, constant or not periodic.
@@ -89,6 +94,7 @@ def fit_simulator(parts: Sequence[Telemetry], options: FitOptions, verbose: int 
         decay=True,
         follow=True,
         verbose=verbose,
+        progress=progress,
     )
 
 

@@ -214,6 +214,7 @@ class NoiseGAN:
         record_every: int = 100,
         on_record: Callable[[int, "NoiseGAN"], None] | None = None,
         verbose: bool | None = None,
+        on_iteration: Callable[[int], None] | None = None,
     ) -> dict[str, np.ndarray]:
         """Trains both networks.
 
@@ -223,6 +224,7 @@ class NoiseGAN:
             record_every: Iterations between two records.
             on_record: Called with the iteration and this object at each record.
             verbose: Whether to show a progress bar; None shows one on a terminal only.
+            on_iteration: Called after each iteration with how many are done.
 
         Returns:
             The history, one entry a record, the first before training: `iteration`, and for `real` and `generated` rows
@@ -240,6 +242,8 @@ class NoiseGAN:
                 if iteration < num_iterations:
                     self._step(noise)
                     bar.update()
+                    if on_iteration is not None:
+                        on_iteration(iteration + 1)
         if num_iterations:  # the average over no iterations is nought
             self.generator_optimizer.finalize_variable_values(self.generator.trainable_variables)
         return {key: np.array([record[key] for record in history]) for key in history[0]}

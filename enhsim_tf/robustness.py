@@ -98,6 +98,7 @@ def judge_arm(
     detectors: Mapping[str, Callable[[int], Detector]],
     seed: int,
     num_blocks: int = 10,
+    on_detector: Callable[[int], None] | None = None,
 ) -> dict[str, list[dict]]:
     """Trains every detector on one arm and judges it on real telemetry.
 
@@ -108,13 +109,14 @@ def judge_arm(
         detectors: From a name to what makes the untrained detector from a seed.
         seed: Seed of the detectors.
         num_blocks: Consecutive blocks of time that false alarms are counted in.
+        on_detector: Called after each detector with how many are done.
 
     Returns:
         Rows of three tables: `alarms` (detector, block, alarms, windows), `recall` (detector, kind, severity, recall,
         recall_at_real_rate, auc_roc, auc_pr) and `traces` (detector, vus_pr).
     """
     tables: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
-    for name, make in detectors.items():
+    for done, (name, make) in enumerate(detectors.items(), 1):
         detector = make(seed).fit(training)
         threshold = detection.threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
@@ -137,6 +139,8 @@ def judge_arm(
         if trial.trace is not None:
             scores = score_trace(detector, trial.trace, training.shape[1], trial.stride)
             tables["traces"].append({"detector": name, "vus_pr": detection.vus_pr(trial.labels, scores, trial.max_buffer)})
+        if on_detector is not None:
+            on_detector(done)
     return tables
 
 

@@ -1,9 +1,11 @@
 """How the commands speak: one line for a user's mistake, nothing of what others write to the terminal."""
 
 import argparse
+import math
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -31,7 +33,8 @@ def tell(line: str) -> None:
         line: Names of channels and folders in it may hold anything.
     """
     text, encoding = "\n".join(printable(each) for each in line.split("\n")), getattr(sys.stdout, "encoding", None) or "utf-8"
-    print(text.encode(encoding, "replace").decode(encoding), flush=True)  # a narrow terminal shows what it can
+    text = text.encode(encoding, "replace").decode(encoding)  # a narrow terminal shows what it can
+    print(f"{text}\n", end="", flush=True)  # in one piece with its end: other processes may write lines of theirs meanwhile
 
 
 def progress(*arguments: Any, **options: Any) -> "tqdm":
@@ -49,6 +52,81 @@ def progress(*arguments: Any, **options: Any) -> "tqdm":
     if not hasattr(tqdm, "_lock"):
         tqdm.set_lock(threading.RLock())
     return tqdm(*arguments, **options)
+
+
+INTERVAL_S = 15.0  # seconds without a word, after which a run without a terminal says how far it is
+
+
+class Progress:
+    """How far long work is, told in lines where no terminal shows bars: one whenever `INTERVAL_S` have passed without any.
+
+    Args:
+        tell: Called with each line. None: nothing is told.
+        before: What each line begins with: the name of the work.
+        clock: Seconds that only rise.
+    """
+
+    def __init__(self, tell: Callable[[str], None] | None = None, before: str = "", clock: Callable[[], float] = time.monotonic):
+        self.tell, self.before, self.clock, self.told = tell, before, clock, clock()
+
+    def loop(self, unit: str, total: int) -> "Loop":
+        """A loop that begins now.
+
+        Args:
+            unit: What is counted, such as `epoch`.
+            total: How many there will be.
+        """
+        return Loop(self, unit, total)
+
+
+class Loop:
+    """A loop of long work, called with how many of its units are done; the one under way may be done in part.
+
+    How long the rest takes is judged by all steps but the first, which builds the graph of a network.
+
+    Args:
+        progress: Whose lines tell of it.
+        unit: What is counted.
+        total: How many there will be.
+    """
+
+    def __init__(self, progress: Progress, unit: str, total: int):
+        self.progress, self.unit, self.total = progress, unit, total
+        self.first: tuple[float, float] | None = None  # when the first step ended, and what was done then
+
+    def __call__(self, done: float) -> None:
+        """Tells a line if it is time for one: 6.2 done of 40 are in number 7."""
+        if self.progress.tell is None or not 0 < done < self.total:
+            return
+        now = self.progress.clock()
+        self.first = self.first or (now, done)
+        if now - self.progress.told < INTERVAL_S:
+            return
+        self.progress.told = now
+        line = f"{self.progress.before}{self.unit} {math.ceil(done):,} of {self.total:,}, {math.floor(100 * done / self.total)} %"
+        began, before = self.first
+        if done > before:
+            line += f", {time_left((now - began) / (done - before) * (self.total - done))}"
+        self.progress.tell(line)
+
+    def within(self, before: int, steps: int = 1) -> Callable[[float], None]:
+        """What is called with the steps that are done of one unit, or of some where a unit is a step.
+
+        Args:
+            before: Units that were done before.
+            steps: Steps of a unit.
+        """
+        return lambda done: self(before + done / steps)
+
+
+SILENT = Progress()
+
+
+def time_left(seconds: float) -> str:
+    """About how long something will still take, in words."""
+    if seconds < 120:
+        return f"about {max(1, round(seconds))} s left"
+    return f"about {round(seconds / 60)} min left" if seconds < 7_200 else f"about {seconds / 3_600:.1f} h left"
 
 
 def finish(run: Callable[[], int], interrupted: str) -> int:

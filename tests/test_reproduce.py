@@ -209,13 +209,13 @@ def _start_and_kill(arguments, pattern, pause_s):
 def test_killed_in_each_stage_it_ends_with_the_same_numbers(smoke, tmp_path):
     cache, out = tmp_path / "cache", tmp_path / "out"
     arguments = ["--budget", "smoke", "--out", str(out), "--cache", str(cache)]
-    pauses = {"enhancer": 1.5, "noise GAN": 1.5, "false alarms": 0.7}  # long stages are killed well inside
+    pauses = {"enhancer": 0.5, "noise GAN": 1.5, "false alarms": 0.7}  # long stages are killed well inside
     for number, stage in enumerate(STAGES):
         said = _start_and_kill(arguments, rf"{stage} \.\.\.", pauses.get(stage, 0.05))
         for earlier in STAGES[: max(number - 1, 0)]:  # the last one before was killed in its turn and is done anew
             assert any(line.startswith(earlier) and "(from the cache)" in line for line in said), "an earlier stage is found done"
         assert not list(cache.glob(f"{stage}-*")), "no part of the killed stage stands under its name"
-    _start_and_kill(arguments, r"degraded [0-9.]+ s", 3)  # while it draws
+    _start_and_kill(arguments, r"degraded [0-9.]+ s", 0.3)  # while it draws the other figures
     for image in out.glob("[!.]*.png"):
         assert image.read_bytes()[-8:-4] == b"IEND", "every figure is whole"
     assert not (out / "results.json").exists()
@@ -265,6 +265,39 @@ def test_exit_code_is_0_as_expected_and_1_when_a_verdict_changed(pretended, tmp_
     assert pretended(C4="partly", C5="reproduced") == 0, "a close call may fall to either side"
     assert pretended("--budget", "smoke", C2="not reproduced") == 0, "a smoke run has no expected verdicts"
     assert (tmp_path / "smoke" / "results.json").is_file()
+
+
+def test_figures_that_need_no_training_are_drawn_once_and_before_any_claim_is_judged(pretended, tmp_path, monkeypatch, capsys):
+    events = []
+    monkeypatch.setattr(figures, "save", lambda name, *others: events.append(name))
+    pretended()  # sets what judges; then:
+    judge = claims.judge
+    monkeypatch.setattr(claims, "judge", lambda *arguments: events.append("judged") or judge(*arguments))
+    del events[:]
+    assert main(["--cache", str(tmp_path / "cache")]) == 0
+    early = list(figure_data.WITHOUT_TRAINING)
+    assert events == [*early, "judged", *(name for name in FIGURES if name not in early)]
+    del events[:]
+    capsys.readouterr()
+    assert main(["--cache", str(tmp_path / "cache"), "--only", "fig03"]) == 0
+    assert events == ["fig03_enhancer"] and "before any training" not in capsys.readouterr().out
+
+
+def test_a_stage_that_fails_leaves_the_early_figures_whole_and_nothing_else(tmp_path, monkeypatch, capsys):
+    def fails(all_of_them, experiment):
+        raise MemoryError("no more")
+
+    monkeypatch.setattr(claims, "judge", fails)
+    assert main(["--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--arrays"]) == 2
+    assert "figures 2, 3, 8, 9, 10, 11 and 14 drawn" in capsys.readouterr().out
+    expected = {f"{name}.{kind}" for name in figure_data.WITHOUT_TRAINING for kind in ("png", "svg", "npz")}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == expected
+    assert [stage.name.split("-")[0] for stage in (tmp_path / "cache").iterdir()] == ["telemetry"]
+
+
+@pytest.mark.parametrize(("names", "words"), [(FIGURES[1:2], "2"), (FIGURES[:2], "1 and 2"), (FIGURES[8:11], "9, 10 and 11")])
+def test_figures_are_listed_in_words(names, words):
+    assert command.listed(names) == words
 
 
 def test_the_time_of_figures_is_that_of_drawing_alone(pretended, tmp_path, monkeypatch, capsys):

@@ -103,6 +103,22 @@ def test_changed_code_of_the_stage_itself_does_it_anew(tmp_path, rooms):
     assert values == [1, 2, 1]
 
 
+def test_changed_code_of_a_helper_does_it_anew(tmp_path, rooms):
+    def one():
+        return 1
+
+    def two():
+        return 2
+
+    def make(folder):
+        save_arrays(folder, {"x": 0})
+
+    def key(*helpers):
+        return Stages(tmp_path / "cache", tell=lambda line: None).run("work", make, (), (), helpers=helpers).name
+
+    assert key(one) == key(one) and len({key(), key(one), key(two), key(one, two)}) == 4
+
+
 def test_other_versions_do_it_anew(work, monkeypatch):
     first, _ = work.run()
     monkeypatch.setattr(stages, "VERSIONS", stages.VERSIONS | {"numpy": "0.0"})

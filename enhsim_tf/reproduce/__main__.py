@@ -3,6 +3,7 @@
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from enhsim_tf.terminal import Parser, finish, tell
@@ -85,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.claims import CLAIMS, changed, judge, ranges
     from enhsim_tf.reproduce.data import Source
     from enhsim_tf.reproduce.experiments import Experiment
-    from enhsim_tf.reproduce.figure_data import FIGURE_DATA
+    from enhsim_tf.reproduce.figure_data import FIGURE_DATA, WITHOUT_TRAINING
     from enhsim_tf.reproduce.figures import save
     from enhsim_tf.reproduce.page import write_page
     from enhsim_tf.reproduce.report import fill_readme, results, table
@@ -93,8 +94,9 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
 
     def experiment_of(seed: int) -> Experiment:
-        stages = Stages(options.cache or default_cache(), options.fresh, tell)
-        given = make_settings(options.budget, seed), stages, source, int(sys.stdout.isatty())
+        is_terminal = sys.stdout.isatty()
+        stages = Stages(options.cache or default_cache(), options.fresh, tell, speaks=not is_terminal)
+        given = make_settings(options.budget, seed), stages, source, int(is_terminal)
         if options.store == "parquet":
             return Experiment(*given)
         from enhsim_tf.reproduce.influx_experiment import InfluxExperiment
@@ -104,16 +106,27 @@ def run(options: argparse.Namespace) -> int:
     began, is_smoke = time.perf_counter(), options.budget == "smoke"
     source = None if options.telemetry is None else Source(options.telemetry, options.column, options.time)
     experiment = experiment_of(options.seed)
-    records = [] if options.only else judge(CLAIMS, experiment)
 
-    chosen, drawn_s = chosen_figures(options.only), 0.0
-    for name in chosen:
-        data = FIGURE_DATA[name](experiment)  # does the stages it needs, which say their own time
-        drawing = time.perf_counter()
-        save(name, data, folder, caption_of(name, experiment), is_smoke)
-        drawn_s += time.perf_counter() - drawing
-        if options.arrays:
-            save_arrays(folder, data, name)
+    def draw(names: Sequence[str]) -> float:
+        """Draws figures and returns the seconds of drawing alone."""
+        drawn_s = 0.0
+        for name in names:
+            data = FIGURE_DATA[name](experiment)  # does the stages it needs, which say their own time
+            drawing = time.perf_counter()
+            save(name, data, folder, caption_of(name, experiment), is_smoke)
+            drawn_s += time.perf_counter() - drawing
+            if options.arrays:
+                save_arrays(folder, data, name)
+        return drawn_s
+
+    chosen, records, drawn_s = chosen_figures(options.only), [], 0.0
+    early = [] if options.only else [name for name in chosen if name in WITHOUT_TRAINING]
+    if early:  # something to look at in the minutes that the training takes
+        drawn_s += draw(early)
+        tell(f"figures {listed(early)} drawn in {folder}/ before any training")
+    if not options.only:
+        records = judge(CLAIMS, experiment)
+    drawn_s += draw([name for name in chosen if name not in early])
     tell(f"{'figures':12} {drawn_s:7.1f} s")
     if options.only:
         tell(f"{folder / chosen[0]}.png and .svg")
@@ -240,6 +253,12 @@ def chosen_figures(only: str | None) -> list[str]:
     if not chosen:
         raise InputError(f"Expected --only with one of {', '.join(name.split('_')[0] for name in FIGURES)}. Received: {only!r}.")
     return chosen
+
+
+def listed(names: Sequence[str]) -> str:
+    """Numbers of figures in words, such as 2, 3 and 11."""
+    *numbers, last = [str(int(name.removeprefix("fig")[:2])) for name in names]
+    return f"{', '.join(numbers)} and {last}" if numbers else last
 
 
 def out_folder(options: argparse.Namespace) -> Path:

@@ -76,7 +76,9 @@ class DegradedModes:
             limits[name] = detection.threshold(score.score(held_out), self.settings.robustness.false_alarm_rate)
 
         cells, per_window = [], {name: [] for name in SCORED}
-        for mode, severity in (("nominal", 0.0), *((mode, severity) for mode in MODES for severity in SEVERITIES)):
+        tried = [("nominal", 0.0), *((mode, severity) for mode in MODES for severity in SEVERITIES)]
+        told = self.stages.progress.loop("mode and severity", len(tried))
+        for done, (mode, severity) in enumerate(tried, 1):
             scenario = None if mode == "nominal" else Degraded(mode, severity)
             coarse, truth = self._pairs(scenario, self.settings.modes.num_windows, f"test {mode} {severity}")
             found = {name: score.score(coarse) for name, score in scores.items()}
@@ -89,6 +91,7 @@ class DegradedModes:
                     cell = np.full(len(score), len(cells))
                     per_window[method].append(pd.DataFrame({"score": score, "error": errors, "cell": cell}))
                 cells.append(about)
+            told(done)
 
         tenths, correlations = [], []
         for method, parts in per_window.items():
@@ -169,10 +172,11 @@ class DegradedModes:
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """The second pipeline's enhancer, as it is trained there, on other windows."""
         from enhsim_tf.backend import keras
-        from enhsim_tf.enhancer import build_enhancer, fit_windows
+        from enhsim_tf.enhancer import EpochsDone, build_enhancer, fit_windows
 
         seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.enhancer.batch_size
         network = build_enhancer(self.data.window, seed=seed)
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
-        fit_windows(network, coarse, target, epochs, batch_size, seed, rate, verbose=self.replicate.verbose)
+        callbacks = [EpochsDone(self.stages.progress.loop("enhancer, epoch", epochs))]
+        fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=callbacks, verbose=self.replicate.verbose)
         return network

@@ -21,6 +21,7 @@ from enhsim_tf.simulator import MODES, Degraded
 from enhsim_tf.store import ParquetStore
 
 if TYPE_CHECKING:
+    from enhsim_tf.backend import keras
     from enhsim_tf.enhanced_simulator import EnhancedSimulator
 
 _DATA = ("reproduce.data",)
@@ -81,10 +82,18 @@ class Experiment:
             self.settings.noise.moving_average,
             self.settings.seed,
         )
-        return self.stages.run("enhancer", self._make_enhancer, _ENHANCER, depends, after=("telemetry",))
+        helpers = (Experiment.untrained_enhancer,)
+        return self.stages.run("enhancer", self._make_enhancer, _ENHANCER, depends, ("telemetry",), helpers)
+
+    def untrained_enhancer(self) -> "keras.Model":
+        """Network one before it has learnt anything."""
+        from enhsim_tf.enhancer import build_enhancer
+
+        chosen = self.settings.enhancer
+        return build_enhancer(self.data.window, chosen.hidden_units, chosen.num_hidden, self.settings.seed, chosen.initialiser)
 
     def _make_enhancer(self, folder: Path) -> None:
-        from enhsim_tf.enhancer import build_enhancer, fit_windows
+        from enhsim_tf.enhancer import EpochsDone, fit_windows
 
         chosen, seed, number = self.settings.enhancer, self.settings.seed, self.settings.telemetry.num_windows
         offset, scale, _ = self.data.units
@@ -93,7 +102,7 @@ class Experiment:
         wanted = "truth" if self.settings.telemetry.target == "clean" else "target"
         pairs = (train["coarse"], train[wanted], held_out["coarse"], held_out[wanted])
         source, target, *validation = ((windows - offset) / scale for windows in pairs)
-        network = build_enhancer(self.data.window, chosen.hidden_units, chosen.num_hidden, seed, chosen.initialiser)
+        network = self.untrained_enhancer()
         history = fit_windows(
             network,
             source,
@@ -103,6 +112,7 @@ class Experiment:
             seed,
             chosen.learning_rate,
             tuple(validation),
+            callbacks=[EpochsDone(self.stages.progress.loop("epoch", chosen.epochs))],
             verbose=self.verbose,
             loss=chosen.loss,
         )
@@ -114,21 +124,31 @@ class Experiment:
         """Network two, its history and how its noise changed while it learned."""
         _ = self.data
         depends = (self.settings.telemetry, self.settings.split, self.settings.noise, self.settings.adversarial, self.settings.seed)
-        return self.stages.run("noise GAN", self._make_noise, _NOISE, depends, after=("telemetry",))
+        helpers = (Experiment.untrained_noise_networks,)
+        return self.stages.run("noise GAN", self._make_noise, _NOISE, depends, ("telemetry",), helpers)
 
-    def _make_noise(self, folder: Path) -> None:
-        from enhsim_tf import fidelity
-        from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+    def untrained_noise_networks(self) -> "tuple[keras.Model, keras.Model]":
+        """Network two, generator and discriminator, before they have learnt anything."""
+        from enhsim_tf.noise_gan import build_discriminator, build_generator
 
-        chosen, training, seed, window = self.settings.noise, self.settings.adversarial, self.settings.seed, self.data.window
-        gan = NoiseGAN(
+        chosen, seed, window = self.settings.noise, self.settings.seed, self.data.window
+        return (
             build_generator(window, chosen.latent, chosen.generator_units, chosen.generator_activation, seed, chosen.initialiser),
             build_discriminator(
                 window, chosen.filters, chosen.filter_width, chosen.stride, chosen.narrow_units, chosen.dropout, seed, chosen.initialiser
             ),
+        )
+
+    def _make_noise(self, folder: Path) -> None:
+        from enhsim_tf import fidelity
+        from enhsim_tf.noise_gan import NoiseGAN
+
+        training, seed = self.settings.adversarial, self.settings.seed
+        gan = NoiseGAN(
+            *self.untrained_noise_networks(),
             batch_size=training.batch_size,
             learning_rate=training.learning_rate,
-            latent_span=chosen.latent_span,
+            latent_span=self.settings.noise.latent_span,
             mixed_batch=training.mixed_batch,
             generated_in_training_mode=training.generated_in_training_mode,
             scale=self.data.units[2],
@@ -147,7 +167,8 @@ class Experiment:
                 )
             )
 
-        history = gan.fit(real, training.num_iterations, training.record_every, follow, verbose=bool(self.verbose))
+        told = self.stages.progress.loop("iteration", training.num_iterations)
+        history = gan.fit(real, training.num_iterations, training.record_every, follow, bool(self.verbose), told)
         for name in ("generator", "discriminator"):
             getattr(gan, name).save(folder / f"{name}.keras", include_optimizer=False)
         of_real = {"real_lag_one": fidelity.autocorrelation(real, 1)[1], "real_rank": fidelity.effective_rank(real[:200])}
@@ -206,13 +227,13 @@ class Experiment:
         return self._measure("resemblance", self._make_resemblance)
 
     def _make_resemblance(self, folder: Path) -> None:
-        seed, noise_of = self.settings.seed, self.simulator.noise.generate
+        seed, noise_of, told = self.settings.seed, self.simulator.noise.generate, self.stages.progress.loop("comparison", 4)
         # windows that share no sample, in the order of time: an overlap across the classifier's folds would give itself away
         real, again = (self.data.noise_windows(part, None) for part in ("test", "train"))
-        noise = measurements.resemblance(noise_of(len(real), seed + 1), real, again, seed)
+        noise = measurements.resemblance(noise_of(len(real), seed + 1), real, again, seed, told.within(0))
         real, again = (self.data.windows(part, None) for part in ("test", "train"))
         combined = self.simulator.enhance(real["coarse"]) + noise_of(len(real["coarse"]), seed + 2)
-        combined = measurements.resemblance(combined, real["target"], again["target"], seed)
+        combined = measurements.resemblance(combined, real["target"], again["target"], seed, told.within(2))
         save_arrays(
             folder, {f"noise_{key}": value for key, value in noise.items()} | {f"sum_{key}": value for key, value in combined.items()}
         )
@@ -248,7 +269,8 @@ class Experiment:
         arms = {name: (training[name], threshold[name]) for name in training}
         arms["real"] = (windows("train", chosen.num_windows, "arms, real")["target"], windows("calibration", None)["target"])
         degraded = {mode: self.data.degraded_truth(Degraded(mode, chosen.severity), noisy=True) for mode in MODES}
-        save_arrays(folder, measurements.false_alarms(arms, windows("test", None)["target"], degraded, chosen, self.settings.seed))
+        nominal, seed = windows("test", None)["target"], self.settings.seed
+        save_arrays(folder, measurements.false_alarms(arms, nominal, degraded, chosen, seed, self.stages.progress))
 
     @functools.cached_property
     def degraded(self) -> dict[str, np.ndarray] | None:

@@ -1,8 +1,8 @@
 """The arrays behind each figure: what is asked of the experiment, and nothing drawn.
 
 Each function takes the `Experiment` and returns plain arrays by name: numbers as arrays of shape `()`, words as unicode
-arrays, so that `numpy.savez` keeps them without pickle. It asks only for what its figure shows: a figure of windows
-trains no network.
+arrays, so that `numpy.savez` keeps them without pickle. It asks only for what its figure shows: a figure of windows, or of
+how a network is built, trains none.
 """
 
 import collections
@@ -98,17 +98,17 @@ def source_noise(experiment: Experiment) -> Arrays:
 
 def enhancer_layers(experiment: Experiment) -> Arrays:
     """Figure 3: the layers of the enhancer."""
-    return _layers(experiment.simulator.enhancer)
+    return _layers(experiment.untrained_enhancer())
 
 
 def generator_layers(experiment: Experiment) -> Arrays:
     """Figure 9: the layers of the generator."""
-    return _layers(experiment.simulator.noise.generator)
+    return _layers(experiment.untrained_noise_networks()[0])
 
 
 def discriminator_layers(experiment: Experiment) -> Arrays:
     """Figure 10: the layers of the discriminator."""
-    return _layers(experiment.simulator.noise.discriminator)
+    return _layers(experiment.untrained_noise_networks()[1])
 
 
 def gan_training(experiment: Experiment) -> Arrays:
@@ -161,6 +161,16 @@ FIGURE_DATA: dict[str, Callable[[Experiment], Arrays]] = {
     "fig13_combined": combined,
     "fig14_telemetry_store": telemetry_store,
 }
+WITHOUT_TRAINING = (
+    "fig02_source_target",
+    "fig03_enhancer",
+    "fig08_source_noise",
+    "fig09_generator",
+    "fig10_discriminator",
+    "fig11_gan_training",
+    "fig14_telemetry_store",
+)
+"""Figures that show nothing a network has learnt; they can be drawn before any is trained."""
 
 
 # -- what several of them need ---------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from enhsim_tf.errors import InputError
 from enhsim_tf.files import make_folder, write_json
 from enhsim_tf.labelled import load_channel, read_labels
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages
+from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,18 +74,22 @@ def collect(
         raise InputError(f"Expected --channels of {', '.join(list(labels)[:8])}. Received: {unknown[0]!r}. Name labelled ones.")
     parts: dict[str, list[pd.DataFrame]] = {}
     skipped: dict[str, str] = {}
-    chosen = list(channels or labels)
-    for number, name in enumerate(chosen, 1):
-        tell(f"channel {number} of {len(chosen)}: {name}")
+    chosen, is_terminal = list(channels or labels), sys.stdout.isatty()
+    turns = Turns("channel", len(chosen), tell)
+    for name in chosen:
+        turns.begin(name)
+        stages = Stages(cache, fresh, tell, speaks=not is_terminal)
         try:
-            study = ChannelStudy(load_channel(data, name), settings, Stages(cache, fresh, tell), int(sys.stdout.isatty()))
+            study = ChannelStudy(load_channel(data, name), settings, stages, int(is_terminal))
             tables = study.tables
         except InputError as error:
             skipped[name] = str(error)
             tell(f"left out: {error}")
+            turns.end(stages)
             continue
         for each, table in tables.items():
             parts.setdefault(each, []).append(table)
+        turns.end(stages)
         from enhsim_tf.backend import keras
 
         keras.backend.clear_session()  # dozens of networks would fill the memory

@@ -83,7 +83,7 @@ class ChannelStudy:
         options = FitOptions(
             num_windows=chosen.num_windows, epochs=chosen.epochs, num_iterations=chosen.num_iterations, held_out=0.0, seed=self.seed
         )
-        fit_simulator([self.channel.train], options, self.verbose).save(folder / "simulator")
+        fit_simulator([self.channel.train], options, self.verbose, self.stages.progress).save(folder / "simulator")
 
     @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
@@ -102,10 +102,13 @@ class ChannelStudy:
         rows["enhancement"] = self.enhancement()
         labels = np.array(self.channel.is_anomalous)
         training, held_out = self.arms(self.seed + 1), self.arms(self.seed + 2)
-        for arm in ARMS:
-            for name, make in (DETECTORS | (CONTROLS if arm == "real" else {})).items():
+        told = self.stages.progress.loop("arm", len(ARMS))
+        for number, arm in enumerate(ARMS):
+            detectors = DETECTORS | (CONTROLS if arm == "real" else {})
+            for done, (name, make) in enumerate(detectors.items(), 1):
                 scorer = make(self.seed).fit(training[arm]).score
                 self._judge(rows, arm, name, scorer, held_out[arm], labels)
+                told(number + done / len(detectors))
             self.stages.tell(f"  {arm:26} false alarms {self._said(rows, arm)}")
         classify = _classifier(training[GENERATED_ARM], self.degraded(self.seed + 3), self.seed)
         self._judge(rows, DEGRADED_ARM, "boosted trees", classify, held_out[GENERATED_ARM], labels)
@@ -130,7 +133,8 @@ class ChannelStudy:
         noise = self.simulator.residual_windows(self.channel.train, chosen.num_windows, np.random.default_rng([self.seed, 1]))
         networks = build_generator(window, seed=self.seed), build_discriminator(window, seed=self.seed)
         gan = NoiseGAN(*networks, scale=noise_unit(noise), seed=self.seed)
-        gan.fit(noise, chosen.num_iterations, verbose=bool(self.verbose))
+        told = self.stages.progress.loop("noise GAN, iteration", chosen.num_iterations)
+        gan.fit(noise, chosen.num_iterations, verbose=bool(self.verbose), on_iteration=told)
         return {
             "GAN": gan,
             "Gaussian": GaussianNoise.fit(noise),

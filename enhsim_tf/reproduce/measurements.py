@@ -10,6 +10,7 @@ from enhsim_tf import fidelity
 from enhsim_tf.detectors import DenseAutoencoder, IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.reproduce.settings import DetectorSettings
 from enhsim_tf.simulator import Degraded
+from enhsim_tf.terminal import SILENT, Progress
 from enhsim_tf.two_sample import two_sample_auc
 
 if TYPE_CHECKING:
@@ -43,7 +44,9 @@ def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, f
     }
 
 
-def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray, seed: int) -> dict[str, float]:
+def resemblance(
+    generated: np.ndarray, real: np.ndarray, real_again: np.ndarray, seed: int, on_comparison: Callable[[int], None] = lambda done: None
+) -> dict[str, float]:
     """How close generated windows are to real ones, each measure beside its real-against-real floor.
 
     Args:
@@ -51,9 +54,10 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
         real: As many held-out real windows.
         real_again: At least as many other real windows: what the floor compares with `real`.
         seed: Seed of the two-sample classifier's folds.
+        on_comparison: Called after each of the two comparisons with how many are done.
     """
     measures = {}
-    for name, other in (("", generated), ("floor_", real_again[: len(real)])):
+    for done, (name, other) in enumerate((("", generated), ("floor_", real_again[: len(real)])), 1):
         lag_one = fidelity.autocorrelation(other, 1)[1] - fidelity.autocorrelation(real, 1)[1]
         measures |= {
             f"{name}scale_difference": fidelity.scale_difference(other, real),
@@ -63,6 +67,7 @@ def resemblance(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray,
             f"{name}roughness_ratio": fidelity.roughness(other) / fidelity.roughness(real),
             f"{name}classifier_auc": two_sample_auc(other, real, seed),
         }
+        on_comparison(done)
     ranks = {"rank": fidelity.effective_rank(generated), "real_rank": fidelity.effective_rank(real)}
     return measures | ranks | {"num_windows": float(len(real))}
 
@@ -87,7 +92,9 @@ def speed(simulator: "EnhancedSimulator", num_windows: int, repeats: int = 5) ->
     return rates | {"cost_ratio": rates["coarse_rate"] / rates["generate_rate"]}
 
 
-def false_alarms(arms: Mapping, test: np.ndarray, degraded: Mapping, settings: DetectorSettings, seed: int) -> dict[str, np.ndarray]:
+def false_alarms(
+    arms: Mapping, test: np.ndarray, degraded: Mapping, settings: DetectorSettings, seed: int, progress: Progress = SILENT
+) -> dict[str, np.ndarray]:
     """False alarms and recall of detectors trained on each arm; the threshold comes from held-out windows of the arm.
 
     Args:
@@ -96,18 +103,20 @@ def false_alarms(arms: Mapping, test: np.ndarray, degraded: Mapping, settings: D
         degraded: From a degraded mode to real degraded windows.
         settings: The detectors' settings.
         seed: Seed of the detectors.
+        progress: Tells how many arms are done.
 
     Returns:
         Arrays `false_alarm_rate` and `recall` (mean over the modes) of shape `(arms, detectors)`, and the names
         `arms`, `detectors`.
     """
-    rate, found = [], []
-    for training, threshold_windows in arms.values():
+    rate, found, told = [], [], progress.loop("arm", len(arms))
+    for number, (training, threshold_windows) in enumerate(arms.values()):
         detectors = make_detectors(settings, seed)
-        for detector in detectors.values():
+        for done, detector in enumerate(detectors.values(), 1):
             threshold = np.quantile(detector.fit(training).score(threshold_windows), 1 - settings.false_alarm_rate)
             rate.append(np.mean(detector.score(test) > threshold))
             found.append(np.mean([np.mean(detector.score(windows) > threshold) for windows in degraded.values()]))
+            told(number + done / len(detectors))
     shape = (len(arms), len(detectors))
     return {
         "false_alarm_rate": np.reshape(rate, shape),

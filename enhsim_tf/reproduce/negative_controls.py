@@ -12,6 +12,7 @@ import numpy as np
 
 from enhsim_tf.noise_processes import AutoregressiveNoise
 from enhsim_tf.realism import RealFloor
+from enhsim_tf.terminal import SILENT, Progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +74,7 @@ NEGATIVE_CONTROLS: Mapping[str, Control] = {
 """From real windows and an owner of the draws to as many windows with a fault."""
 
 
-def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int) -> "pd.DataFrame":
+def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int, progress: Progress = SILENT) -> "pd.DataFrame":
     """Measures every control, and real windows as the one without a fault.
 
     Args:
@@ -81,6 +82,7 @@ def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int)
         samples: Samples of a window.
         num_resplits: Re-splits of the floor at most.
         seed: Seed of the process, the controls and the re-splits.
+        progress: Tells how many controls are done.
 
     Returns:
         A row a control and measure, with the fields of `realism.Row`, `control` and `num_windows`.
@@ -89,8 +91,10 @@ def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int)
 
     real, again, third = (process(num_windows, samples, np.random.default_rng([seed, part])) for part in range(3))
     floor = RealFloor(real, again, num_resplits, seed=seed)
-    rows = []
-    for number, (name, make) in enumerate({"real": lambda windows, rng: windows, **NEGATIVE_CONTROLS}.items()):
+    controls: dict[str, Control] = {"real": lambda windows, rng: windows, **NEGATIVE_CONTROLS}
+    rows, told = [], progress.loop("control", len(controls))
+    for number, (name, make) in enumerate(controls.items()):
         judged = floor.judge(make(third, np.random.default_rng([seed, 3 + number])))
         rows += [{"control": name, "num_windows": num_windows, **dataclasses.asdict(row)} for row in judged.rows]
+        told(number + 1)
     return pd.DataFrame(rows)

@@ -107,6 +107,7 @@ class Replicate:
             held_out=chosen.held_out,
             decay=True,
             verbose=self.verbose,
+            progress=self.stages.progress,
         ).save(folder / "simulator")
 
     @functools.cached_property
@@ -129,9 +130,11 @@ class Replicate:
         trial, seed = self.trial(), self.settings.seed
         training, held_out = self.arms("arms, training"), self.arms("arms, threshold")
         rows: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
-        for arm in ARMS:
+        told = self.stages.progress.loop("arm", len(ARMS))
+        for number, arm in enumerate(ARMS):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
-            judged = robustness.judge_arm(training[arm], held_out[arm], trial, detectors, seed)
+            on_detector = told.within(number, len(detectors))
+            judged = robustness.judge_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
             for name, found in judged.items():
                 rows[name] += [{"arm": arm, **row} for row in found]
             rates = robustness.summary(judged["alarms"]).values()
@@ -146,14 +149,14 @@ class Replicate:
         trial = self.trial(chosen.num_anomalous_varied)
         quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
         learnt, limiting = self.arms("arms, training"), self.arms("arms, threshold")
-        rows = []
-        for arm, scale, share, both in VARIATIONS:
+        rows, told = [], self.stages.progress.loop("variation", len(VARIATIONS))
+        for number, (arm, scale, share, both) in enumerate(VARIATIONS):
             draws = self.experiment.data.draw(f"mixed windows, {arm}, {scale}, {share}")
             training, held_out = (
                 robustness.mixed(_scaled(arms, arm, scale), arms["real"], part, draws)
                 for arms, part in ((learnt, share), (limiting, share if both else 0.0))
             )
-            judged = robustness.judge_arm(training, held_out, trial, quick, seed)
+            judged = robustness.judge_arm(training, held_out, trial, quick, seed, on_detector=told.within(number, len(quick)))
             recall, alarms = ({name: [] for name in quick} for _ in range(2))
             for row in judged["recall"]:
                 recall[row["detector"]].append(row["recall"])
@@ -174,7 +177,10 @@ class Replicate:
             extracted = self.disjoint_extracted[pipeline]
             judged[f"{name}: extracted"] = extracted[np.arange(number) % len(extracted)]
             judged |= {f"{name} + {noise}": model.generate(number, seed) for noise, model in self.surrogates[pipeline].items()}
-        rows = [{"noise": noise, **dataclasses.asdict(row)} for noise, windows in judged.items() for row in floor.judge(windows).rows]
+        rows, told = [], self.stages.progress.loop("noise", len(judged))
+        for done, (noise, windows) in enumerate(judged.items(), 1):
+            rows += [{"noise": noise, **dataclasses.asdict(row)} for row in floor.judge(windows).rows]
+            told(done)
         process = NOISES[self.settings.telemetry.noise]
         parameters = [
             {"noise": noise, "block": block, "parameter": parameter, "value": value}

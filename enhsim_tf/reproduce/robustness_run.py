@@ -1,7 +1,6 @@
 """`python -m enhsim_tf.reproduce --experiment robustness`: every replicate, its tables, findings, figures and report."""
 
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from enhsim_tf.files import make_folder, write_json
 from enhsim_tf.reproduce.negative_controls import judge_controls
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages
+from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,17 +64,16 @@ def collect(
     from enhsim_tf.reproduce.replicates import replicate
 
     parts: dict[str, list[pd.DataFrame]] = {}
-    total, began = settings.robustness.num_seeds * len(environments), time.perf_counter()
+    is_terminal, turns = sys.stdout.isatty(), Turns("replicate", settings.robustness.num_seeds * len(environments), tell)
     for number in range(settings.robustness.num_seeds):
         for environment in environments:
-            done = number * len(environments) + environments.index(environment)
-            tell(f"replicate {done + 1} of {total}: {environment}, seed {settings.robustness.first_seed + number}")
-            one = replicate(settings, Stages(cache, fresh, tell), environment, number, int(sys.stdout.isatty()))
+            turns.begin(f"{environment}, seed {settings.robustness.first_seed + number}")
+            stages = Stages(cache, fresh, tell, speaks=not is_terminal)
+            one = replicate(settings, stages, environment, number, int(is_terminal))
             tables = one.tables | (DegradedModes(one).tables if environment == environments[0] else {})
             for name, table in tables.items():
                 parts.setdefault(name, []).append(table)
-            spent = time.perf_counter() - began
-            tell(f"{done + 1} of {total} replicates in {spent:.0f} s; about {spent / (done + 1) * (total - done - 1) / 60:.0f} min left")
+            turns.end(stages)
             from enhsim_tf.backend import keras
 
             keras.backend.clear_session()  # hundreds of networks would fill the memory
@@ -91,8 +89,10 @@ def _controls(settings: Settings, cache: Path, fresh: bool, tell: Callable[[str]
     chosen = settings.robustness
     numbers = (chosen.num_windows, settings.telemetry.window, chosen.num_resplits, chosen.first_seed)
 
-    def make(folder: Path) -> None:
-        judge_controls(*numbers).to_parquet(folder / "controls.parquet")
+    stages = Stages(cache, fresh, tell, speaks=not sys.stdout.isatty())
 
-    folder = Stages(cache, fresh, tell).run("controls", make, ("reproduce.negative_controls",), numbers)
+    def make(folder: Path) -> None:
+        judge_controls(*numbers, stages.progress).to_parquet(folder / "controls.parquet")
+
+    folder = stages.run("controls", make, ("reproduce.negative_controls",), numbers)
     return pd.read_parquet(folder / "controls.parquet")

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.files import make_folder, remove_leftovers, replace_file, replace_folder, sha256, write_json
+from enhsim_tf.terminal import SILENT, Progress, time_left
 
 _PACKAGE = Path(__file__).parents[1]
 VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
@@ -40,16 +41,27 @@ class Stages:
         cache: Folder the stages are kept in.
         fresh: Whether to do every stage anew.
         tell: Called with a line about each stage.
+        speaks: Whether a long stage also tells how far it is.
     """
 
-    def __init__(self, cache: Path, fresh: bool = False, tell: Callable[[str], None] = print):
+    def __init__(self, cache: Path, fresh: bool = False, tell: Callable[[str], None] = print, speaks: bool = False):
         self.cache, self.fresh, self.tell = make_folder(cache), fresh, tell
         remove_leftovers(self.cache)
         self.seconds: dict[str, float] = {}
         self.cached: dict[str, bool] = {}
+        self.progress = SILENT  # while a stage is done, its own
+        self.speaks = speaks
         self._keys: dict[str, str] = {}
 
-    def run(self, name: str, make: Callable[[Path], None], rooms: Iterable[str], settings: Any, after: Iterable[str] = ()) -> Path:
+    def run(
+        self,
+        name: str,
+        make: Callable[[Path], None],
+        rooms: Iterable[str],
+        settings: Any,
+        after: Iterable[str] = (),
+        helpers: Iterable[Callable] = (),
+    ) -> Path:
         """Does a stage, or finds it done.
 
         Args:
@@ -58,11 +70,13 @@ class Stages:
             rooms: Modules of the package that `make` works with.
             settings: What else the result depends on, anything with a faithful `repr`.
             after: Names of the stages whose results `make` reads.
+            helpers: Functions that `make` calls and that are in none of the rooms.
 
         Returns:
             The folder with the stage's results.
         """
-        depends = [name, repr(settings), _code(rooms), inspect.getsource(make), VERSIONS, [self._keys[before] for before in after]]
+        sources = [inspect.getsource(function) for function in (make, *helpers)]
+        depends = [name, repr(settings), _code(rooms), *sources, VERSIONS, [self._keys[before] for before in after]]
         key = self._keys[name] = hashlib.sha256(json.dumps(depends).encode()).hexdigest()[:16]
         folder = self.cache / f"{name}-{key}"
         done, damage = (None, None) if self.fresh or not os.path.lexists(folder) else _read(folder, name)
@@ -74,12 +88,56 @@ class Stages:
             began = time.perf_counter()
             # of two runs at once the first to end keeps its place, so that nothing goes away that a run reads
             with replace_folder(folder, None if self.fresh else lambda path: _read(path, name)[1] is None) as temporary:
-                make(temporary)
+                self._make(name, make, temporary)
                 done = {"stage": name, "seconds": time.perf_counter() - began, "sha256": _checksums(temporary)}
                 write_json(temporary / "stage.json", done | {"checksum": _checksum(done)})
         self.seconds[name] = done["seconds"]
         self.tell(f"{name:12} {self.seconds[name]:7.1f} s{'  (from the cache)' if self.cached[name] else ''}")
         return folder
+
+    def _make(self, name: str, make: Callable[[Path], None], folder: Path) -> None:
+        """Fills the folder of a stage, which meanwhile finds its own progress here."""
+        outer, self.progress = self.progress, Progress(self.tell if self.speaks else None, f"{name:12} ")
+        try:
+            make(folder)
+        finally:
+            self.progress = outer
+
+
+class Turns:
+    """Replicates or channels in turn: which of how many it is, and how long the others will take.
+
+    That is judged by those that this run trained; before there is one, by those that it found done.
+
+    Args:
+        what: What they are, in the singular.
+        total: How many.
+        tell: Called with each line.
+        clock: Seconds that only rise.
+    """
+
+    def __init__(self, what: str, total: int, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic):
+        self.what, self.total, self.tell, self.clock = what, total, tell, clock
+        self.spent: dict[bool, list[float]] = {True: [], False: []}  # by whether it was found done
+        self.began = self.turn_began = clock()
+
+    def begin(self, name: str) -> None:
+        """Tells that the next one begins, and its name."""
+        self.turn_began = self.clock()
+        self.tell(f"{self.what} {self._done + 1} of {self.total}: {name}")
+
+    def end(self, stages: Stages) -> None:
+        """Tells that one has ended, whose stages these were."""
+        now = self.clock()
+        self.spent[all(stages.cached.values())].append(now - self.turn_began)
+        judged = self.spent[False] or self.spent[True]
+        left = sum(judged) / len(judged) * (self.total - self._done)
+        said = f"{self._done} of {self.total} {self.what}s in {now - self.began:.0f} s"
+        self.tell(f"{said}; {time_left(left)}" if self._done < self.total else said)
+
+    @property
+    def _done(self) -> int:
+        return len(self.spent[True]) + len(self.spent[False])
 
 
 def _read(folder: Path, name: str) -> tuple[dict[str, Any] | None, str | None]:
