@@ -54,9 +54,10 @@ def recall_at_real_rate(real_scores: np.ndarray, anomalous_scores: np.ndarray, r
 
 def auc_roc(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> float:
     """Area under the ROC curve: the share of pairs in the right order, ties for half."""
-    from sklearn.metrics import roc_auc_score
-
-    return float(roc_auc_score(*_labelled(nominal_scores, anomalous_scores)))
+    nominal, anomalous = _scores(nominal_scores, anomalous_scores)
+    in_order = np.sort(nominal)
+    below, not_above = (np.searchsorted(in_order, anomalous, side).sum() for side in ("left", "right"))
+    return float((below + not_above) / 2 / (len(nominal) * len(anomalous)))
 
 
 def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarray, prevalence: float = 0.02) -> float:
@@ -67,11 +68,13 @@ def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarra
         anomalous_scores: Scores of anomalous windows.
         prevalence: Share of anomalous windows that the weights stand for; a random score reaches about this.
     """
-    from sklearn.metrics import average_precision_score
-
-    labels, scores = _labelled(nominal_scores, anomalous_scores)
-    weights = np.where(labels, prevalence / len(anomalous_scores), (1 - prevalence) / len(nominal_scores))
-    return float(average_precision_score(labels, scores, sample_weight=weights))
+    nominal, anomalous = _scores(nominal_scores, anomalous_scores)
+    thresholds = np.unique(anomalous)[::-1]  # recall rises at these alone
+    recalls, false = (
+        (len(scores) - np.searchsorted(np.sort(scores), thresholds, "left")) / len(scores) for scores in (anomalous, nominal)
+    )
+    true = prevalence * recalls
+    return float(np.sum(np.diff(recalls, prepend=0) * true / (true + (1 - prevalence) * false)))
 
 
 def gap_closed(rate: float, simulated_rate: float, real_rate: float) -> float:
@@ -152,6 +155,16 @@ def _distance(labels: np.ndarray) -> np.ndarray:
     return np.minimum(places - before, after - places)
 
 
-def _labelled(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and scores in one array each."""
-    return np.repeat([0, 1], [len(nominal_scores), len(anomalous_scores)]), np.concatenate([nominal_scores, anomalous_scores])
+def _scores(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scores of both kinds as they can be compared.
+
+    Raises:
+        InputError: If there are none of a kind, or one is not a number.
+    """
+    nominal, anomalous = (np.asarray(scores, np.float64) for scores in (nominal_scores, anomalous_scores))
+    if not (len(nominal) and len(anomalous)) or np.isnan(nominal).any() or np.isnan(anomalous).any():
+        raise InputError(
+            "Expected scores of nominal and of anomalous windows, and no nan. "
+            f"Received: {len(nominal)} and {len(anomalous)}, {np.isnan(nominal).sum() + np.isnan(anomalous).sum()} nan."
+        )
+    return nominal, anomalous

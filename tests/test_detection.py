@@ -67,6 +67,27 @@ def test_area_under_precision_and_recall_at_a_prevalence_by_hand():
     assert auc_pr_at_prevalence([3, 1] * 50, [4, 2], prevalence=p) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_areas_are_those_of_scikit_learn(seed):
+    rng = np.random.default_rng(seed)
+    levels = (3, 40, 10**6)[seed % 3]  # many ties, some and none
+    nominal, anomalous = rng.integers(0, levels, 70), rng.integers(0, levels, 9) + rng.integers(0, levels)
+    if seed % 4 == 0:
+        anomalous = np.where(rng.random(9) < 0.3, np.inf, anomalous / 7).astype(np.float32)
+    labels, scores = np.repeat([0, 1], [70, 9]), np.minimum(np.concatenate([nominal, anomalous]), 1e30)
+    assert auc_roc(nominal, anomalous) == pytest.approx(roc_auc_score(labels, scores), abs=1e-12)
+    weights = np.where(labels, 0.05 / 9, 0.95 / 70)
+    expected = average_precision_score(labels, scores, sample_weight=weights)
+    assert auc_pr_at_prevalence(nominal, anomalous, 0.05) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(("nominal", "anomalous"), [([], [1.0]), ([1.0], []), ([np.nan, 1.0], [2.0]), ([1.0], [np.nan])])
+def test_areas_of_nothing_and_of_no_numbers_are_refused(refused, nominal, anomalous):
+    for area in (auc_roc, auc_pr_at_prevalence):
+        with refused(f"{len(nominal)} and {len(anomalous)}"):
+            area(nominal, anomalous)
+
+
 @pytest.mark.parametrize("prevalence", [0.02, 0.3])
 def test_area_of_a_random_score_is_the_prevalence(prevalence):
     rng = np.random.default_rng(0)
