@@ -70,9 +70,7 @@ def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarra
     """
     nominal, anomalous = _scores(nominal_scores, anomalous_scores)
     thresholds = np.unique(anomalous)[::-1]  # recall rises at these alone
-    recalls, false = (
-        (len(scores) - np.searchsorted(np.sort(scores), thresholds, "left")) / len(scores) for scores in (anomalous, nominal)
-    )
+    recalls, false = ((len(scores) - np.searchsorted(np.sort(scores), thresholds, "left")) / len(scores) for scores in (anomalous, nominal))
     true = prevalence * recalls
     return float(np.sum(np.diff(recalls, prepend=0) * true / (true + (1 - prevalence) * false)))
 

@@ -45,15 +45,14 @@ PACKAGE_NAMES = {node.name for path in (ROOT / "enhsim_tf").rglob("*.py") for no
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
+def cache(smoke_run):
     """One cache for all kernels, with every stage done once."""
-    folder = tmp_path_factory.mktemp("stages")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ENHSIM_TF_CACHE", str(folder))
+        patch.setenv("ENHSIM_TF_CACHE", str(smoke_run.cache))
         experiment = teaching.open_experiment("smoke")
         experiment.verbose = 0
         assert teaching.prepare(experiment) == []
-    return folder
+    return smoke_run.cache
 
 
 def test_no_notebook_is_lost():

@@ -29,12 +29,6 @@ def _command(*arguments):
     return subprocess.run([*COMMAND, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=600)
 
 
-def _committed():
-    """What no smoke run may touch: the figures and the README, with their times."""
-    files = [ROOT / "README.md", *sorted((ROOT / "figures").rglob("*"))]
-    return [(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
-
-
 def _without_timing(found):
     return [claim for claim in found["claims"] if claim["id"] != "C2"]
 
@@ -44,13 +38,9 @@ def _results(out):
 
 
 @pytest.fixture(scope="module")
-def smoke(tmp_path_factory):
+def smoke(smoke_run):
     """One undisturbed smoke run."""
-    folder, before = tmp_path_factory.mktemp("smoke"), _committed()
-    done = _command("--budget", "smoke", "--out", folder / "out", "--cache", folder / "cache")
-    assert done.returncode == 0, done.stderr
-    touched = before != _committed()
-    return SimpleNamespace(out=folder / "out", cache=folder / "cache", done=done, found=_results(folder / "out"), touched=touched)
+    return SimpleNamespace(**vars(smoke_run), done=smoke_run, found=_results(smoke_run.out))
 
 
 # -- help ------------------------------------------------------------------------------------------------------------------
@@ -125,10 +115,10 @@ def test_progress_bars_are_quiet_where_there_is_no_terminal(smoke):
 @pytest.fixture(scope="module")
 def again(smoke, tmp_path_factory):
     """The same once more, with the arrays and a second seed."""
-    out, before = tmp_path_factory.mktemp("again"), _committed()
+    out, before = tmp_path_factory.mktemp("again"), smoke.committed()
     done = _command("--budget", "smoke", "--out", out, "--cache", smoke.cache, "--arrays", "--spread", 1)
     assert done.returncode == 0, done.stderr
-    assert before == _committed()
+    assert before == smoke.committed()
     return SimpleNamespace(out=out, done=done, found=_results(out))
 
 
