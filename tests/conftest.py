@@ -27,13 +27,6 @@ from enhsim_tf.errors import InputError  # noqa: E402
 ROOT = Path(__file__).parents[1]
 
 
-def pytest_collection_finish():
-    """What is imported by now stays: the garbage collector need not walk over it whenever a graph is traced."""
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(20_000, 10, 10)
-
-
 @pytest.fixture(scope="module", autouse=True)
 def memory_given_back():
     """Networks and their graphs are garbage in circles: they go with the file that made them, and their memory to the system."""
