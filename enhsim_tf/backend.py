@@ -6,6 +6,7 @@ messages reaches the user. If TensorFlow was imported before, it keeps the setti
 """
 
 import contextlib
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -28,10 +29,22 @@ def _without_standard_error() -> Iterator[None]:
         os.close(nowhere)
 
 
+@contextlib.contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """Rests the garbage collector, which would walk again and again over all that is imported, and that stays."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
 def _start() -> None:
     apply_settings()
     _check_backend("Expected KERAS_BACKEND", os.environ["KERAS_BACKEND"])
-    with _without_standard_error():
+    with _without_standard_error(), _collector_at_rest():
         import tensorflow
 
         tensorflow.config.list_physical_devices()  # the messages about devices come with the first look at them

@@ -13,6 +13,7 @@ from pathlib import Path
 import jupytext
 import nbclient
 import nbformat
+from jupyter_client.manager import KernelManager
 
 from enhsim_tf.files import make_folder, replace_file, sha256
 
@@ -43,13 +44,17 @@ def read(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def execute(source: Path, budget: str, cache: Path | None = None) -> nbformat.NotebookNode:
-    """Executes a source in a kernel of its own, in the folder of the notebooks as Jupyter does, and stamps it.
+def execute(
+    source: Path, budget: str, cache: Path | None = None, kernel: KernelManager | None = None
+) -> nbformat.NotebookNode:
+    """Executes a source in a kernel, in the folder of the notebooks as Jupyter does, and stamps it.
 
     Args:
         source: One of `sources()`.
         budget: `full` or `smoke`.
         cache: Where finished stages are kept; None keeps them where `reproduce` does.
+        kernel: A kernel that goes on to live, with what it has imported; it was started, if at all, for this budget and
+            cache. The notebook finds no name of an earlier one. None: a kernel of the notebook's own.
 
     Raises:
         nbclient.exceptions.CellExecutionError: If a cell raises.
@@ -60,6 +65,7 @@ def execute(source: Path, budget: str, cache: Path | None = None) -> nbformat.No
     )
     client = nbclient.NotebookClient(
         notebook,
+        km=kernel,
         timeout=TIMEOUT_S,
         kernel_name="python3",
         resources={"metadata": {"path": str(source.parent)}},
@@ -67,7 +73,9 @@ def execute(source: Path, budget: str, cache: Path | None = None) -> nbformat.No
         coalesce_streams=True,
         extra_arguments=["--IPKernelApp.log_level=ERROR"],
     )
-    client.execute(env=environment)
+    if kernel is not None and kernel.has_kernel:
+        _forget(kernel)
+    client.execute(env=environment, cleanup_kc=kernel is None)
     notebook.metadata["language_info"] = {
         "name": "python"
     }  # what the kernel says of itself differs from machine to machine
@@ -78,6 +86,19 @@ def execute(source: Path, budget: str, cache: Path | None = None) -> nbformat.No
         "budget": budget,
     }
     return notebook
+
+
+def _forget(kernel: KernelManager) -> None:
+    """Takes all names that a notebook has left from its kernel."""
+    channels = kernel.client()
+    channels.start_channels()
+    try:
+        channels.wait_for_ready()
+        reply = channels.execute("%reset -f", reply=True, timeout=60)
+        if reply["content"]["status"] != "ok":
+            raise RuntimeError(f"The kernel keeps its names: {reply['content']}")
+    finally:
+        channels.stop_channels()
 
 
 def findings(source: Path, figures: Path = FOLDER.parent / "figures") -> dict[str, str]:

@@ -1,20 +1,88 @@
 """What all tests share: a quiet TensorFlow, and the one form a user's mistake is answered in."""
 
 import contextlib
+import ctypes
+import functools
+import gc
+import json
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from filelock import FileLock
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background job; what the tests start would not hear an interrupt
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
+for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")  # two processes test at a time; threads that wait for each other burn as much as those that work
 
 from enhsim_tf.errors import InputError  # noqa: E402
 from enhsim_tf.tensorflow_settings import apply_settings  # noqa: E402
 
 apply_settings()  # a test that imports Keras itself computes as the package does
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def memory_given_back():
+    """Networks and their graphs are garbage in circles: they go with the file that made them, and their memory to the system."""
+    yield
+    gc.collect()
+    if sys.platform == "linux":
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+@pytest.fixture(scope="session")
+def smoke_run(tmp_path_factory):
+    """One undisturbed smoke run of the reproduction, made by the first of the testing processes that asks for it.
+
+    Returns:
+        The folders `out` and `cache`; what the command said and its exit code; whether it touched what is committed, and
+        what tells so of another run.
+    """
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "smoke-run"
+    with FileLock(f"{folder}.lock"):
+        if not (folder / "said.json").is_file():
+            before = committed()
+            options = ["--budget", "smoke", "--out", folder / "out", "--cache", folder / "cache"]
+            done = subprocess.run(
+                [sys.executable, "-m", "enhsim_tf.reproduce", *options], cwd=ROOT, capture_output=True, text=True, timeout=600
+            )
+            said = {"returncode": done.returncode, "stdout": done.stdout, "stderr": done.stderr, "touched": before != committed()}
+            folder.mkdir(exist_ok=True)
+            (folder / "said.json").write_text(json.dumps(said), encoding="utf-8")
+    said = json.loads((folder / "said.json").read_text(encoding="utf-8"))
+    assert said["returncode"] == 0, said["stderr"]
+    return SimpleNamespace(out=folder / "out", cache=folder / "cache", committed=committed, **said)
+
+
+def committed():
+    """What no smoke run may touch: the figures and the README, with their times."""
+    files = [ROOT / "README.md", *sorted((ROOT / "figures").rglob("*"))]
+    return [(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
+
+
+@pytest.fixture(scope="module")
+def narrow_enhancer():
+    """Simulators that are fitted in this process have an enhancer of 256 units for 3,200.
+
+    What is tested is the path from telemetry to a simulator. The wide network takes far longer, and after each training
+    TensorFlow keeps 130 MB of its weights and moments until the process ends.
+    """
+    from enhsim_tf import enhancer
+
+    plain = enhancer.build_enhancer
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(enhancer, "build_enhancer", functools.partial(plain, hidden_units=256))
+        yield
 
 
 @pytest.fixture

@@ -237,6 +237,7 @@ def test_the_commands_of_the_readme_can_be_asked():
         assert parse(words).command == words[0]
 
 
+@pytest.mark.usefixtures("narrow_enhancer")
 def test_the_python_of_the_readme_does_what_it_says(tmp_path, monkeypatch, capsys):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in readme.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]

@@ -22,6 +22,7 @@ from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.simulator import MODES, Degraded, SquareWave, SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
 
+pytestmark = pytest.mark.usefixtures("narrow_enhancer")
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
 FILES = ["discriminator.keras", "enhancer.keras", "generator.keras", "manifest.json", "settings.json"]
 
@@ -417,7 +418,7 @@ def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batch
     steps = np.repeat(np.random.default_rng(1).normal(0, 4, 60), 50)
     clean = 1_000 + 50 * np.sin(2 * np.pi * 2.0 * np.arange(3_000) / 100)
     telemetry = Telemetry((clean + steps).astype(np.float32), interval_s=2.0)
-    settings = {"num_windows": 300, "epochs": 8, "num_iterations": 0, "window": 60, "verbose": 0, "decay": True, "moving_average": 5}
+    settings = {"num_windows": 300, "epochs": 40, "num_iterations": 0, "window": 60, "verbose": 0, "decay": True, "moving_average": 5}
     settings |= {"noise": "paper", "held_out": 0.25}
     scales = {
         extraction: EnhancedSimulator.fit(telemetry, seed=0, extraction=extraction, **settings).noise.scale * 0.1

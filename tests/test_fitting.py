@@ -17,6 +17,7 @@ from enhsim_tf.injections import INJECTIONS
 from enhsim_tf.simulator import SquareWave, SquareWaveSimulator
 from enhsim_tf.telemetry import Telemetry
 
+pytestmark = pytest.mark.usefixtures("narrow_enhancer")
 TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2, seed=3)
 DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")
 

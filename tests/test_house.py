@@ -1,6 +1,7 @@
 """The walls of the house: floors, quiet imports, documented rooms, owned draws."""
 
 import ast
+import contextlib
 import importlib
 import os
 import re
@@ -158,15 +159,36 @@ def test_every_room_has_its_floor():
     assert len(TREES) >= 15
 
 
-@pytest.mark.parametrize("module", TREES)
-def test_imports_go_down_the_floors(module):
-    rooms = rooms_imported_by(module, TREES[module]) - {room_of(module)}
-    upwards = {room for room in rooms if FLOORS[room] > FLOORS[room_of(module)]}
-    if room_of(module) in ("reproduce", "__main__"):
-        upwards.discard("__init__")  # for its version
-    assert not upwards
-    if room_of(module) != "reproduce":
-        assert "reproduce" not in rooms  # only the wing knows the paper's numbers, and nobody asks the wing
+@contextlib.contextmanager
+def noted(found, where):
+    """The block's failed assertion is noted under its place, so that one test tells of every place at once."""
+    try:
+        yield
+    except AssertionError as error:
+        found.append(f"{where}: {error}")
+
+
+def test_a_failed_assertion_is_noted_with_its_place():
+    found = []
+    for number in range(4):
+        with noted(found, f"number {number}"):
+            assert number % 2 == 0, "odd"
+    assert [line.splitlines()[0] for line in found] == ["number 1: odd", "number 3: odd"]
+
+
+def test_imports_go_down_the_floors():
+    found = []
+    for module, tree in TREES.items():
+        rooms = rooms_imported_by(module, tree) - {room_of(module)}
+        upwards = {room for room in rooms if FLOORS[room] > FLOORS[room_of(module)]}
+        if room_of(module) in ("reproduce", "__main__"):
+            upwards.discard("__init__")  # for its version
+        with noted(found, module):
+            assert not upwards
+        if room_of(module) != "reproduce":
+            with noted(found, module):
+                assert "reproduce" not in rooms  # only the wing knows the paper's numbers, and nobody asks the wing
+    assert not found, "\n".join(found)
 
 
 def test_rooms_of_one_floor_do_not_import_in_a_circle():
@@ -242,9 +264,7 @@ def test_there_is_something_to_check():
     assert parameters_of(DEFINITIONS["simulator.SquareWave"])[:2] == ["period_s", "phase"]
 
 
-@pytest.mark.parametrize("where", DEFINITIONS)
-def test_public_names_are_documented(where):
-    node = DEFINITIONS[where]
+def check_documentation(node):
     text = ast.get_docstring(node)
     assert text, "no docstring"
     assert text.splitlines()[0].rstrip().endswith((".", ":")), "the summary is not a sentence on one line"
@@ -255,9 +275,15 @@ def test_public_names_are_documented(where):
         assert not [name for name in parameters if name not in described], "arguments without a description"
 
 
-@pytest.mark.parametrize("where", DEFINITIONS)
-def test_public_names_have_type_hints(where):
-    node = DEFINITIONS[where]
+def test_public_names_are_documented():
+    found = []
+    for where, node in DEFINITIONS.items():
+        with noted(found, where):
+            check_documentation(node)
+    assert not found, "\n".join(found)
+
+
+def check_type_hints(node):
     functions = [node] if isinstance(node, ast.FunctionDef) else []
     if isinstance(node, ast.ClassDef):
         functions = [inner for inner in node.body if isinstance(inner, ast.FunctionDef) and inner.name in ("__init__", "__call__")]
@@ -266,9 +292,16 @@ def test_public_names_have_type_hints(where):
         assert function.returns is not None or function.name == "__init__"
 
 
-@pytest.mark.parametrize("module", TREES)
-def test_modules_say_what_they_own(module):
-    assert ast.get_docstring(TREES[module])
+def test_public_names_have_type_hints():
+    found = []
+    for where, node in DEFINITIONS.items():
+        with noted(found, where):
+            check_type_hints(node)
+    assert not found, "\n".join(found)
+
+
+def test_modules_say_what_they_own():
+    assert [module for module, tree in TREES.items() if not ast.get_docstring(tree)] == []
 
 
 OWNERS = {"default_rng", "Generator", "SeedSequence", "BitGenerator", "PCG64"}
@@ -300,9 +333,9 @@ def unowned_draws(tree):
     return found
 
 
-@pytest.mark.parametrize("module", TREES)
-def test_every_draw_has_an_owner(module):
-    assert not unowned_draws(TREES[module])
+def test_every_draw_has_an_owner():
+    found = {module: unowned_draws(tree) for module, tree in TREES.items()}
+    assert {module: draws for module, draws in found.items() if draws} == {}
 
 
 @pytest.mark.parametrize(
@@ -324,11 +357,14 @@ def test_draws_without_an_owner_would_be_seen(text):
     assert unowned_draws(ast.parse(text))
 
 
-@pytest.mark.parametrize("module", TREES)
-def test_no_exception_is_caught_blindly(module):
-    for node in ast.walk(TREES[module]):
-        if isinstance(node, ast.ExceptHandler):
-            assert node.type is not None and ast.unparse(node.type) not in ("Exception", "BaseException")
+def test_no_exception_is_caught_blindly():
+    found = []
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ExceptHandler):
+                with noted(found, f"{module}, line {node.lineno}"):
+                    assert node.type is not None and ast.unparse(node.type) not in ("Exception", "BaseException")
+    assert not found, "\n".join(found)
 
 
 def test_every_room_has_its_tests():

@@ -2,7 +2,6 @@
 
 import ast
 import base64
-import concurrent.futures
 import io
 import re
 import shutil
@@ -11,6 +10,7 @@ from pathlib import Path
 import nbformat
 import numpy as np
 import pytest
+from jupyter_client.manager import KernelManager
 from PIL import Image
 
 from enhsim_tf.reproduce import figures, labelled_figures, robustness_figures, teaching
@@ -45,15 +45,14 @@ PACKAGE_NAMES = {node.name for path in (ROOT / "enhsim_tf").rglob("*.py") for no
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
+def cache(smoke_run):
     """One cache for all kernels, with every stage done once."""
-    folder = tmp_path_factory.mktemp("stages")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ENHSIM_TF_CACHE", str(folder))
+        patch.setenv("ENHSIM_TF_CACHE", str(smoke_run.cache))
         experiment = teaching.open_experiment("smoke")
         experiment.verbose = 0
         assert teaching.prepare(experiment) == []
-    return folder
+    return smoke_run.cache
 
 
 def test_no_notebook_is_lost():
@@ -61,15 +60,16 @@ def test_no_notebook_is_lost():
 
 
 @pytest.fixture(scope="module")
-def executed(cache):
-    """From a source to its future notebook: two kernels at a time, since each spends most of its time on imports."""
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        yield {source: pool.submit(build.execute, source, "smoke", cache) for source in SOURCES}
+def kernel():
+    """One for all: each would import for longer than it computes."""
+    kernel = KernelManager(kernel_name="python3")
+    yield kernel
+    kernel.shutdown_kernel(now=True)
 
 
 @each_notebook
-def test_it_runs(source, executed, cache):
-    notebook = executed[source].result()
+def test_it_runs(source, kernel, cache):
+    notebook = build.execute(source, "smoke", cache, kernel)
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     printed = [output for output in outputs if output.output_type == "stream"]
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
@@ -82,6 +82,12 @@ def test_it_runs(source, executed, cache):
     for path in (str(ROOT), str(Path.home()), str(cache), "/tmp/"):
         assert path not in re.sub(r'"image/png": ".*?"', "", words)
     assert notebook.metadata["enhsim_tf"]["budget"] == "smoke"
+
+
+def test_a_notebook_finds_no_name_of_an_earlier_one_in_a_shared_kernel(kernel, tmp_path):
+    for number, code in enumerate(("import math\nearlier = math.pi", "for name in ('earlier', 'math'):\n    assert name not in globals()")):
+        (tmp_path / f"9{number}_x.py").write_text(f"# %%\n{code}\n", encoding="utf-8")
+        build.execute(tmp_path / f"9{number}_x.py", "smoke", tmp_path, kernel)
 
 
 # -- held to their form ------------------------------------------------------------------------------------------------------

@@ -94,6 +94,7 @@ def test_each_variation_is_made_once():
     assert set(SCALED) & set(MIXED) == {"enhanced + GAN", "ours + GAN"}  # whose scale 1 and share 0 are one
 
 
+@pytest.mark.usefixtures("narrow_enhancer")
 def test_surrogates_are_fitted_to_the_very_windows_that_the_networks_learn(tmp_path, monkeypatch):
     learnt, fit = [], NoiseGAN.fit
 

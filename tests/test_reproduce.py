@@ -29,12 +29,6 @@ def _command(*arguments):
     return subprocess.run([*COMMAND, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=600)
 
 
-def _committed():
-    """What no smoke run may touch: the figures and the README, with their times."""
-    files = [ROOT / "README.md", *sorted((ROOT / "figures").rglob("*"))]
-    return [(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
-
-
 def _without_timing(found):
     return [claim for claim in found["claims"] if claim["id"] != "C2"]
 
@@ -44,13 +38,9 @@ def _results(out):
 
 
 @pytest.fixture(scope="module")
-def smoke(tmp_path_factory):
+def smoke(smoke_run):
     """One undisturbed smoke run."""
-    folder, before = tmp_path_factory.mktemp("smoke"), _committed()
-    done = _command("--budget", "smoke", "--out", folder / "out", "--cache", folder / "cache")
-    assert done.returncode == 0, done.stderr
-    touched = before != _committed()
-    return SimpleNamespace(out=folder / "out", cache=folder / "cache", done=done, found=_results(folder / "out"), touched=touched)
+    return SimpleNamespace(**vars(smoke_run), done=smoke_run, found=_results(smoke_run.out))
 
 
 # -- help ------------------------------------------------------------------------------------------------------------------
@@ -125,10 +115,10 @@ def test_progress_bars_are_quiet_where_there_is_no_terminal(smoke):
 @pytest.fixture(scope="module")
 def again(smoke, tmp_path_factory):
     """The same once more, with the arrays and a second seed."""
-    out, before = tmp_path_factory.mktemp("again"), _committed()
+    out, before = tmp_path_factory.mktemp("again"), smoke.committed()
     done = _command("--budget", "smoke", "--out", out, "--cache", smoke.cache, "--arrays", "--spread", 1)
     assert done.returncode == 0, done.stderr
-    assert before == _committed()
+    assert before == smoke.committed()
     return SimpleNamespace(out=out, done=done, found=_results(out))
 
 
@@ -191,14 +181,23 @@ def test_a_table_with_times_keeps_them(tmp_path, kind):
 # -- killed and started again ----------------------------------------------------------------------------------------------
 
 
-def _start_and_kill(arguments, pattern, pause_s):
-    """Starts the command and kills it `pause_s` after it said a line like `pattern`; returns what it said."""
+def _start_and_kill(arguments, pattern, pause_s=0.0, drawn=None):
+    """Starts the command and kills it after it said a line like `pattern`; returns what it said.
+
+    Args:
+        arguments: Of the command.
+        pattern: A regular expression.
+        pause_s: Seconds from that line on.
+        drawn: A folder; it is killed as soon as three figures are there.
+    """
     process = subprocess.Popen([*COMMAND, *arguments], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     said = []
     for text in process.stdout:
         said.append(" ".join(text.split()))
         if re.fullmatch(pattern, said[-1]):
             time.sleep(pause_s)
+            while drawn is not None and len(list(drawn.glob("[!.]*.png"))) < 3 and process.poll() is None:
+                time.sleep(0.002)
             break
     process.send_signal(signal.SIGKILL)
     said += [" ".join(text.split()) for text in process.stdout]
@@ -215,8 +214,10 @@ def test_killed_in_each_stage_it_ends_with_the_same_numbers(smoke, tmp_path):
         for earlier in STAGES[: max(number - 1, 0)]:  # the last one before was killed in its turn and is done anew
             assert any(line.startswith(earlier) and "(from the cache)" in line for line in said), "an earlier stage is found done"
         assert not list(cache.glob(f"{stage}-*")), "no part of the killed stage stands under its name"
-    _start_and_kill(arguments, r"degraded [0-9.]+ s", 0.3)  # while it draws the other figures
-    for image in out.glob("[!.]*.png"):
+    _start_and_kill(arguments, r"degraded [0-9.]+ s", drawn=out)  # while it draws
+    images = list(out.glob("[!.]*.png"))
+    assert images
+    for image in images:
         assert image.read_bytes()[-8:-4] == b"IEND", "every figure is whole"
     assert not (out / "results.json").exists()
 
