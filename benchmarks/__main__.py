@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parse(arguments)
     from benchmarks.figures import draw
     from benchmarks.report import fill_readme, with_words
-    from enhsim_tf.files import write_json
+    from enhsim_tf.common.atomic_files import write_json
 
     if options.redraw:
         kept = json.loads(options.out.read_text())

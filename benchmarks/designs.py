@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.reproduce.__main__ import NOISES as ENVIRONMENTS
-from enhsim_tf.reproduce.report_words import AS_IT_IS, DEVELOPMENT_SEEDS, REAL_NOISE
-from enhsim_tf.reproduce.robustness_report import designs_of
+from enhsim_tf.reproduce.publish.report import designs_of
+from enhsim_tf.reproduce.publish.wording import AS_IT_IS, DEVELOPMENT_SEEDS, REAL_NOISE
 
 if TYPE_CHECKING:
-    from enhsim_tf.backend import keras
-    from enhsim_tf.noise_gan import NoiseGAN
-    from enhsim_tf.reproduce.replicates import Replicate
+    from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.noise.gan import NoiseGAN
+    from enhsim_tf.reproduce.robustness.replicate import Replicate
 
 ROOT = Path(__file__).parents[1]
 LONGER, LEAST_SQUARES, TAILS, MAXIMUM = (
@@ -61,9 +61,9 @@ def untrained(design: str, noise: np.ndarray, num_iterations: int, seed: int) ->
         num_iterations: Those of the frozen design.
         seed: Seed of the weights and of every draw.
     """
-    from enhsim_tf.backend import keras
-    from enhsim_tf.convolutional_noise import convolutional_noise_gan
-    from enhsim_tf.noise_gan import build_discriminator
+    from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+    from enhsim_tf.noise.discriminator import build_discriminator
 
     number = 4 * num_iterations if design == LONGER else num_iterations
     gan = convolutional_noise_gan(noise, number, seed)
@@ -87,7 +87,7 @@ def heavy_tailed(generator: "keras.Model", num_slow: int, weight: float = 0.2) -
         num_slow: Channels that stay normal.
         weight: The h of the distribution: moments of the order 1/h and above are infinite.
     """
-    from enhsim_tf.backend import keras
+    from enhsim_tf.keras_tools.backend import keras
 
     normal = keras.Input(generator.input_shape[1:])
     white, slow = normal[:, :, :-num_slow], normal[:, :, -num_slow:]
@@ -122,9 +122,9 @@ class Bench:
             A row: iterations of training, false alarms and recall of the detectors that train in a second, mean over
             them, trained on telemetry with this noise, and each measure's departure in units of its mean floor.
         """
-        from enhsim_tf import robustness
-        from enhsim_tf.detectors import DETECTORS
-        from enhsim_tf.reproduce.replicates import QUICK_DETECTORS
+        from enhsim_tf.detection import evaluation as robustness
+        from enhsim_tf.detection.detectors import DETECTORS
+        from enhsim_tf.reproduce.robustness.replicate import QUICK_DETECTORS
 
         number, generated, arms = 0, self.held_out, self.telemetry
         if noise != REAL_NOISE:
@@ -144,11 +144,11 @@ class Bench:
 def main(arguments: list[str] | None = None) -> int:
     """Makes the rows that are missing, and writes the file after each."""
     options = parse(arguments)
-    from enhsim_tf.files import replace_file
-    from enhsim_tf.reproduce.replicates import Replicate
+    from enhsim_tf.common.atomic_files import replace_file
+    from enhsim_tf.common.console import tell
+    from enhsim_tf.reproduce.robustness.replicate import Replicate
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache
-    from enhsim_tf.terminal import tell
 
     rows = designs_of(options.out)
     for seed in options.seed or [110]:

@@ -19,6 +19,10 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from enhsim_tf.datasets.plan import Plan
 
 ROWS = {"local, 1 worker": ("local", 1), "local, 2 workers": ("local", 2), "ray, 2 workers": ("ray", 2)}
 PARTS, IDLE = "where the time goes", {"a driver alone, local": ("local", 2), "a driver alone, ray": ("ray", 2)}
@@ -40,11 +44,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def plan_for(options: argparse.Namespace):
+def plan_for(options: argparse.Namespace) -> "Plan":
     """The data set of every row."""
-    from enhsim_tf.fleet_plan import plan_of
-    from enhsim_tf.scenario_file import mix_of
-    from enhsim_tf.simulator import Degraded
+    from enhsim_tf.coarse_simulator.degraded import Degraded
+    from enhsim_tf.datasets.plan import plan_of
+    from enhsim_tf.datasets.scenario_file import mix_of
 
     mix = mix_of([Degraded("stuck", 0.5), Degraded("drift", 0.3)], options.nominal_share)
     mix = dataclasses.replace(mix, shard=min(8_192, max(1, options.windows // 8)))
@@ -53,7 +57,8 @@ def plan_for(options: argparse.Namespace):
 
 def measure_row(options: argparse.Namespace) -> dict:
     """Makes one data set and says what that took."""
-    from enhsim_tf import engines, fleet
+    from enhsim_tf.common.parallel import engines
+    from enhsim_tf.datasets import generate as fleet
 
     engine, workers = ROWS[options.one]
     plan, run, finished, actor_bytes = plan_for(options), engines.run, [], []
@@ -104,7 +109,8 @@ def _largest_actor() -> int:
 
 def measure_parts(options: argparse.Namespace) -> dict:
     """Makes shards in this process, in one thread as a worker does, and says what each part of the work took, a window."""
-    from enhsim_tf import local_engine, shards
+    from enhsim_tf.common.parallel import local as local_engine
+    from enhsim_tf.datasets import shard as shards
 
     local_engine.begin(pickle.dumps(None), threads=1)
 
@@ -151,7 +157,7 @@ def measure_parts(options: argparse.Namespace) -> dict:
 
 def _matrix_product() -> tuple[float, float]:
     """Seconds and operations of the best of some matrix products of the enhancer's size, in this process' one thread."""
-    from enhsim_tf.backend import tf
+    from enhsim_tf.keras_tools.backend import tf
 
     first, second = (tf.random.stateless_uniform(shape, (1, 2)) for shape in ((1_024, 3_200), (3_200, 3_200)))
     product, times = tf.function(tf.matmul), []
@@ -164,7 +170,7 @@ def _matrix_product() -> tuple[float, float]:
 
 def measure_idle(options: argparse.Namespace) -> dict:
     """How many numbers a second an engine hands out and gets back."""
-    from enhsim_tf import engines
+    from enhsim_tf.common.parallel import engines
 
     engine, workers = IDLE[options.one]
     times = [time.perf_counter() for _ in engines.run(engine, operator.index, range(_NUM_IDLE), workers)]  # no work at all
@@ -188,7 +194,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(json.dumps(measure(options)))
         return 0
     from benchmarks.__main__ import machine
-    from enhsim_tf.files import write_json
+    from enhsim_tf.common.atomic_files import write_json
 
     has_ray = importlib.util.find_spec("ray") is not None
     names = [name for name in ROWS if "ray" not in name or has_ray]

@@ -8,10 +8,13 @@ import numpy as np
 
 from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
-from enhsim_tf.backend import keras, tf
-from enhsim_tf.convolutional_noise import convolutional_noise_gan
-from enhsim_tf.enhancer import build_enhancer, fit_windows
-from enhsim_tf.noise_gan import NoiseGAN, build_discriminator, build_generator
+from enhsim_tf.enhancer.network import build_enhancer
+from enhsim_tf.keras_tools.backend import keras, tf
+from enhsim_tf.keras_tools.training import fit_windows
+from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.gan import NoiseGAN
+from enhsim_tf.noise.generator import build_generator
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from benchmarks.rows import bar_of_reproduction, reproduction
-from enhsim_tf.files import replace_file
-from enhsim_tf.reproduce.report import fill_parts
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.reproduce.publish.results import fill_parts
 
 
 def line_of(row: dict) -> str:

@@ -12,10 +12,10 @@ import matplotlib.figure
 import numpy as np
 
 from benchmarks.fleet import PARTS, ROWS
-from enhsim_tf.files import replace_file
-from enhsim_tf.reproduce.figures import Figure, save
-from enhsim_tf.reproduce.report import fill_parts
-from enhsim_tf.sheet import BLUE_TINT, DOUBLE, ENHANCED, GENERATED, LINE, QUIET, REAL, new_sheet, panels
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.plot_style import BLUE_TINT, DOUBLE, ENHANCED, GENERATED, LINE, QUIET, REAL, new_sheet, panels
+from enhsim_tf.reproduce.figure import Figure, save
+from enhsim_tf.reproduce.publish.results import fill_parts
 
 ROOT = Path(__file__).parents[1]
 ONE, TWO, RAY = ROWS

@@ -1,43 +1,43 @@
 """ML-enhanced simulation: realistic telemetry from a coarse simulator (Feldman 2020, arXiv 2008.12082).
 
-The public names below are imported on first use, so `import enhsim_tf` costs milliseconds and only the rooms
-that hold a network pay for TensorFlow.
+The public names below are imported on first use, so `import enhsim_tf` takes milliseconds and only
+modules that hold a network import TensorFlow.
 """
 
 import importlib
 
 __version__ = "0.1.0"
 
-_ROOMS = {
-    "Cleaned": "cleaning",
-    "Cleaning": "cleaning",
-    "Degraded": "simulator",
-    "EnhancedSimulator": "enhanced_simulator",
-    "FitOptions": "fit_options",
-    "InputError": "errors",
-    "NoiseGAN": "noise_gan",
-    "ParquetStore": "store",
-    "ScoreOptions": "scoring",
-    "SquareWave": "simulator",
-    "SquareWaveSimulator": "simulator",
-    "Telemetry": "telemetry",
-    "TrustedRange": "trusted_range",
-    "build_enhancer": "enhancer",
-    "clean": "cleaning",
-    "extract_noise": "noise",
-    "fit_channel": "fitting",
-    "from_series": "sources",
-    "load_labelled": "labelled",
-    "read_source": "sources",
-    "read_telemetry": "telemetry",
-    "score_channel": "scoring",
-    "series_labelled": "training_sets",
-    "to_series": "sources",
+_PLACES = {
+    "Cleaned": "telemetry.cleaning.clean",
+    "Cleaning": "telemetry.cleaning.clean",
+    "Degraded": "coarse_simulator.degraded",
+    "EnhancedSimulator": "enhanced_simulator.simulator",
+    "FitOptions": "enhanced_simulator.fit_options",
+    "InputError": "common.errors",
+    "NoiseGAN": "noise.gan",
+    "ParquetStore": "telemetry.parquet_store",
+    "ScoreOptions": "enhanced_simulator.scoring",
+    "SquareWave": "coarse_simulator.square_waves",
+    "SquareWaveSimulator": "coarse_simulator.square_waves",
+    "Telemetry": "telemetry.series",
+    "TrustedRange": "enhanced_simulator.trusted_range",
+    "build_enhancer": "enhancer.network",
+    "clean": "telemetry.cleaning.clean",
+    "extract_noise": "noise.extraction",
+    "fit_channel": "enhanced_simulator.fitting",
+    "from_series": "telemetry.sources",
+    "load_labelled": "telemetry.telemanom",
+    "read_source": "telemetry.sources",
+    "read_telemetry": "telemetry.single_file",
+    "score_channel": "enhanced_simulator.scoring",
+    "series_labelled": "datasets.labelled_windows",
+    "to_series": "telemetry.sources",
 }
-__all__ = list(_ROOMS)
+__all__ = list(_PLACES)
 
 
 def __getattr__(name: str):
-    if name in _ROOMS:
-        return getattr(importlib.import_module(f"enhsim_tf.{_ROOMS[name]}"), name)
+    if name in _PLACES:
+        return getattr(importlib.import_module(f"enhsim_tf.{_PLACES[name]}"), name)
     raise AttributeError(f"module 'enhsim_tf' has no attribute {name!r}")

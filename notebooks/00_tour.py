@@ -14,8 +14,8 @@ import sys
 
 sys.path.insert(0, "..")  # the clone that this notebook lies in
 
-from enhsim_tf.reproduce.teaching import drawing, open_experiment, show, verdict
-from enhsim_tf.sheet import COARSE, GENERATED
+from enhsim_tf.common.plot_style import COARSE, GENERATED
+from enhsim_tf.reproduce.notebook import drawing, open_experiment, show, verdict
 
 experiment = open_experiment()
 
@@ -223,15 +223,15 @@ assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 # %% [markdown]
 # ## Exercises
 #
-# 1. Make one window for each degraded mode of the simulator (`enhsim_tf.simulator.MODES`) and plot it over what the coarse simulator
-#    said. Which would you believe?
+# 1. Make one window for each degraded mode of the simulator (`enhsim_tf.coarse_simulator.degraded.MODES`) and plot it over what
+#    the coarse simulator said. Which would you believe?
 # 2. You must deliver training data for a detector tomorrow. Which arm of the bar chart do you take, and what would you check first?
 
 # %% [markdown] jp-MarkdownHeadingCollapsed=true
 # ## Solution
 
 # %%
-from enhsim_tf.simulator import MODES
+from enhsim_tf.coarse_simulator.degraded import MODES
 
 alt = "One window for each degraded mode: what the coarse simulator says, and what is generated from it"
 with drawing(alt, len(MODES), 1.5, sharey=True) as panels:

@@ -9,8 +9,8 @@ import sys
 
 sys.path.insert(0, "..")  # the clone that this notebook lies in
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
-from enhsim_tf.sheet import GENERATED, REAL
+from enhsim_tf.common.plot_style import GENERATED, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment()
 claim("C2", "C7")

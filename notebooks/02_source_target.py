@@ -12,7 +12,7 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, open_experiment, show
+from enhsim_tf.reproduce.notebook import claim, open_experiment, show
 
 experiment = open_experiment()
 claim("C1")
@@ -24,7 +24,7 @@ claim("C1")
 
 # %%
 from enhsim_tf import SquareWave, SquareWaveSimulator
-from enhsim_tf.signals import sines
+from enhsim_tf.reproduce.paper.signals import sines
 
 orbit = SquareWave(period_s=480, low=-0.5, high=0.5)
 rotation = SquareWave(period_s=120, low=-0.25, high=0.25)
@@ -45,7 +45,7 @@ pairs = show(experiment, "fig02_source_target")
 # between by an amount that can be computed.
 
 # %%
-from enhsim_tf.fidelity import nrmse
+from enhsim_tf.realism.measures import nrmse
 
 for wave in simulator.waves:
     between = time_s % (wave.period_s / 2) != 0  # at a crossing itself the sine has no sign
@@ -59,7 +59,7 @@ assert abs(error - closed_form) < 0.01
 # is a multiple of the shorter, so the simulator repeats itself after 480 samples:
 
 # %%
-from enhsim_tf.telemetry import cut_windows
+from enhsim_tf.telemetry.windows import cut_windows
 
 windows = cut_windows(simulator(np.arange(20_000.0)), np.arange(19_000), 500)
 distinct = len(np.unique(windows, axis=0))

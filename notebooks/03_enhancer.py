@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, open_experiment, show
-from enhsim_tf.sheet import COARSE, ENHANCED, REAL
+from enhsim_tf.common.plot_style import COARSE, ENHANCED, REAL
+from enhsim_tf.reproduce.notebook import claim, open_experiment, show
 
 experiment = open_experiment()
 claim("C1")
@@ -46,7 +46,7 @@ assert 0.74 < max(by_hand) / sum(by_hand) < 0.76
 # dotted line: no network can get below the variance of the noise on windows it has not seen.
 
 # %%
-from enhsim_tf.reproduce.teaching import drawing
+from enhsim_tf.reproduce.notebook import drawing
 
 history, floor = experiment.enhancer_history, experiment.settings.telemetry.noise_sd**2
 alt = "Training and held-out loss of the enhancer by epoch, above the variance of the noise"
@@ -84,8 +84,8 @@ for window in (500, 1_000, 2_000):
     print(f"{window:5} samples: {model.count_params():12,} parameters, {between:,} between the hidden layers")
 
 # %%
-from enhsim_tf.enhancer import fit_windows
-from enhsim_tf.fidelity import nrmse
+from enhsim_tf.keras_tools.training import fit_windows
+from enhsim_tf.realism.measures import nrmse
 
 train, test = (experiment.data.windows(part, 150, f"exercise, {part}") for part in ("train", "test"))
 shuffled = np.random.default_rng(0).permutation(500)

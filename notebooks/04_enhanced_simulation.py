@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show, verdict
-from enhsim_tf.sheet import COARSE, ENHANCED, REAL
+from enhsim_tf.common.plot_style import COARSE, ENHANCED, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment()
 claim("C1", "C2", "C3")
@@ -24,7 +24,7 @@ claim("C1", "C2", "C3")
 # example like this one knows.
 
 # %%
-from enhsim_tf.fidelity import nrmse, roughness
+from enhsim_tf.realism.measures import nrmse, roughness
 
 held_out = experiment.data.windows("test", None)
 enhanced = experiment.simulator.enhance(held_out["coarse"])

@@ -12,7 +12,7 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, open_experiment, show, verdict
+from enhsim_tf.reproduce.notebook import claim, open_experiment, show, verdict
 
 experiment = open_experiment()
 claim("C6", "C7")
@@ -86,7 +86,7 @@ series = show(experiment, "fig07_real_or_generated_series")
 # *What to see:* no stretch has seams, and all keep the rhythm of the satellite for as long as you look.
 
 # %%
-from enhsim_tf.fidelity import autocorrelation
+from enhsim_tf.realism.measures import autocorrelation
 
 rhythm = [autocorrelation(row[None], 480)[480] for row in series["rows"]]
 print("correlation of each stretch with itself one orbit later:", np.round(rhythm, 2))
@@ -97,7 +97,7 @@ assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[experiment.settings.budget]
 # itself every half window, however long the series is:
 
 # %%
-from enhsim_tf.noise import extract_noise
+from enhsim_tf.noise.extraction import extract_noise
 
 repeats = []
 for row, is_generated in zip(series["rows"], series["is_generated"]):
@@ -121,7 +121,7 @@ assert np.min(np.array(repeats)[is_generated]) > least > np.max(np.array(repeats
 # %%
 from sklearn.metrics import roc_auc_score
 
-from enhsim_tf.two_sample import window_features
+from enhsim_tf.realism.window_features import window_features
 
 real = experiment.data.noise_windows("test", None)
 generated = experiment.simulator.noise.generate(len(real), seed=1)

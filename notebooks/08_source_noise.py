@@ -12,8 +12,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
-from enhsim_tf.sheet import AVERAGE, COARSE, REAL
+from enhsim_tf.common.plot_style import AVERAGE, COARSE, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment()
 claim("C6")
@@ -58,7 +58,7 @@ assert abs(noise.std() / expected - 1) < 0.01
 # each other; the closed form below holds for lags up to half the width.
 
 # %%
-from enhsim_tf.fidelity import autocorrelation
+from enhsim_tf.realism.measures import autocorrelation
 
 lags = np.arange(1, 40)
 near, far = (width - lags) / width**2 - 2 / width, np.clip(width - lags, 0, None) / width**2

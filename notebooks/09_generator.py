@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
-from enhsim_tf.sheet import AVERAGE, GENERATED, REAL
+from enhsim_tf.common.plot_style import AVERAGE, GENERATED, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment()
 claim("C6")
@@ -21,7 +21,7 @@ claim("C6")
 # ## How it is built
 
 # %%
-from enhsim_tf.noise_gan import build_generator
+from enhsim_tf.noise.generator import build_generator
 
 untrained = build_generator(window=500, latent=16, hidden_units=64, activation="tanh", seed=0)
 layers = show(experiment, "fig09_generator")
@@ -88,7 +88,7 @@ assert beyond["generated, before tanh"] < 1e-9 and beyond["real noise"] > 0.5
 # %%
 import keras
 
-from enhsim_tf.fidelity import effective_rank
+from enhsim_tf.realism.measures import effective_rank
 
 linear = keras.Sequential([keras.Input((16,)), keras.layers.Dense(64), keras.layers.Dense(500)])
 print("rank without relu and tanh:", np.linalg.matrix_rank(linear.predict(latent, verbose=0), tol=1e-2))

@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
-from enhsim_tf.sheet import COARSE, ENHANCED
+from enhsim_tf.common.plot_style import COARSE, ENHANCED
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment()
 claim("C5")
@@ -23,7 +23,7 @@ claim("C5")
 # The paper gives no number of filters; 500 is the author's, in the public code of his 1-D GAN.
 
 # %%
-from enhsim_tf.noise_gan import build_discriminator
+from enhsim_tf.noise.discriminator import build_discriminator
 
 untrained = build_discriminator(window=500, filters=500, width=20, stride=4, narrow_units=25, seed=0)
 layers = show(experiment, "fig10_discriminator")
@@ -88,7 +88,7 @@ assert moved["blocks of 100 reordered"] < moved["samples reordered"] / 1.5
 # %%
 import tensorflow as tf
 
-from enhsim_tf.convolution_maximum import convolution_maximum
+from enhsim_tf.keras_tools.convolution_maximum import convolution_maximum
 
 convolution, pooling = untrained.layers[:2]
 rows = tf.constant(rng.standard_normal((8, 500)), tf.float32)

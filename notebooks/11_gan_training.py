@@ -12,8 +12,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
-from enhsim_tf.sheet import COARSE, GENERATED
+from enhsim_tf.common.plot_style import COARSE, GENERATED
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment()
 claim("C4", "C5")
@@ -47,7 +47,8 @@ print(inspect.getsource(NoiseGAN.train_step))
 # To watch the phases one by one, take a small pair of networks and set one of the two learning rates to zero:
 
 # %%
-from enhsim_tf.noise_gan import build_discriminator, build_generator
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.generator import build_generator
 
 noise = experiment.data.noise_windows("train", 500, "notebook")[:, :100]
 rows = noise[:, :, None].astype("float32")

@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show, verdict
-from enhsim_tf.sheet import COARSE, GENERATED
+from enhsim_tf.common.plot_style import COARSE, GENERATED
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment()
 claim("C4", "C5")
@@ -115,7 +115,8 @@ assert records[1]["verdict"] in ("reproduced", "partly")
 
 # %%
 from enhsim_tf import NoiseGAN
-from enhsim_tf.noise_gan import build_discriminator, build_generator
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.generator import build_generator
 
 # %%
 noise, sizes = experiment.data.noise_windows("train", 500, "notebook")[:, :100], []

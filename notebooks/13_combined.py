@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show, verdict
-from enhsim_tf.sheet import COARSE, GENERATED, REAL
+from enhsim_tf.common.plot_style import COARSE, GENERATED, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment()
 claim("C7")
@@ -34,7 +34,7 @@ arrays = show(experiment, "fig13_combined")
 # how restless they are. Several windows laid over each other would tell: the noise of all holds one pattern (notebook 05).
 
 # %%
-from enhsim_tf.fidelity import marginal_distance, roughness, scale_difference
+from enhsim_tf.realism.measures import marginal_distance, roughness, scale_difference
 
 real = held_out["target"]
 size, restless = scale_difference(combined, real), roughness(combined) / roughness(real)
@@ -73,8 +73,8 @@ print(f"standard deviation before the onset {before:.2f}, after it {after:.2f}")
 # %% [markdown]
 # ## Exercises
 #
-# 1. Replace network two by Gaussian noise of the same standard deviation (`enhsim_tf.noise.GaussianNoise`). By which of the numbers
-#    above does it do worse?
+# 1. Replace network two by Gaussian noise of the same standard deviation (`enhsim_tf.noise.surrogates.GaussianNoise`). By which
+#    of the numbers above does it do worse?
 # 2. Compare the correlation of the *difference* between combined and clean with that of real noise, at lags 1 to 24. Who is closer, the
 #    GAN or the Gaussian?
 
@@ -82,8 +82,8 @@ print(f"standard deviation before the onset {before:.2f}, after it {after:.2f}")
 # ## Solution
 
 # %%
-from enhsim_tf.fidelity import autocorrelation, effective_rank
-from enhsim_tf.noise import GaussianNoise
+from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.realism.measures import autocorrelation, effective_rank
 
 noise = experiment.data.noise_windows("train", None)[: len(clean)]
 plain = GaussianNoise.fit(noise).generate(len(clean), seed=2)

@@ -13,8 +13,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show
-from enhsim_tf.sheet import GENERATED, REAL
+from enhsim_tf.common.plot_style import GENERATED, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment()
 claim("C5")
@@ -40,7 +40,8 @@ _ = show(experiment, "fig11_gan_training")
 # A small pair of networks and the real noise, so that sixty iterations take seconds.
 
 # %%
-from enhsim_tf.noise_gan import build_discriminator, build_generator
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.generator import build_generator
 
 real_noise = experiment.data.noise_windows("train", 1_000, "notebook")[:, :100, None]
 discriminator, generator = build_discriminator(100, filters=32, seed=0), build_generator(100, seed=0)

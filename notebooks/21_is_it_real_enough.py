@@ -12,9 +12,9 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf import fidelity
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, show, verdict
-from enhsim_tf.sheet import COARSE, GENERATED, QUIET, REAL
+from enhsim_tf.common.plot_style import COARSE, GENERATED, QUIET, REAL
+from enhsim_tf.realism import measures as fidelity
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment()
 claim("C6", "C8")
@@ -24,7 +24,7 @@ claim("C6", "C8")
 # the standard deviation of the training noise.
 
 # %%
-from enhsim_tf.noise import GaussianNoise
+from enhsim_tf.noise.surrogates import GaussianNoise
 
 is_full = experiment.settings.budget == "full"  # a smoke run makes noise of the wrong size
 real = experiment.data.noise_windows("test", None)
@@ -137,7 +137,7 @@ assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 # directions that the components do not know.
 
 # %%
-from enhsim_tf.detectors import PCAResidual
+from enhsim_tf.detection.detectors import PCAResidual
 
 chosen, simulator = experiment.settings.detectors, experiment.simulator
 healthy = experiment.data.windows("test", None)["target"]

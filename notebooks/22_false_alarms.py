@@ -12,9 +12,9 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf import detection
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, open_findings, show_finding
-from enhsim_tf.sheet import COARSE, GENERATED, QUIET, REAL
+from enhsim_tf.common.plot_style import COARSE, GENERATED, QUIET, REAL
+from enhsim_tf.detection import metrics as detection
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, open_findings, show_finding
 
 experiment = open_experiment()
 claim("C8")
@@ -27,7 +27,7 @@ claim("C8")
 # has no real telemetry to train on has none to set a threshold with.
 
 # %%
-from enhsim_tf.detectors import PCAResidual
+from enhsim_tf.detection.detectors import PCAResidual
 
 chosen, simulator = experiment.settings.detectors, experiment.simulator
 coarse = experiment.data.windows("train", 2 * chosen.num_windows, "notebook 22")["coarse"]
@@ -74,7 +74,7 @@ assert rate["clean"] > 0.9 and rate["real"] < 0.1
 # is left.
 
 # %%
-from enhsim_tf.reproduce.replicates import ARMS
+from enhsim_tf.reproduce.robustness.replicate import ARMS
 
 found, tables = open_findings()
 for arm, about in ARMS.items():

@@ -12,8 +12,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import claim, drawing, open_experiment, open_findings, show_finding
-from enhsim_tf.sheet import COARSE, ENHANCED, GENERATED, REAL
+from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED, REAL
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, open_findings, show_finding
 
 experiment = open_experiment()
 claim("C9")
@@ -59,8 +59,8 @@ if experiment.settings.budget == "full":
 # the training windows leave of it, and how far it is from the nearest of them.
 
 # %%
-from enhsim_tf import detection
-from enhsim_tf.out_of_range import OutOfRange
+from enhsim_tf.detection import metrics as detection
+from enhsim_tf.enhancer.out_of_range import OutOfRange
 
 learnt = experiment.data.windows("train", experiment.settings.telemetry.num_windows, "training windows")[
     "coarse"

@@ -11,8 +11,8 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 
 import numpy as np
 
-from enhsim_tf.reproduce.teaching import drawing, open_experiment, open_labelled, show_finding
-from enhsim_tf.sheet import ENHANCED, GENERATED
+from enhsim_tf.common.plot_style import ENHANCED, GENERATED
+from enhsim_tf.reproduce.notebook import drawing, open_experiment, open_labelled, show_finding
 
 experiment = open_experiment()
 

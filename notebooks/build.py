@@ -15,7 +15,7 @@ import nbclient
 import nbformat
 from jupyter_client.manager import KernelManager
 
-from enhsim_tf.files import make_folder, replace_file, sha256
+from enhsim_tf.common.atomic_files import make_folder, replace_file, sha256
 
 FOLDER = Path(__file__).parent
 STAMP = "enhsim_tf"  # the notebook's metadata that hold its stamp
@@ -148,7 +148,7 @@ def build(budget: str, only: str | None) -> int:
             file=sys.stderr,
         )
         return 2
-    from enhsim_tf.reproduce.teaching import open_experiment, prepare
+    from enhsim_tf.reproduce.notebook import open_experiment, prepare
 
     prepare(open_experiment(budget))  # so that no progress bar of a training stays in a notebook
     folder = FOLDER if budget == "full" else make_folder(FOLDER.parent / "smoke")

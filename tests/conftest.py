@@ -22,8 +22,8 @@ os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports Te
 for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(threads, "1")  # two processes test at a time; threads that wait for each other burn as much as those that work
 
-from enhsim_tf.errors import InputError  # noqa: E402
-from enhsim_tf.tensorflow_settings import apply_settings  # noqa: E402
+from enhsim_tf.common.errors import InputError  # noqa: E402
+from enhsim_tf.keras_tools.tensorflow_settings import apply_settings  # noqa: E402
 
 apply_settings()  # a test that imports Keras itself computes as the package does
 
@@ -77,7 +77,7 @@ def narrow_enhancer():
     What is tested is the path from telemetry to a simulator. The wide network takes far longer, and after each training
     TensorFlow keeps 130 MB of its weights and moments until the process ends.
     """
-    from enhsim_tf import enhancer
+    from enhsim_tf.enhancer import network as enhancer
 
     plain = enhancer.build_enhancer
     with pytest.MonkeyPatch.context() as patch:

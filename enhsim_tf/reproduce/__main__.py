@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from enhsim_tf.terminal import Parser, finish, tell
+from enhsim_tf.common.console import Parser, finish, tell
 
 EXAMPLES = """\
 examples:
@@ -81,15 +81,16 @@ def run(options: argparse.Namespace) -> int:
     folder = make_folders(options)
     if options.experiment:
         return run_labelled(options, folder) if options.experiment == "labelled" else run_experiment(options, folder)
-    from enhsim_tf.files import write_json
+    from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import caption_of
-    from enhsim_tf.reproduce.claims import CLAIMS, changed, judge, ranges
-    from enhsim_tf.reproduce.data import Source
-    from enhsim_tf.reproduce.experiments import Experiment
-    from enhsim_tf.reproduce.figure_data import FIGURE_DATA, WITHOUT_TRAINING
-    from enhsim_tf.reproduce.figures import save
-    from enhsim_tf.reproduce.page import write_page
-    from enhsim_tf.reproduce.report import fill_readme, results, table
+    from enhsim_tf.reproduce.figure import save
+    from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge, ranges
+    from enhsim_tf.reproduce.paper.data import Source
+    from enhsim_tf.reproduce.paper.figure_data import FIGURE_DATA, WITHOUT_TRAINING
+    from enhsim_tf.reproduce.paper.figures import FIGURES
+    from enhsim_tf.reproduce.paper.pipeline import Experiment
+    from enhsim_tf.reproduce.publish.page import write_page
+    from enhsim_tf.reproduce.publish.results import fill_readme, results, table
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
 
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         given = make_settings(options.budget, seed), stages, source, int(is_terminal)
         if options.store == "parquet":
             return Experiment(*given)
-        from enhsim_tf.reproduce.influx_experiment import InfluxExperiment
+        from enhsim_tf.reproduce.paper.influx_pipeline import InfluxExperiment
 
         return InfluxExperiment(location_of(options.store), *given)
 
@@ -113,7 +114,7 @@ def run(options: argparse.Namespace) -> int:
         for name in names:
             data = FIGURE_DATA[name](experiment)  # does the stages it needs, which say their own time
             drawing = time.perf_counter()
-            save(name, data, folder, caption_of(name, experiment), is_smoke)
+            save(name, data, folder, caption_of(name, experiment), is_smoke, figures=FIGURES)
             drawn_s += time.perf_counter() - drawing
             if options.arrays:
                 save_arrays(folder, data, name)
@@ -155,8 +156,8 @@ def run(options: argparse.Namespace) -> int:
 
 def run_experiment(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on robustness, below the figures' folder, and returns the exit code."""
-    from enhsim_tf.reproduce.robustness_report import report, verdict_lines
-    from enhsim_tf.reproduce.robustness_run import FOLDER, run
+    from enhsim_tf.reproduce.publish.report import report, verdict_lines
+    from enhsim_tf.reproduce.robustness.run import FOLDER, run
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import default_cache
 
@@ -174,9 +175,9 @@ def run_experiment(options: argparse.Namespace, folder: Path) -> int:
 
 def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     """Runs the study of real telemetry, below the figures' folder, and returns the exit code."""
-    from enhsim_tf.reproduce.labelled_run import FOLDER, lines, run
-    from enhsim_tf.reproduce.robustness_report import findings_of, report
+    from enhsim_tf.reproduce.publish.report import findings_of, report
     from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.spacecraft.run import FOLDER, lines, run
     from enhsim_tf.reproduce.stages import default_cache
 
     out = folder / FOLDER
@@ -193,7 +194,7 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
 
 def check(options: argparse.Namespace) -> None:
     """Refuses what cannot be used before anything is made; needs no TensorFlow."""
-    from enhsim_tf.errors import InputError
+    from enhsim_tf.common.errors import InputError
 
     if not 0 <= options.seed < 2**32 - max(options.spread, 0):
         raise InputError(f"Expected a seed from 0 to before 2**32, with the further ones. Received: --seed {options.seed}.")
@@ -206,7 +207,7 @@ def check(options: argparse.Namespace) -> None:
     if (options.experiment == "labelled") != (options.data is not None) or (options.channels and options.data is None):
         raise InputError("Expected --experiment labelled and --data DIR together, and --channels only with them. Received: one alone.")
     if options.data is not None:
-        from enhsim_tf.labelled import read_labels
+        from enhsim_tf.telemetry.telemanom import read_labels
 
         read_labels(options.data)
     if options.experiment and (options.only or options.telemetry or options.spread or options.seed or options.arrays):
@@ -223,20 +224,20 @@ def check(options: argparse.Namespace) -> None:
     if options.budget == "smoke" and out_folder(options).resolve() == Path("figures").resolve():
         raise InputError("Expected another --out for a smoke run: figures/ holds full budget. Received: --out figures.")
     if options.store != "parquet":
-        from enhsim_tf.influx_store import InfluxStore
+        from enhsim_tf.telemetry.influx_store import InfluxStore
 
         InfluxStore(location_of(options.store)).check()
     if options.telemetry is not None:
-        from enhsim_tf.reproduce.data import least_part
+        from enhsim_tf.reproduce.paper.data import least_part
         from enhsim_tf.reproduce.settings import Settings
-        from enhsim_tf.telemetry import read_telemetry
+        from enhsim_tf.telemetry.single_file import read_telemetry
 
         read_telemetry(options.telemetry, options.column, options.time, 2 * least_part(Settings()))
 
 
 def location_of(place: str) -> str:
     """Where in InfluxDB `--store` puts the telemetry."""
-    from enhsim_tf.errors import InputError
+    from enhsim_tf.common.errors import InputError
     from enhsim_tf.reproduce.settings import LOCATION
 
     if place != "influxdb" and not place.startswith("influxdb://"):
@@ -246,7 +247,7 @@ def location_of(place: str) -> str:
 
 def chosen_figures(only: str | None) -> list[str]:
     """Names of the figures to draw: all, or the one that is named by its number or in full."""
-    from enhsim_tf.errors import InputError
+    from enhsim_tf.common.errors import InputError
     from enhsim_tf.reproduce.settings import FIGURES
 
     chosen = [name for name in FIGURES if only is None or only in (name, name.split("_")[0])]
@@ -275,8 +276,8 @@ def is_other(options: argparse.Namespace) -> bool:
     """Whether an experiment is not the one that the project shows: fewer seeds, one environment, other channels."""
     if options.experiment != "labelled":
         return options.seeds is not None or options.environment is not None
-    from enhsim_tf.labelled import read_labels
-    from enhsim_tf.reproduce.robustness_report import findings_of
+    from enhsim_tf.reproduce.publish.report import findings_of
+    from enhsim_tf.telemetry.telemanom import read_labels
 
     shown = findings_of(Path(), "labelled")
     return bool(options.channels) or (shown is not None and set(read_labels(options.data)) != {*shown["channels"], *shown["skipped"]})
@@ -284,7 +285,7 @@ def is_other(options: argparse.Namespace) -> bool:
 
 def make_folders(options: argparse.Namespace) -> Path:
     """Makes the folders that the options name, before anything slow is imported; returns the one that figures go to."""
-    from enhsim_tf.files import make_folder, remove_leftovers
+    from enhsim_tf.common.atomic_files import make_folder, remove_leftovers
 
     out = make_folder(out_folder(options))
     remove_leftovers(out)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from enhsim_tf.reproduce.settings import LOCATION
 
 if TYPE_CHECKING:
-    from enhsim_tf.reproduce.experiments import Experiment
+    from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def caption_of(name: str, experiment: "Experiment") -> str:

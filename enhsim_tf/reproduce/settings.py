@@ -8,7 +8,7 @@ the paper is a field that can be turned. A smoke budget changes counts only: the
 import dataclasses
 from typing import Any
 
-from enhsim_tf.errors import InputError
+from enhsim_tf.common.errors import InputError
 
 OURS = "ours"
 BUDGETS = ("smoke", "full")

@@ -1,7 +1,7 @@
 """Stages that are done once: each is kept under the hash of what it depends on and found again by the next run.
 
 A stage is a function that fills a folder. The folder appears whole, under a name that holds the hash of the stage's
-settings, of its code with all rooms below it, of the stages before it, and of the versions it ran on. A killed run
+settings, of its code with all modules that it imports, of the stages before it, and of the versions it ran on. A killed run
 therefore leaves only whole stages, and the next one goes on behind the last of them and clears away what was half done.
 The checksums of its files stand in `stage.json`: a stage that was damaged since is told and done again.
 """
@@ -12,6 +12,7 @@ import importlib.metadata
 import inspect
 import json
 import os
+import textwrap
 import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -19,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.files import make_folder, remove_leftovers, replace_file, replace_folder, sha256, write_json
-from enhsim_tf.terminal import SILENT, Progress, time_left
+from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace_file, replace_folder, sha256, write_json
+from enhsim_tf.common.console import SILENT, Progress, time_left
 
 _PACKAGE = Path(__file__).parents[1]
 VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
@@ -57,7 +58,7 @@ class Stages:
         self,
         name: str,
         make: Callable[[Path], None],
-        rooms: Iterable[str],
+        modules: Iterable[str],
         settings: Any,
         after: Iterable[str] = (),
         helpers: Iterable[Callable] = (),
@@ -67,16 +68,16 @@ class Stages:
         Args:
             name: Name of the stage.
             make: Fills the folder it is given.
-            rooms: Modules of the package that `make` works with.
+            modules: Modules of the package that `make` works with.
             settings: What else the result depends on, anything with a faithful `repr`.
             after: Names of the stages whose results `make` reads.
-            helpers: Functions that `make` calls and that are in none of the rooms.
+            helpers: Functions that `make` calls and that are in none of those modules.
 
         Returns:
             The folder with the stage's results.
         """
-        sources = [inspect.getsource(function) for function in (make, *helpers)]
-        depends = [name, repr(settings), _code(rooms), *sources, VERSIONS, [self._keys[before] for before in after]]
+        sources = [what_runs(inspect.getsource(function)) for function in (make, *helpers)]
+        depends = [name, repr(settings), _code(modules), *sources, VERSIONS, [self._keys[before] for before in after]]
         key = self._keys[name] = hashlib.sha256(json.dumps(depends).encode()).hexdigest()[:16]
         folder = self.cache / f"{name}-{key}"
         done, damage = (None, None) if self.fresh or not os.path.lexists(folder) else _read(folder, name)
@@ -191,15 +192,36 @@ def load_arrays(folder: Path, name: str = "arrays") -> dict[str, np.ndarray]:
         return dict(archive)
 
 
-def _code(rooms: Iterable[str]) -> str:
-    """Hash of the sources of `rooms` and of every room they import, directly or not."""
-    waiting, seen = list(rooms), {}
+def _code(modules: Iterable[str]) -> str:
+    """Hash of the code of `modules` and of every module they import, directly or not."""
+    waiting, seen = list(modules), {}
     while waiting:
-        room = waiting.pop()
-        if room not in seen and room != "reproduce.settings":  # a stage depends on their values, not on how they are worded
-            seen[room] = source = (_PACKAGE / f"{room.replace('.', '/')}.py").read_text(encoding="utf-8")
+        module = waiting.pop()
+        if module not in seen and module != "reproduce.settings":  # a stage depends on their values, not on how they are worded
+            source = _file_of(module).read_text(encoding="utf-8")
+            seen[module] = what_runs(source)
             waiting += imports_of(source)
-    return hashlib.sha256("".join(f"{room}\n{seen[room]}" for room in sorted(seen)).encode()).hexdigest()
+    return hashlib.sha256("".join(f"{module}\n{seen[module]}" for module in sorted(seen)).encode()).hexdigest()
+
+
+def _file_of(module: str) -> Path:
+    path = _PACKAGE / module.replace(".", "/")
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def what_runs(source: str) -> str:
+    """A source as its syntax tree in text, without comments and docstrings: what is said about code changes no result."""
+    try:
+        tree = ast.parse(textwrap.dedent(source))
+    except SyntaxError:  # of a lambda, Python knows the lines around it alone
+        return source
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+            and ast.get_docstring(node, clean=False) is not None
+        ):
+            node.body = node.body[1:]
+    return ast.dump(tree)
 
 
 def imports_of(source: str) -> list[str]:

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from enhsim_tf.errors import InputError
+from enhsim_tf.common.errors import InputError
 from tests.fuzzing.target import UnusedError, is_good
 
 MOST_SECONDS = 5.0

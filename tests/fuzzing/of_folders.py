@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.channels import models_of, refuse_foreign
-from enhsim_tf.fleet import verify
-from enhsim_tf.fleet_plan import FORMAT, Model, Plan, plan_of
-from enhsim_tf.scenario_file import Mix, ScenarioShare
-from enhsim_tf.shard_folder import JOURNAL, MANIFEST, check_folder, read_manifest, read_records
-from enhsim_tf.shards import file_of
+from enhsim_tf.datasets.folder import JOURNAL, MANIFEST, check_folder, read_manifest, read_records
+from enhsim_tf.datasets.generate import verify
+from enhsim_tf.datasets.plan import FORMAT, Model, Plan, plan_of
+from enhsim_tf.datasets.scenario_file import Mix, ScenarioShare
+from enhsim_tf.datasets.shard import file_of
+from enhsim_tf.enhanced_simulator.model_folder import models_of, refuse_foreign
 from tests.fuzzing.target import Target, all_of, json_of
 
 _NETWORKS = ("enhancer", "generator", "discriminator")
@@ -31,11 +31,12 @@ _PLAN = Plan(_MIX, (Model("model", Path("nowhere"), 1.0, "0" * 64, 60, 2.0),), 3
 @functools.cache
 def saved_model() -> dict[str, bytes]:
     """The files of a small saved simulator."""
-    from enhsim_tf.convolutional_noise import build_convolutional_generator
-    from enhsim_tf.enhanced_simulator import EnhancedSimulator
-    from enhsim_tf.enhancer import build_enhancer
-    from enhsim_tf.noise_gan import NoiseGAN, build_discriminator
-    from enhsim_tf.simulator import SquareWave, SquareWaveSimulator
+    from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.enhancer.network import build_enhancer
+    from enhsim_tf.noise.convolutional_gan import build_convolutional_generator
+    from enhsim_tf.noise.discriminator import build_discriminator
+    from enhsim_tf.noise.gan import NoiseGAN
 
     noise = NoiseGAN(build_convolutional_generator(2, 3, 2, 1, 2), build_discriminator(_WINDOW, 2, 4), slow_samples=(50.0,))
     coarse = SquareWaveSimulator([SquareWave(20.0, low=-1.0, high=1.0)])
@@ -88,7 +89,7 @@ def _plan(folder: Path) -> None:
 
 
 def _load(folder: Path) -> None:
-    from enhsim_tf.enhanced_simulator import EnhancedSimulator
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
     EnhancedSimulator.load(folder)
 
@@ -139,11 +140,11 @@ def _planned_seeds() -> list[bytes]:
 @functools.cache
 def data_set() -> dict[str, bytes]:
     """The files of a small finished data set."""
-    from tests import fleet_works
+    from tests.faults import small_data_set
 
     with tempfile.TemporaryDirectory() as folder:
         before = os.environ.copy()
-        maker = fleet_works.PlainMaker(_PLAN, folder)
+        maker = small_data_set.PlainMaker(_PLAN, folder)
         records = [maker(number) for number in range(2)]
         shards = [{"file": file_of(each.shard), "rows": each.rows, "sha256": each.sha256} for each in records]
         files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}

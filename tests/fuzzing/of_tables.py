@@ -9,12 +9,13 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from enhsim_tf.cleaning import Cleaning, clean
-from enhsim_tf.labelled import load_labelled
-from enhsim_tf.out_of_range import OutOfRange
-from enhsim_tf.sources import read_source
-from enhsim_tf.store import ParquetStore
-from enhsim_tf.telemetry import Telemetry, read_telemetry
+from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.single_file import read_telemetry
+from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.telemetry.telemanom import load_labelled
 from tests.fuzzing.target import Target, UnusedError, all_of, json_of, text_of
 
 _NUM = 60

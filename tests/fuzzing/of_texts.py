@@ -10,17 +10,18 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from enhsim_tf import influx_server
-from enhsim_tf.channels import folder_of
-from enhsim_tf.cleaning import Cleaning, clean
-from enhsim_tf.commands import parse
-from enhsim_tf.fleet_command import workers_of
-from enhsim_tf.influx_store import InfluxStore, parse_location
-from enhsim_tf.scenario_file import read_mix
-from enhsim_tf.simulator import MODES
-from enhsim_tf.sources import read_source
-from enhsim_tf.telemetry import Telemetry, read_telemetry
-from enhsim_tf.training_sets import num_samples_of, parse_scenario, start_of
+from enhsim_tf.cli.arguments import parse
+from enhsim_tf.cli.generate_many import workers_of
+from enhsim_tf.coarse_simulator.degraded import MODES
+from enhsim_tf.datasets.labelled_windows import num_samples_of, parse_scenario, start_of
+from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.enhanced_simulator.model_folder import folder_of
+from enhsim_tf.telemetry import influx_client as influx_server
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.single_file import read_telemetry
+from enhsim_tf.telemetry.sources import read_source
 from tests.fuzzing.target import Target, all_of, json_of, text_of
 
 _SCENARIOS = """\

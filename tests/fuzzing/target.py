@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from enhsim_tf.errors import InputError
+from enhsim_tf.common.errors import InputError
 from tests.fuzzing.mutations import change_bytes, change_json, change_text
 
 MOST_LETTERS = 600  # of a refusal

@@ -1,0 +1,76 @@
+"""`python -m enhsim_tf generate`: labelled training data from fitted simulators."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from enhsim_tf.common.console import tell
+from enhsim_tf.common.errors import InputError, printable
+
+if TYPE_CHECKING:
+    pass
+
+
+from enhsim_tf.cli.options import counted, for_each, load, outputs_of
+
+
+def run_generate(options: argparse.Namespace) -> int:
+    """Generates labelled training data from each channel's simulator."""
+    if options.nominal_share is not None and not options.scenarios and (options.continuous is not None or not options.scenario):
+        raise InputError("Expected --nominal-share with --windows and --scenario only. Received: it without them. Leave it out.")
+    if options.start is not None and options.continuous is None:
+        raise InputError(f"Expected --start with --continuous only. Received: --start {options.start} with --windows. Leave it out.")
+    if options.workers or options.engine or options.scenarios:
+        from enhsim_tf.cli.generate_many import run_fleet
+
+        return run_fleet(options, tell)
+    options.seed = options.seed or 0
+    from enhsim_tf.datasets.labelled_windows import (
+        num_samples_of,
+        parse_length,
+        parse_scenario,
+        shares_of,
+        start_of,
+        write_series_labelled,
+        write_windows_labelled,
+    )
+
+    scenarios = [parse_scenario(text) for text in options.scenario]
+    if options.windows is None and options.continuous is None:
+        raise InputError("Expected --windows or --continuous. Received: neither.")
+    if options.windows is not None and options.windows < 1:
+        raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
+    if options.continuous is not None and len(scenarios) > 1:
+        raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write a series for each.")
+    nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
+    shares = shares_of(scenarios, options.windows or 0, nominal_share, options.seed) if options.windows else []
+    start = None if options.start is None else start_of(options.start)
+    if options.continuous is not None:
+        parse_length(options.continuous)
+    from enhsim_tf.enhanced_simulator.model_folder import chosen_of, models_of
+
+    models = chosen_of(models_of(options.models), options.channel)
+    paths = outputs_of(options.out, models, (".parquet",))
+
+    def write(channel: str) -> None:
+        simulator = load(models[channel])
+        if options.continuous is None:
+            write_windows_labelled(paths[channel], simulator, shares)
+            what = f"{counted(options.windows, 'window')} of {simulator.window} samples"
+        else:
+            length = num_samples_of(options.continuous, simulator.interval_s)
+            scenario = scenarios[0] if scenarios else None
+            write_series_labelled(paths[channel], simulator, length, scenario, options.seed, start)
+            what = f"{counted(length, 'sample')}, one every {simulator.interval_s:g} s"
+        tell(f"{printable(channel)}: {what} in {paths[channel]}")
+        if not scenarios:
+            return
+        from enhsim_tf.enhanced_simulator.trusted_range import TrustedRange
+
+        trusted = TrustedRange(simulator)
+        for scenario in scenarios:
+            share = trusted.share_outside(scenario)
+            tell(
+                f"{printable(channel)}: {scenario.mode} at {scenario.severity:g}: {share:.0%} of such windows are beyond what its enhancer learnt from"
+            )
+
+    return for_each(models, write)

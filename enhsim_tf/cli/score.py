@@ -1,0 +1,58 @@
+"""`python -m enhsim_tf score`: scores telemetry with a detector trained on generated data."""
+
+import argparse
+import os
+from typing import TYPE_CHECKING
+
+from enhsim_tf.common.console import tell
+from enhsim_tf.common.errors import InputError, printable
+
+if TYPE_CHECKING:
+    pass
+
+
+from enhsim_tf.cli.options import cleaning_of, counted, for_each, load, outputs_of
+
+
+def run_score(options: argparse.Namespace) -> int:
+    """Scores each channel of the source that has a simulator."""
+    from enhsim_tf.detection import detectors
+    from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
+
+    detector = {name.casefold().replace(" ", "-"): name for name in detectors.DETECTORS}[options.detector]
+    chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
+    cleaning = cleaning_of(options, 2)
+    from enhsim_tf.enhanced_simulator.model_folder import models_of
+    from enhsim_tf.telemetry.cleaning.clean import clean
+    from enhsim_tf.telemetry.sources import read_source
+
+    models = models_of(options.models)
+    series = read_source(options.source, options.column, options.time, cleaning)
+    if len(models) == 1 and len(series) == 1:  # one of each belong together, whatever they are called
+        models = dict(zip(series, models.values(), strict=True))
+    unknown = [name for name in series if name not in models]
+    if unknown:
+        known = ", ".join(list(models)[:8])
+        raise InputError(
+            f"Expected channels that were fitted: {printable(known)}. Received: {unknown[0]!r}. Name those to be scored with --column."
+        )
+    paths = outputs_of(options.out, series, (".parquet", ".csv"))
+    for path in paths.values():
+        if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
+            raise InputError(f"Expected another --out than the source. Received: {path} for both. Name another.")
+
+    def write(channel: str) -> None:
+        cleaned = clean(series[channel], cleaning)
+        frame = score_channel(load(models[channel]), cleaned.parts, chosen)
+        write_scores(paths[channel], frame)
+        tell("\n".join(cleaned.report.lines()))
+        left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
+        scored = len(frame) - left
+        tell(
+            f"{printable(channel)}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector}, "
+            f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal ones"
+            + (f"; {counted(left, 'sample')} not scored, in pieces shorter than a window" if left else "")
+            + f"; in {paths[channel]}"
+        )
+
+    return for_each(series, write)

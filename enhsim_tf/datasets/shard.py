@@ -1,0 +1,213 @@
+"""One shard of a large data set: a Parquet file that is a pure function of the plan and the shard's number.
+
+Who makes it, when, and in which order does not matter: its draws have a seed of its own, and the networks see batches of
+one size, so that they are built once and in one way in every worker.
+
+Columns: `window` (a list of float32), `scenario` (`nominal` or a degraded mode), `severity`, `onset` (the first sample
+concerned, null where nominal), and `model` where the plan has several.
+"""
+
+import functools
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.common.atomic_files import replace_file, sha256
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.datasets.labelled_windows import NOMINAL, columns_of
+from enhsim_tf.datasets.plan import FORMAT, Plan
+from enhsim_tf.enhanced_simulator.saving import MANIFEST
+from enhsim_tf.enhancer.training_pairs import at_level
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+_STREAM = 0x666C656574  # sets these seeds apart from all others of the package
+_BEGINS = 1_000_000  # windows begin at a random one of these samples, so at every phase of the waves
+_BATCH, _BATCH_VALUES = 1_024, 2**19  # windows a call of the networks, and values where the windows are long
+_ROW_GROUP = 4_096
+
+
+class Record(NamedTuple):
+    """What is recorded of a finished shard: its number, its windows, and its file's checksum."""
+
+    shard: int
+    rows: int
+    sha256: str
+
+
+class Rows(NamedTuple):
+    """What each window of a shard is to be, arrays of one value a window; scenario 0 is nominal."""
+
+    model: np.ndarray
+    scenario: np.ndarray
+    severity: np.ndarray
+    onset: np.ndarray
+    begin: np.ndarray
+    level: np.ndarray
+
+
+def file_of(shard: int) -> str:
+    """The name of a shard's file."""
+    return f"shard-{shard:06d}.parquet"
+
+
+def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.random.Generator]:
+    """Draws what each window of a shard is to be, and the generators of what happens in a scenario and of the noise.
+
+    The number of windows of a scenario (or of a model) is its share of the shard's, rounded up or down at random; their
+    order is random.
+
+    Args:
+        plan: The data set.
+        shard: The shard's number.
+    """
+    seeds = np.random.SeedSequence([_STREAM, plan.seed, shard]).spawn(4)
+    mixing, placing, happening, noise = map(np.random.default_rng, seeds)
+    num_rows = plan.rows_of(shard)
+    model = systematic([model.share for model in plan.models], num_rows, mixing)
+    scenario = systematic([plan.mix.nominal, *(part.share for part in plan.mix.scenarios)], num_rows, mixing)
+    ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
+    severity, onset = (ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * mixing.random((num_rows, 2))).T
+    severity = severity.astype(np.float32).astype(np.float64)  # as its label says
+    return Rows(model, scenario, severity, onset, placing.integers(0, _BEGINS, num_rows), placing.random(num_rows)), happening, noise
+
+
+def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
+    """Draws the part each row belongs to, in random order: each part gets its share of the rows, rounded up or down.
+
+    Args:
+        shares: Share of each part; they add up to one.
+        num_rows: Number of rows.
+        rng: Owner of the draw.
+
+    Returns:
+        Integers of shape `(num_rows,)`.
+    """
+    edges = np.cumsum(shares) / np.sum(shares)
+    places = (rng.random() + np.arange(num_rows)) / num_rows
+    return rng.permutation(np.minimum(np.searchsorted(edges, places, side="right"), np.flatnonzero(shares)[-1]))
+
+
+def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, Rows]:
+    """Makes the windows of a shard, float32 of shape `(rows, samples)`, and what each of them is.
+
+    Args:
+        plan: The data set.
+        simulators: The plan's models, loaded.
+        shard: The shard's number.
+    """
+    rows, happening, noise = draw_rows(plan, shard)
+    windows = np.empty((len(rows.begin), plan.window), np.float32)
+    batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // plan.window))
+    for number, simulator in enumerate(simulators):
+        own = np.flatnonzero(rows.model == number)
+        for first in range(0, len(own), batch):
+            places = own[first : first + batch]
+            coarse = np.zeros((batch, plan.window), np.float32)
+            for place, window in zip(places, coarse, strict=False):
+                times = simulator.interval_s * (rows.begin[place] + np.arange(plan.window))
+                window[:] = simulator.coarse.simulate(times[None], _scenario_of(plan, rows, place), happening)[0]
+            clean = simulator.enhance(coarse)[: len(places)]
+            if simulator.levels is not None:
+                levels = simulator.levels[(rows.level[places] * len(simulator.levels)).astype(int)]
+                clean = at_level(clean, *levels.T)
+            windows[places] = clean + simulator.noise.generate(batch, noise)[: len(places)]
+    return windows, rows
+
+
+def _scenario_of(plan: Plan, rows: Rows, place: int) -> Degraded | None:
+    number = rows.scenario[place]
+    if number == 0:
+        return None
+    return Degraded(plan.mix.scenarios[number - 1].mode, float(rows.severity[place]), float(rows.onset[place]))
+
+
+def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
+    """The columns of a data set's shards, with what they are in their metadata.
+
+    Args:
+        settings: `Plan.settings`.
+        key: `Plan.key`.
+    """
+    import pyarrow as pa
+
+    columns = columns_of(settings["window"])
+    if len(settings["models"]) > 1:
+        columns["model"] = pa.string()
+    return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})
+
+
+class ShardMaker:
+    """Makes shards in one process: loads the models once, then a file a call.
+
+    Args:
+        plan: The data set.
+        folder: Where its files go.
+    """
+
+    def __init__(self, plan: Plan, folder: str | os.PathLike):
+        self.plan, self.folder = plan, Path(folder).absolute()
+        self.settings, self.key = plan.settings(), plan.key  # of the machine that asks; another that works for it has to agree
+
+    @functools.cached_property
+    def simulators(self) -> list["EnhancedSimulator"]:
+        """The plan's models.
+
+        Raises:
+            InputError: If one is damaged, or another than that of the plan.
+        """
+        if self.plan.key != self.key:
+            versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
+            raise InputError(f"Expected every machine to have {versions}. Received: others on {os.uname().nodename}.")
+        from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+        simulators = []
+        for model in self.plan.models:
+            simulators.append(EnhancedSimulator.load(model.folder))
+            if sha256(model.folder / MANIFEST) != model.sha256 or simulators[-1].window != model.window:
+                raise InputError(f"Expected the model that the data set was begun with. Received: another one in {model.folder}.")
+        return simulators
+
+    def __call__(self, shard: int) -> Record:
+        """Makes a shard and writes its file, whole or not at all.
+
+        Raises:
+            InputError: If a model cannot be used, or the file not be written.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        windows, rows = make_windows(self.plan, self.simulators, shard)
+        nominal = rows.severity == 0  # scenario 0 among them
+        modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
+        scenarios = [_scenario_of(self.plan, rows, place) for place in range(len(nominal))]
+        onsets = np.array([0 if each is None else each.first_sample(self.plan.window) for each in scenarios], np.int32)
+        columns = [
+            pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), self.plan.window),
+            pa.array(np.where(nominal, NOMINAL, modes[rows.scenario]), pa.string()),
+            pa.array(rows.severity.astype(np.float32)),
+            pa.array(onsets, mask=nominal),
+        ]
+        if len(self.plan.models) > 1:
+            columns.append(pa.array(np.array([model.name for model in self.plan.models], object)[rows.model], pa.string()))
+        table = pa.table(columns, schema=schema_of(self.settings, self.key))
+        names = [name for name in ("scenario", "model") if name in table.column_names]
+        # the bytes of equal significance side by side: signs and exponents compress, the mantissas' noise does not
+        options = {"use_dictionary": names, "column_encoding": {"window.list.element": "BYTE_STREAM_SPLIT"}, "write_statistics": names}
+        path = self.folder / file_of(shard)
+        try:
+            with replace_file(path) as temporary:
+                pq.write_table(table, temporary, row_group_size=_ROW_GROUP, compression="zstd", **options)
+                return Record(shard, table.num_rows, sha256(temporary))
+        except (OSError, pa.ArrowException) as error:
+            reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:120]
+            raise InputError(
+                f"Expected {path.name} to be written. Received: {reason}. Finished shards are kept: mend it and run the same command again."
+            ) from None

@@ -1,0 +1,98 @@
+"""Detectors that are networks: what an autoencoder cannot reconstruct is strange. Keras is imported when one is trained."""
+
+import numpy as np
+
+
+class DenseAutoencoder:
+    """A dense autoencoder; its score is the mean square of what it cannot reconstruct.
+
+    Args:
+        num_hidden: Units of the hidden layers.
+        num_code: Units of the code.
+        epochs: Passes over the windows.
+        seed: Seed of the weights and of the order of the windows.
+    """
+
+    def __init__(self, num_hidden: int = 128, num_code: int = 16, epochs: int = 30, seed: int = 0):
+        self.num_hidden, self.num_code, self.epochs, self.seed = num_hidden, num_code, epochs, seed
+
+    def fit(self, windows: np.ndarray) -> "DenseAutoencoder":
+        """Trains it to reconstruct the windows."""
+        from enhsim_tf.keras_tools.training import dense_stack, fit_windows
+
+        self._mean, self._scale = np.mean(windows), np.std(windows)
+        units, samples = (self.num_hidden, self.num_code, self.num_hidden), windows.shape[1]
+        self._network = dense_stack(samples, (*units, samples), seed=self.seed, name="autoencoder")
+        scaled = self._scaled(windows)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0, jit_compile=False)
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Mean squared reconstruction error, in units of the training variance."""
+        scaled = self._scaled(windows)
+        return np.mean((np.asarray(self._network(scaled)) - scaled) ** 2, axis=1)
+
+    def _scaled(self, windows: np.ndarray) -> np.ndarray:
+        return ((windows - self._mean) / self._scale).astype(np.float32)
+
+
+class ConvolutionalAutoencoder:
+    """A convolutional autoencoder; its score is the mean square of what it cannot reconstruct.
+
+    Two convolutions and their transposes, of stride 4: every sixteen samples become four numbers. What it knows is
+    local, and the same at every place of a window.
+
+    Args:
+        filters: Filters of the outer convolutions.
+        width: Samples of each kernel.
+        num_code: Numbers that sixteen samples are narrowed to.
+        epochs: Passes over the windows.
+        seed: Seed of the weights and of the order of the windows.
+    """
+
+    stride = 4
+
+    def __init__(self, filters: int = 16, width: int = 9, num_code: int = 4, epochs: int = 15, seed: int = 0):
+        self.filters, self.width, self.num_code, self.epochs, self.seed = filters, width, num_code, epochs, seed
+
+    def fit(self, windows: np.ndarray) -> "ConvolutionalAutoencoder":
+        """Trains it to reconstruct the windows."""
+        from enhsim_tf.keras_tools.training import fit_windows
+
+        self._mean, self._scale = np.mean(windows), np.std(windows)
+        self._network = self._build(windows.shape[1])
+        scaled = self._scaled(windows)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, learning_rate=0.003, verbose=0)
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Mean squared reconstruction error, in units of the training variance."""
+        from enhsim_tf.keras_tools.training import predict_windows
+
+        scaled = self._scaled(windows)
+        return np.mean((predict_windows(self._network, scaled, 1_024) - scaled) ** 2, axis=1)
+
+    def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a name
+        from enhsim_tf.keras_tools.backend import keras
+        from enhsim_tf.keras_tools.training import seeded_initialiser
+
+        missing = -samples % self.stride**2  # zeros at the end, taken away again
+        layers, kernels = keras.layers, [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)]
+        options = {"strides": self.stride, "padding": "same"}
+        return keras.Sequential(
+            [
+                keras.Input((samples,)),
+                layers.Reshape((samples, 1)),
+                layers.ZeroPadding1D((0, missing)),
+                layers.Conv1D(self.filters, self.width, activation="relu", kernel_initializer=kernels[0], **options),
+                layers.Conv1D(self.num_code, self.width, kernel_initializer=kernels[1], **options),
+                layers.Conv1DTranspose(self.filters, self.width, activation="relu", kernel_initializer=kernels[2], **options),
+                layers.Conv1DTranspose(1, self.width, kernel_initializer=kernels[3], **options),
+                layers.Cropping1D((0, missing)),
+                layers.Reshape((samples,)),
+            ],
+            name="convolutional_autoencoder",
+        )
+
+    def _scaled(self, windows: np.ndarray) -> np.ndarray:
+        return ((windows - self._mean) / self._scale).astype(np.float32)

@@ -1,0 +1,140 @@
+"""Measures what a simulator fitted to a channel is worth: its error, its noise, what detectors trained on it say of real windows.
+
+Everything is measured on telemetry that the simulator has not seen, where there is any.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.detection import evaluation as robustness
+from enhsim_tf.detection.detectors import DETECTORS
+from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
+from enhsim_tf.enhancer.training_pairs import cut_pairs, even_places, ridge, window_errors
+from enhsim_tf.realism import real_floor as realism
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import disjoint_offsets
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors that train in a second
+_NUM_WINDOWS = 1_000  # generated windows that a detector learns from; as many set its threshold
+_NUM_COMPARED = 200  # windows that errors and alarms are measured on, at most
+_LEAST_NOISE_WINDOW, _NUM_NOISE_WINDOWS = 16, 40  # of the comparison of noises, which needs windows that share no sample
+_OFTEN = 3  # times that a value occurs, to be a level of quantised telemetry
+
+
+def report_on(
+    simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], is_held_out: bool, seed: int
+) -> ChannelReport:
+    """Measures a simulator on real telemetry.
+
+    Args:
+        simulator: The fitted simulator, which follows the telemetry.
+        learnt: What it learnt from.
+        held_out: What it is measured on.
+        is_held_out: Whether that is something else.
+        seed: Seed of everything drawn.
+    """
+    window = simulator.window
+    places = even_places(held_out, window, _NUM_COMPARED)
+    pairs = cut_pairs(held_out, simulator.coarse, places, window, follow=True)  # as the coarse signal alone can be set
+    enhanced = simulator.follow(simulator.pairs(held_out, places))
+    typical = _typical(enhanced, pairs.target)
+    generated = simulator.generate(2 * _NUM_WINDOWS, seed=seed + 1)
+    extracted = simulator.residual_windows(learnt, _NUM_WINDOWS, np.random.default_rng([seed, 2]))
+    noise_sd = float(np.std(extracted, dtype=np.float64))
+    noise_window, rows = _compare_noise(simulator, [*learnt, *held_out] if is_held_out else list(learnt), seed)
+    places = even_places(learnt, window, 2 * _NUM_WINDOWS)
+    training = cut_pairs(learnt, simulator.coarse, places, window, follow=True)
+    real = training.target
+    trial = robustness.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
+    trial = dataclasses.replace(trial, anomalous={key: value for key, value in trial.anomalous.items() if key[1] == SEVERITY})
+    quick = {name: DETECTORS[name] for name in QUICK}
+    cut = len(real) * 3 // 5  # of real windows the later ones set the threshold: neighbours overlap
+    gap = window * len(real) // max(1, sum(map(len, learnt)))
+    judged = {
+        "generated": robustness.judge_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
+        "real": robustness.judge_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
+    }
+    recall = {name: {row["kind"]: row["recall"] for row in judged["generated"]["recall"] if row["detector"] == name} for name in QUICK}
+    return ChannelReport(
+        learnt[0].name,
+        window,
+        max(wave.period_s for wave in simulator.coarse.waves),
+        is_held_out,
+        len(pairs),
+        min(len(pairs), sum(len(part) // window for part in held_out)),
+        {
+            "coarse": _nrmse(pairs.coarse_at_level, pairs.target),
+            "ridge": _nrmse(ridge(training, pairs), pairs.target),
+            "enhanced": _nrmse(enhanced, pairs.target),
+        },
+        rows,
+        noise_window,
+        {name: robustness.summary(tables["alarms"]) for name, tables in judged.items()},
+        recall,
+        noise_sd,
+        {
+            "coarse": pairs.coarse_at_level[typical],
+            "enhanced": enhanced[typical],
+            "real": pairs.target[typical],
+            "generated": generated[0],
+        },
+        learnt[0].unit,
+        learnt[0].time_unit,
+        levels_of(np.concatenate([part.values for part in learnt])),
+    )
+
+
+def levels_of(values: np.ndarray) -> dict[str, float]:
+    """The `count` of levels of quantised values and the `step` between the nearest two; empty where they are not.
+
+    Args:
+        values: The telemetry; a few values that are none of its levels, such as those that fill gaps, do not count.
+    """
+    levels, counts = np.unique(values, return_counts=True)
+    often = levels[counts >= _OFTEN].astype(np.float64)
+    if not 2 <= len(often) <= len(values) // 10 or counts[counts >= _OFTEN].sum() < 0.99 * len(values):
+        return {}
+    step = float(np.diff(often).min())
+    multiples = (often - often[0]) / step
+    is_even = np.abs(multiples - np.round(multiples)).max() < 0.1  # the values of a wave without noise repeat too
+    return {"count": len(often), "step": step} if is_even else {}
+
+
+def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
+    """Median of the errors over windows that are not flat, NaN where all are."""
+    errors = window_errors(windows, target)
+    return float(np.nanmedian(errors)) if np.isfinite(errors).any() else float("nan")
+
+
+def _typical(windows: np.ndarray, target: np.ndarray) -> int:
+    """The window whose error is nearest to the median."""
+    apart = np.abs(window_errors(windows, target) - _nrmse(windows, target))
+    return int(np.argmin(np.where(np.isnan(apart), np.inf, apart)))
+
+
+def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], seed: int) -> tuple[int, list[dict[str, Any]]]:
+    """Rows of every fidelity measure, generated against extracted noise, in windows short enough that many share no sample."""
+    window = simulator.window
+    whole = [part for part in parts if len(part) >= window]
+    places, before = [], 0
+    for part in whole:
+        places += list(before + disjoint_offsets(len(part), window))
+        before += len(part) - window + 1
+    pairs = simulator.pairs(whole, np.array(places))
+    residual = pairs.target - simulator.follow(pairs)
+    pieces = max(1, -(-_NUM_NOISE_WINDOWS // len(residual)))
+    short = window // pieces
+    if short < _LEAST_NOISE_WINDOW:
+        return short, []
+    residual = residual[:, : short * pieces].reshape(-1, short)
+    half = len(residual) // 2
+    floor = realism.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
+    generated = simulator.noise.generate(-(-half // pieces), seed)[:, : short * pieces].reshape(-1, short)[:half]
+    rows = [dataclasses.asdict(row) for row in floor.judge(generated).rows]
+    return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is no JSON

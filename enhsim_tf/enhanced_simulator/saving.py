@@ -1,0 +1,136 @@
+"""A trained simulator at rest: a folder of three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
+
+It knows files and checksums, and that Keras opens them in safe mode; not what the networks are for.
+"""
+
+import os
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.size_limits import DAMAGES, read_json
+from enhsim_tf.enhanced_simulator.safe_loading import check_network
+
+if TYPE_CHECKING:
+    from enhsim_tf.keras_tools.backend import keras
+
+MANIFEST, SETTINGS = "manifest.json", "settings.json"
+MOST_SETTINGS = 50_000_000  # bytes of a JSON file; ours have some ten thousand
+_OURS = b'"enhsim_tf.EnhancedSimulator/'  # stands at the beginning of the manifest of every version
+_FORMAT = "enhsim_tf.EnhancedSimulator/1"
+_NETWORKS = ("enhancer", "generator", "discriminator")
+
+
+def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"], settings: Mapping[str, Any]) -> None:
+    """Writes the folder, whole or not at all.
+
+    Args:
+        folder: Where to; a saved simulator that stands there is replaced.
+        networks: `enhancer`, `generator` and `discriminator`.
+        settings: Everything else, in plain JSON types.
+
+    Raises:
+        InputError: If something else than a saved simulator stands there, which is left as it is.
+    """
+    folder = Path(folder)
+    if is_foreign(folder):
+        raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which holds something else.")
+    with replace_folder(folder) as temporary:
+        for name in _NETWORKS:
+            networks[name].save(temporary / f"{name}.keras", include_optimizer=False)
+        write_json(temporary / SETTINGS, settings)
+        checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
+        write_json(temporary / MANIFEST, {"format": _FORMAT, "sha256": checksums})
+
+
+def is_foreign(folder: Path) -> bool:
+    """Whether something else than a saved simulator stands there; a damaged one is one, and an empty folder is as good as none."""
+    manifest = folder / MANIFEST
+    is_ours = manifest.is_file() and _OURS in _beginning_of(manifest)  # others have manifests too
+    is_empty = folder.is_dir() and not any(folder.iterdir())
+    return os.path.lexists(folder) and not (is_ours or is_empty)
+
+
+def _beginning_of(path: Path) -> bytes:
+    with open(path, "rb") as file:
+        return file.read(1_000)
+
+
+def check_saved(folder: str | os.PathLike) -> None:
+    """Checks that a saved simulator is whole, by its checksums; loads no network.
+
+    Args:
+        folder: The folder.
+
+    Raises:
+        InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
+    """
+    folder = Path(folder)
+    manifest = _json_of(folder, MANIFEST)
+    if manifest.get("format") != _FORMAT or set(manifest) != {"format", "sha256"} or not _is_complete(manifest["sha256"]):
+        raise InputError(
+            f"Expected the format {_FORMAT}. Received: {str(manifest.get('format'))[:80]!r} in {folder}. Save the simulator with this version."
+        )
+    for name, expected in manifest["sha256"].items():
+        if not (folder / name).is_file() or sha256(folder / name) != expected:
+            raise InputError(f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again.")
+
+
+def _is_complete(checksums: Any) -> bool:
+    return isinstance(checksums, dict) and set(checksums) == {SETTINGS, *(f"{name}.keras" for name in _NETWORKS)}
+
+
+def settings_of(folder: str | os.PathLike) -> dict[str, Any]:
+    """The settings that were saved, as they stand there.
+
+    Raises:
+        InputError: If they cannot be read.
+    """
+    return _json_of(Path(folder), SETTINGS)
+
+
+def _json_of(folder: Path, name: str) -> dict[str, Any]:
+    try:
+        content = read_json(folder / name, MOST_SETTINGS)
+        if not isinstance(content, dict):
+            raise ValueError("no object")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
+        ) from None
+    return content
+
+
+def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Model"], Mapping[str, Any]], Any]) -> Any:
+    """Reads what `write_saved` wrote, in Keras' safe mode.
+
+    Args:
+        folder: The folder.
+        make: Makes the simulator from the networks and the settings.
+
+    Returns:
+        What `make` made.
+
+    Raises:
+        InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
+    """
+    from enhsim_tf.keras_tools.backend import keras, tf  # here: what only looks at a folder should not wait for it
+
+    folder = Path(folder)
+    check_saved(folder)
+    settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
+    try:
+        for name in _NETWORKS:
+            check_network(folder / f"{name}.keras")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # of a layer that the file has no weights for, Keras only warns
+            networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
+        if sha256(folder / MANIFEST) != as_checked:  # a new simulator took its place meanwhile, and the networks may be of both
+            raise ValueError("it was replaced while it was read; try again")
+        return make(networks, settings)
+    except (*DAMAGES, UserWarning, tf.errors.OpError) as error:
+        reason = (str(error).splitlines() or [""])[0]
+        raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

@@ -1,0 +1,48 @@
+"""The paper's discriminator of noise (section 2.3, Figure 10)."""
+
+from enhsim_tf.keras_tools.backend import keras
+from enhsim_tf.keras_tools.training import seeded_initialiser
+
+
+def build_discriminator(
+    window: int = 500,
+    filters: int = 500,
+    width: int = 20,
+    stride: int = 4,
+    narrow_units: int = 25,
+    dropout: float = 0.0,
+    seed: int = 0,
+    initialiser: str = "he_uniform",
+) -> keras.Sequential:
+    """Builds the paper's discriminator, Figure 10: one convolution, its maximum, narrowing to one sigmoid neuron.
+
+    Args:
+        window: Samples of a window.
+        filters: Filters of the convolution.
+        width: Samples under a filter.
+        stride: Samples from one position of a filter to the next.
+        narrow_units: Units of the layer before the last.
+        dropout: Share dropped after the convolution and after the narrow layer; 0 leaves the layers out.
+        seed: Seed of the weights.
+        initialiser: Keras name of the weights' initialiser.
+
+    Returns:
+        An uncompiled Keras model from shape `(windows, window, 1)` to `(windows, 1)`, the probability of being real.
+    """
+    kernels = [seeded_initialiser(initialiser, seed * 1000 + number) for number in (200, 201, 202)]
+
+    def dropped(number: int) -> list[keras.layers.Layer]:
+        return [keras.layers.Dropout(dropout, seed=seed * 1000 + number)] if dropout else []
+
+    return keras.Sequential(
+        [
+            keras.Input((window, 1)),
+            keras.layers.Conv1D(filters, width, strides=stride, activation="relu", kernel_initializer=kernels[0]),
+            *dropped(300),
+            keras.layers.GlobalMaxPooling1D(),
+            keras.layers.Dense(narrow_units, activation="relu", kernel_initializer=kernels[1]),
+            *dropped(301),
+            keras.layers.Dense(1, activation="sigmoid", kernel_initializer=kernels[2]),
+        ],
+        name="discriminator",
+    )

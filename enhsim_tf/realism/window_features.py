@@ -1,0 +1,24 @@
+"""Features of a window, for two-sample tests and for detectors."""
+
+import numpy as np
+
+
+def window_features(windows: np.ndarray) -> np.ndarray:
+    """Fourteen features of each window, float64 of shape `(windows, 14)`.
+
+    Mean, log sd, excess kurtosis, largest value, log sd of first differences, lag-1 correlation, and the log power in
+    eight bands that double in width.
+    """
+    values = np.asarray(windows, np.float64)
+    tiny = 1e-12  # keeps the logarithm of a window that stands still finite
+    mean = values.mean(axis=1)
+    centred = values - mean[:, None]
+    variance = np.mean(centred**2, axis=1) + tiny
+    kurtosis = np.mean(centred**4, axis=1) / variance**2 - 3
+    steps = np.std(np.diff(values, axis=1), axis=1)
+    correlation = np.mean(centred[:, 1:] * centred[:, :-1], axis=1) / variance
+    power = np.abs(np.fft.rfft(centred, axis=1)) ** 2
+    edges = np.unique(np.rint(np.geomspace(1, power.shape[1], 9)).astype(int))
+    bands = [np.log(power[:, a:b].mean(axis=1) + tiny) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    columns = [mean, np.log(variance) / 2, kurtosis, values.max(axis=1), np.log(steps + tiny), correlation, *bands]
+    return np.stack(columns, axis=1)

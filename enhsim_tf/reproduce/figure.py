@@ -1,0 +1,111 @@
+"""What a figure of the reproduction is, and how it is saved."""
+
+import dataclasses
+import os
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib.figure
+import matplotlib.style
+import numpy as np
+
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.plot_style import EDGE, GENERATED, QUIET, STYLE
+from enhsim_tf.reproduce.caption import caption_of_findings
+
+WATERMARK = "SMOKE BUDGET"
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure:
+    """A figure of the paper.
+
+    Args:
+        number: Its number; 14 is the one the paper commented out.
+        title: The paper's caption.
+        alt: What it shows, in words, for those who do not see it.
+        drawn_by: Makes it from its arrays.
+    """
+
+    number: int
+    title: str
+    alt: str
+    drawn_by: Callable[[Mapping[str, np.ndarray]], matplotlib.figure.Figure]
+
+    def draw(self, data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
+        """Draws the figure in the style of all.
+
+        Args:
+            data: The arrays that `figure_data.FIGURE_DATA` makes for it.
+        """
+        with matplotlib.style.context(STYLE):
+            return self.drawn_by(data)
+
+
+def save(
+    name: str,
+    data: Mapping[str, np.ndarray],
+    folder: str | os.PathLike,
+    caption: str,
+    is_smoke: bool,
+    saved_as: Sequence[str] = ("png", "svg"),
+    *,
+    figures: Mapping[str, Figure],
+) -> list[Path]:
+    """Draws a figure and writes it, with its caption line and, where it is due, the mark of a smoke run.
+
+    The same data give the same bytes.
+
+    Args:
+        name: One of `figures`.
+        data: Its arrays.
+        folder: An existing folder.
+        caption: What ran, in small print at the bottom.
+        is_smoke: Whether the arrays come from a smoke run.
+        saved_as: File types.
+        figures: The figures by name.
+
+    Returns:
+        The paths of the files.
+    """
+    figure = figures[name].draw(data)
+    width, height = figure.get_size_inches()
+    lines = textwrap.wrap(caption, int((width - 2 * EDGE) * 20.5))
+    small = {"size": 7, "color": QUIET, "linespacing": 1.05}
+    figure.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
+    if is_smoke:
+        mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
+        figure.text(0.5, 0.5, WATERMARK, **mark, ha="center", va="center", zorder=10, gid="watermark")
+    paths = [Path(folder) / f"{name}.{kind}" for kind in saved_as]
+    with matplotlib.style.context(STYLE):
+        for path in paths:
+            undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+            with replace_file(path) as temporary:
+                figure.savefig(temporary, metadata={"Title": figures[name].title, "Description": figures[name].alt} | undated)
+    return paths
+
+
+def save_all(
+    figures: Mapping[str, Figure], found: Mapping[str, Any], folder: str | os.PathLike, command: str, names: Sequence[str] = ()
+) -> list[Path]:
+    """Draws the figures of an experiment from its findings and writes them, as `save` does.
+
+    Args:
+        figures: The experiment's figures by name.
+        found: Its findings.
+        folder: An existing folder.
+        command: What runs it, for the captions.
+        names: Which; none for all.
+
+    Returns:
+        The paths of the files.
+    """
+    caption = caption_of_findings(found, command)
+    return [path for name in names or figures for path in save(name, found, folder, caption, found["budget"] == "smoke", figures=figures)]
+
+
+def _shape(words: np.ndarray) -> str:
+    """The samples of a Keras shape such as `(None, 500, 1)`."""
+    return str(words).strip("()").split(", ")[1]

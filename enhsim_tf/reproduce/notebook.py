@@ -1,0 +1,184 @@
+"""What the notebooks share: the experiment, its figures and its claims, shown in Jupyter.
+
+It trains, measures and draws nothing of its own: stages come from the cache that `reproduce` fills, figures from the
+function that writes `figures/`, sentences and verdicts from the ledger.
+"""
+
+import contextlib
+import functools
+import importlib
+import io
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.figure
+import matplotlib.style
+import numpy as np
+from IPython.display import Markdown, display
+from PIL import Image
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.plot_style import STYLE
+from enhsim_tf.reproduce import figure
+from enhsim_tf.reproduce.caption import caption_of, in_seeds
+from enhsim_tf.reproduce.paper import claims, figures
+from enhsim_tf.reproduce.paper.figure_data import FIGURE_DATA
+from enhsim_tf.reproduce.paper.pipeline import Experiment
+from enhsim_tf.reproduce.robustness import figures as robustness_figures
+from enhsim_tf.reproduce.robustness import findings
+from enhsim_tf.reproduce.robustness import run as robustness_run
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.reproduce.spacecraft import figures as labelled_figures
+from enhsim_tf.reproduce.spacecraft import findings as labelled_findings
+from enhsim_tf.reproduce.spacecraft import run as labelled_run
+from enhsim_tf.reproduce.stages import Stages, default_cache
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_TAKES = {"full": "minutes", "smoke": "seconds"}
+# stages that take time, in their order, and what of the experiment asks for each
+_STAGES = {"telemetry": "store", "enhancer": "enhancer_folder", "noise GAN": "noise_folder", "enhancement": "enhancement"}
+_STAGES |= {"speed": "speed", "false alarms": "false_alarms", "resemblance": "resemblance", "degraded": "degraded"}
+_LEDGER = {known.id: known for known in claims.CLAIMS}
+_ROOT = Path(__file__).parents[2]
+_KEPT = _ROOT / "figures" / robustness_run.FOLDER
+_SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
+
+
+class Arrays(dict):
+    """Arrays by name, of which Jupyter shows the shapes instead of the contents."""
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name}: {np.shape(values)} {np.asarray(values).dtype}" for name, values in self.items())
+
+
+class _MissingStageError(Exception):
+    """A stage that was looked for and is still to be done."""
+
+
+class _Lookup(Stages):
+    """Stages that are looked for and never done."""
+
+    def run(self, name: str, make: Callable[[Path], None], *others: Any, **options: Any) -> Path:
+        @functools.wraps(make)  # a stage is found by the source of what makes it
+        def refuse(folder: Path) -> None:
+            raise _MissingStageError(name)
+
+        return super().run(name, refuse, *others, **options)
+
+
+def open_experiment(budget: str | None = None) -> Experiment:
+    """Opens the paper's experiment and says which stages are still to be done and how long they take.
+
+    A stage is done when a cell first asks for it, with a progress bar for each training, and kept for all notebooks and
+    for `python -m enhsim_tf.reproduce`.
+
+    Args:
+        budget: `full` or `smoke`; None takes it from the environment variable `ENHSIM_TF_BUDGET`, or `full`.
+    """
+    budget = budget or os.environ.get("ENHSIM_TF_BUDGET", "full")
+    if budget not in _TAKES:
+        raise InputError(f"Expected ENHSIM_TF_BUDGET to be one of: {', '.join(_TAKES)}. Received: {budget!r}.")
+    settings, cache, results = make_settings(budget), default_cache(), _ROOT / "figures" / "results.json"
+    took = json.loads(results.read_text(encoding="utf-8")) if results.is_file() else {}
+    known = took["timings"] if took.get("budget") == budget else {}
+    missing = prepare(Experiment(settings, _Lookup(cache, tell=lambda line: None)))
+    todo = [f"{stage} (about {known[stage]:.0f} s)" if stage in known else f"{stage} ({_TAKES[budget]})" for stage in missing]
+    print(f"{budget.capitalize()} budget, seed {settings.seed}.", end=" ")
+    print(f"Still to do, when first needed: {', '.join(todo)}." if todo else "Everything is ready.")
+    importlib.import_module(
+        "enhsim_tf.keras_tools.backend"
+    )  # a notebook that imports Keras itself then computes with the package's settings
+    return Experiment(settings, Stages(cache, tell=lambda line: None if line.endswith("(from the cache)") else print(line)), verbose=1)
+
+
+def prepare(experiment: Experiment) -> list[str]:
+    """Does every stage; returns those that could not be done, because the experiment's stages are only looked up."""
+    missing = []
+    for stage, attribute in _STAGES.items():
+        try:
+            getattr(experiment, attribute)
+        except _MissingStageError:
+            missing.append(stage)
+    return missing
+
+
+def show(experiment: Experiment, name: str) -> Arrays:
+    """Shows a figure (one of `settings.FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
+    arrays, is_smoke = FIGURE_DATA[name](experiment), experiment.settings.budget == "smoke"
+    with tempfile.TemporaryDirectory() as folder:
+        (path,) = figure.save(name, arrays, folder, caption_of(name, experiment), is_smoke, ("png",), figures=figures.FIGURES)
+        _show_picture(path.read_bytes(), figures.FIGURES[name].alt)
+    return Arrays(arrays)
+
+
+def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
+    """The experiment on robustness as it was run and kept: its findings, and the tables they come from."""
+    found = json.loads((_KEPT / "findings.json").read_text(encoding="utf-8"))
+    print(
+        f"{found['num_replicates']} replicates: {in_seeds(found['seeds'])} in {len(found['environments'])} environments, kept in figures/."
+    )
+    return found, findings.KEPT.read(_KEPT)
+
+
+def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
+    """The study of real telemetry as it was run and kept: its findings, and the tables they come from."""
+    folder = _ROOT / "figures" / labelled_run.FOLDER
+    found = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
+    print(f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in figures/.")
+    return found, labelled_findings.KEPT.read(folder)
+
+
+def show_finding(found: dict, name: str) -> None:
+    """Shows a figure of an experiment from its findings: one of `robustness_figures.FIGURES` or `labelled_figures.FIGURES`."""
+    of_labelled = name in labelled_figures.FIGURES
+    drawn, kept = (labelled_figures, labelled_findings.KEPT) if of_labelled else (robustness_figures, findings.KEPT)
+    with tempfile.TemporaryDirectory() as folder:
+        path = next(path for path in figure.save_all(drawn.FIGURES, found, folder, kept.command, (name,)) if path.suffix == ".png")
+        _show_picture(path.read_bytes(), drawn.FIGURES[name].alt)
+
+
+@contextlib.contextmanager
+def drawing(alt: str, columns: int = 1, height: float = 2.4, **shared: bool) -> Iterator:
+    """A row of panels in the style of all, shown when the `with` block ends.
+
+    Args:
+        alt: What they show, in words.
+        columns: Number of panels.
+        height: Height in inches.
+        **shared: What `matplotlib.figure.Figure.subplots` takes, for example `sharey`.
+    """
+    with matplotlib.style.context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(7.2, height), layout="constrained")
+        yield figure.subplots(1, columns, **shared)
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png", metadata={"Software": None})
+    _show_picture(picture.getvalue(), alt)
+
+
+def _show_picture(png: bytes, alt: str) -> None:
+    picture, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
+    picture.quantize(48, dither=Image.Dither.NONE).save(small, "png", optimize=True)  # a third of the bytes, the same to the eye
+    about = {"width": int(picture.width * _SCREEN), "alt": alt}
+    display({"image/png": small.getvalue(), "text/plain": f"Figure: {alt}"}, metadata={"image/png": about}, raw=True)
+
+
+def claim(*ids: str) -> None:
+    """Shows claims of the paper, from the ledger: the sentence, where it stands, and what it is held to."""
+    for known in (_LEDGER[id] for id in ids):
+        held = f"{known.statistic}; {known.tolerance}"
+        place = f"section {known.section}" if known.section[0].isdigit() else known.section
+        display(Markdown(f"> **{known.id}** (paper, {place}): {known.sentence}\n>\n> *We hold it to:* {held}."))
+
+
+def verdict(experiment: Experiment, *ids: str) -> list[dict]:
+    """Judges claims by the ledger, shows verdicts and findings, and returns the records that `results.json` holds."""
+    records = claims.judge(tuple(_LEDGER[id] for id in ids), experiment)
+    for record in records:
+        display(Markdown(f"> **{record['id']}: {record['verdict']}.** {record['finding'][0].upper()}{record['finding'][1:]}."))
+    return records

@@ -1,0 +1,247 @@
+"""The data of a run: telemetry placed in the store and read back, its parts, and the windows cut from them.
+
+Everything that the stages of `experiments` share and that trains nothing.
+"""
+
+import dataclasses
+import functools
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.degraded import Degraded, degrade
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, units_of
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhancer.training_pairs import paired_windows
+from enhsim_tf.noise.extraction import extract_noise, noise_unit
+from enhsim_tf.reproduce.noise_processes import NOISES
+from enhsim_tf.reproduce.paper.signals import sines
+from enhsim_tf.reproduce.settings import Settings
+from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.series import Telemetry, check_values
+from enhsim_tf.telemetry.single_file import read_telemetry
+from enhsim_tf.telemetry.windows import cut_windows, even_offsets, random_offsets, split_by_time
+
+_MIN_DISJOINT = 20  # disjoint windows below which a part is read through overlapping ones
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """Where real telemetry comes from.
+
+    Args:
+        path: The file.
+        column: Which column holds the values.
+        time: Which column holds the times, or None.
+    """
+
+    path: Path
+    column: str | None = None
+    time: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """One series with its parts, its coarse simulator and, where known in closed form, its true signal.
+
+    Args:
+        telemetry: The whole series.
+        train: Its training part.
+        calibration: The part that thresholds come from, or None.
+        test: The part that everything is measured on.
+        coarse: Its coarse simulator.
+        periods_s: Periods of the sines it is made of, or None where nobody knows.
+        amplitudes: Their amplitudes, or None.
+    """
+
+    telemetry: Telemetry
+    train: Telemetry
+    calibration: Telemetry | None
+    test: Telemetry
+    coarse: SquareWaveSimulator
+    periods_s: tuple[float, ...] | None = None
+    amplitudes: tuple[float, ...] | None = None
+
+    @property
+    def truth(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """The noiseless signal as a function of time, or None where nobody knows it."""
+        return None if self.periods_s is None else functools.partial(sines, periods_s=self.periods_s, amplitudes=self.amplitudes)
+
+
+def waves_of(settings: Settings) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Periods and amplitudes of each series of the paper's example, by the series' name."""
+    chosen = settings.telemetry
+    if chosen.layout == "separate":
+        return {
+            "orbit": ((chosen.orbit_period_s,), (chosen.orbit_amplitude,)),
+            "rotation": ((chosen.rotation_period_s,), (chosen.rotation_amplitude,)),
+        }
+    return {"orbit and rotation": ((chosen.orbit_period_s, chosen.rotation_period_s), (chosen.orbit_amplitude, chosen.rotation_amplitude))}
+
+
+def least_part(settings: Settings) -> int:
+    """Fewest samples of a part: ten overlapping windows of noise, and what the moving average cuts off around them."""
+    return settings.telemetry.window + 9 + settings.noise.moving_average - 1
+
+
+def draw(settings: Settings, purpose: str) -> np.random.Generator:
+    """The generator of one purpose: draws for one do not move those for another."""
+    return np.random.default_rng([settings.seed, zlib.crc32(purpose.encode())])
+
+
+def draw_noise(settings: Settings, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    """The noise of the example telemetry, float64 of shape `(num_samples,)`.
+
+    Args:
+        settings: Every number; `telemetry.noise` names the process.
+        num_samples: Length of the series.
+        rng: Owner of the draws.
+
+    Raises:
+        InputError: If nobody knows a process of that name.
+    """
+    chosen = settings.telemetry
+    if chosen.noise not in NOISES:
+        raise InputError(f"Expected telemetry.noise to be one of {', '.join(NOISES)}. Received: {chosen.noise!r}.")
+    process = NOISES[chosen.noise]
+    return chosen.noise_sd / process.standard_deviation * process.draw(num_samples, rng)
+
+
+def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -> None:
+    """Places the telemetry in the store: the paper's example, or a real channel.
+
+    Args:
+        store: The store.
+        settings: Every number.
+        source: A file of real telemetry, or None for the paper's example.
+    """
+    chosen = settings.telemetry
+    if source is not None:
+        store.write(read_telemetry(source.path, source.column, source.time, 2 * least_part(settings)))
+        return
+    rng = draw(settings, "telemetry")
+    for name, (periods, amplitudes) in waves_of(settings).items():
+        clean = sines(chosen.interval_s * np.arange(chosen.num_samples), periods, amplitudes)
+        values = (clean + draw_noise(settings, chosen.num_samples, rng)).astype(np.float32)
+        store.write(Telemetry(values, chosen.interval_s, start="2020-01-01T00:00:00+00:00", name=name))
+
+
+class Data:
+    """The telemetry of a run, read back from the store, and its windows.
+
+    Args:
+        store: The store.
+        settings: Every number.
+        is_paper: Whether the store holds the paper's example, where the truth is known.
+    """
+
+    def __init__(self, store: ParquetStore, settings: Settings, is_paper: bool):
+        self.settings, self.window = settings, settings.telemetry.window
+        make = self._paper_channel if is_paper else self._real_channel
+        self.channels = [make(store.read(name)) for name in store.names()]
+
+    def _paper_channel(self, series: Telemetry) -> Channel:
+        split = self.settings.split
+        parts = split_by_time(series, (split.train, split.calibration, split.test), self.window)
+        periods, amplitudes = waves_of(self.settings)[series.name]
+        pairs, levels = zip(periods, amplitudes, strict=True), self.settings.enhancer.num_levels
+        coarse = SquareWaveSimulator([SquareWave(period, low=-size, high=size, num_levels=levels) for period, size in pairs])
+        return Channel(series, *parts, coarse, periods, amplitudes)
+
+    def _real_channel(self, series: Telemetry) -> Channel:
+        # a real channel is short: the gap between the parts gives way before either part falls below a window of noise
+        least = least_part(self.settings)
+        test_length = max(int((1 - self.settings.split.real_train) * len(series)), least)
+        gap = min(self.window, max(0, len(series) - test_length - least))
+        train, test = series.part(0, len(series) - test_length - gap), series.part(len(series) - test_length, len(series))
+        for name, part in (("training", train), ("test", test)):
+            check_values(part.values, f"the {name} part of {series.name}")
+            noise = extract_noise(part.values, self.settings.noise.moving_average)[0]
+            if np.std(noise, dtype=np.float64) <= 1e-5 * np.std(part.values, dtype=np.float64):  # float32 resolves no less
+                raise InputError(
+                    f"Expected noise around the moving average. Received: none in the {name} part of {series.name}. Choose another channel."
+                )
+        return Channel(series, train, None, test, SquareWaveSimulator.fit(train, num_levels=self.settings.enhancer.num_levels))
+
+    def draw(self, purpose: str) -> np.random.Generator:
+        """The generator of one purpose."""
+        return draw(self.settings, purpose)
+
+    @property
+    def num_test_windows(self) -> int:
+        """Test windows that share no sample: the sample size of every rate measured on the test part."""
+        return sum(len(channel.test) // self.window for channel in self.channels)
+
+    @functools.cached_property
+    def units(self) -> tuple[float, float, float]:
+        """Offset and scale of the signal and scale of the noise; a real channel is normalised, the paper's is not."""
+        channel = self.channels[0]
+        if channel.truth is not None:
+            return 0.0, 1.0, 1.0
+        return *units_of(channel.coarse), noise_unit(extract_noise(channel.train.values, self.settings.noise.moving_average)[0])
+
+    def windows(self, part: str, num_windows: int | None, purpose: str = "", synchronised: bool = False) -> dict[str, np.ndarray]:
+        """Paired windows of one part of every channel, as many of each.
+
+        Args:
+            part: `train`, `calibration` or `test`.
+            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
+            purpose: Names the draw of the offsets.
+            synchronised: Whether the coarse simulator's clock is set to each window, instead of running on from training.
+
+        Returns:
+            `coarse`, `target` (the telemetry) and `truth` (the noiseless signal where known, else the telemetry),
+            each of shape `(windows, samples)`.
+        """
+        rng, found = self.draw(purpose), []
+        for channel in self.channels:
+            series = getattr(channel, part)
+            offsets = self._offsets(len(series), num_windows, rng)
+            coarse, target = paired_windows(series, channel.coarse, offsets, self.window)
+            times = series.time_s[offsets[:, None] + np.arange(self.window)]
+            if synchronised:
+                coarse = channel.coarse.simulate(channel.coarse.synchronise(times, target))
+            truth = target if channel.truth is None else channel.truth(times).astype(np.float32)
+            found.append({"coarse": coarse, "target": target, "truth": truth})
+        return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}
+
+    def noise_windows(self, part: str, num_windows: int | None, purpose: str = "") -> np.ndarray:
+        """Windows of the noise that the moving average leaves of a part.
+
+        Args:
+            part: `train`, `calibration` or `test`.
+            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
+            purpose: Names the draw of the offsets.
+
+        Returns:
+            float32 array of shape `(windows, samples)`.
+        """
+        rng = self.draw(purpose)
+        noises = [extract_noise(getattr(channel, part).values, self.settings.noise.moving_average)[0] for channel in self.channels]
+        return np.concatenate([cut_windows(noise, self._offsets(len(noise), num_windows, rng), self.window) for noise in noises])
+
+    def _offsets(self, num_samples: int, num_windows: int | None, rng: np.random.Generator) -> np.ndarray:
+        if num_windows is not None:
+            return random_offsets(num_samples, self.window, num_windows // len(self.channels), rng)
+        disjoint = num_samples // self.window
+        few = disjoint < _MIN_DISJOINT  # a short real channel: windows must overlap, and nothing may be counted by them
+        return even_offsets(num_samples, self.window, min(200, num_samples - self.window + 1) if few else disjoint)
+
+    def degraded_times(self) -> np.ndarray:
+        """Times of the windows that degraded modes are measured on, shape `(windows, samples)`."""
+        begins = self.draw("degraded windows").integers(0, 10**6, self.settings.detectors.num_windows)
+        return self.settings.telemetry.interval_s * (begins[:, None] + np.arange(self.window, dtype=np.float64))
+
+    def degraded_coarse(self, scenario: Degraded | None) -> np.ndarray:
+        """The coarse simulator in a degraded mode, at `degraded_times`."""
+        return self.channels[0].coarse.simulate(self.degraded_times(), scenario, self.draw(f"degraded {scenario}"))
+
+    def degraded_truth(self, scenario: Degraded | None, noisy: bool) -> np.ndarray:
+        """What the true vehicle of the paper's example sends in that mode, at the same times, with the same draws."""
+        channel, rng = self.channels[0], self.draw(f"degraded {scenario}")
+        size = sum(channel.amplitudes)
+        clean = degrade(channel.truth, self.degraded_times(), scenario, (-size, size), min(channel.periods_s), rng)
+        noise = draw_noise(self.settings, clean.size, self.draw(f"degraded noise {scenario}"))
+        return (clean + noise.reshape(clean.shape) if noisy else clean).astype(np.float32)

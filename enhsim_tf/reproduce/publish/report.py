@@ -1,0 +1,184 @@
+"""What the experiment on robustness found, in words: the report in `docs/`, the README's table, the lines of the command.
+
+No number is written here: each comes from the findings, and a test renders the report again from the tables.
+"""
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.common.atomic_files import make_folder, replace_file
+from enhsim_tf.reproduce.caption import in_seeds
+from enhsim_tf.reproduce.publish.wording import (
+    Findings,
+    interval,
+    number,
+    p_value,
+    per_cent,
+    points,
+    reached,
+    share,
+    share_c8,
+    tries_found,
+    verdict_c8,
+    words,
+)
+
+PATH = Path("docs") / "REPORT.md"
+TABLES = (Path("docs") / "designs.csv", Path("docs") / "tries.csv")  # on the way to the second generator; where it misses a bar
+
+
+def render(
+    found: Findings,
+    labelled: Findings | None = None,
+    designs: Sequence[Mapping[str, str]] = (),
+    tries: Sequence[Mapping[str, str]] = (),
+    timing: Findings | None = None,
+    template: str = "report.md.jinja",
+) -> str:
+    """The report as Markdown.
+
+    Args:
+        found: The findings.
+        labelled: Those of the study of real telemetry, or None where there was none.
+        designs: Rows of what was tried on the way to the second generator, as `designs_of` reads them.
+        tries: Those of what was tried where it misses a bar.
+        timing: What the benchmark measured of its iteration, as `timing_of` reads it.
+        template: Its template, beside this module.
+    """
+    import jinja2
+
+    from enhsim_tf.reproduce.settings import make_settings
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {
+        "per_cent": per_cent,
+        "interval": interval,
+        "points": points,
+        "p_value": p_value,
+        "reached": reached,
+        "in_seeds": in_seeds,
+        "share": share,
+    }
+    settings, tried = make_settings(found["budget"]), [_tried(row) for row in tries]
+    return environment.get_template(template).render(
+        found=found,
+        labelled=labelled,
+        designs=designs,
+        tries=tried,
+        tries_found=tries_found(tried),
+        timing=timing,
+        controls=found["negative_controls"],
+        settings=settings,
+        words=words(found, settings),
+        c8=share_c8(found),
+        c8_ours=share_c8(found, "ours + GAN"),
+    )
+
+
+def findings_of(root: Path, name: str) -> Findings | None:
+    """The findings that a project keeps of an experiment, or None.
+
+    Args:
+        root: Folder of the project.
+        name: `robustness` or `labelled`.
+    """
+    path = root / "figures" / name / "findings.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def designs_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a table of designs that were tried, a row a training; none where there is no such file."""
+    if not path.is_file():
+        return []
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def timing_of(root: Path) -> Findings | None:
+    """What the project's benchmark measured of the second generator's iteration: `ratio`, `bar` and `reached`; or None."""
+    path = root / "benchmarks" / "results.json"
+    rows = json.loads(path.read_text(encoding="utf-8"))["rows"] if path.is_file() else []
+    return next((row for row in rows if row["of"] == "second"), None)
+
+
+def _tried(row: Mapping[str, str]) -> dict[str, Any]:
+    """A row of the tries as the report shows it: how many measures are within twice their floor, and which is furthest."""
+    from enhsim_tf.realism.real_floor import MEASURES
+    from enhsim_tf.reproduce.robustness.targets import LARGEST_RATIO
+
+    ratios = {measure.name: float(row[measure.name]) for measure in MEASURES}
+    worst = max(ratios, key=ratios.__getitem__)
+    within = sum(ratio <= LARGEST_RATIO for ratio in ratios.values())
+    return {**row, "within": within, "number": len(ratios), "worst": worst, "largest": number(ratios[worst])}
+
+
+def report(found: Findings, root: Path) -> None:
+    """Writes the report and the README's part on the experiment; each only where it exists or may be made.
+
+    Args:
+        found: The findings of a full run.
+        root: Folder of the project.
+    """
+    from enhsim_tf.reproduce.publish.results import fill_parts
+    from enhsim_tf.reproduce.spacecraft import run as labelled_run
+
+    labelled = findings_of(root, "labelled")
+    make_folder(root / PATH.parent)
+    with replace_file(root / PATH) as temporary:
+        text = render(found, labelled, *(designs_of(root / path) for path in TABLES), timing_of(root))
+        temporary.write_text(text, encoding="utf-8")
+    parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
+    readme = root / "README.md"
+    if readme.is_file():
+        text = readme.read_text(encoding="utf-8")
+        parts = {name: part for name, part in parts.items() if f"<!-- {name}: generated -->" in text}
+        with replace_file(readme) as temporary:
+            temporary.write_text(fill_parts(text, parts, readme.name), encoding="utf-8")
+
+
+def table(found: Findings) -> str:
+    """The README's table: false alarms by arm and environment, and recall."""
+    from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
+    from enhsim_tf.detection.detectors import DETECTORS
+    from enhsim_tf.reproduce.settings import make_settings
+
+    names = found["environments"]
+    lines = [
+        f"| trained on | {' | '.join(names)} | recall | gap closed |",
+        f"|---|{'---|' * len(names)}---|---|",
+    ]
+    for arm, about in found["arms"].items():
+        cells = [interval(about["by_environment"][name]["false_alarms"]) for name in names]
+        lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {per_cent(about['gap_closed'], 0)} |")
+    seeds, rate = found["seeds"], make_settings(found["budget"]).robustness.false_alarm_rate
+    return "\n".join(lines) + (
+        f"\n\nFalse alarms on {found['num_windows']:,} nominal windows of the example telemetry that plays the part of the real, mean over {len(DETECTORS)} detectors "
+        f"set for {per_cent(rate, 0)}, with its 95 % interval over {in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}) and blocks of time; recall at the arm's own threshold, mean "
+        f"over {len(INJECTIONS)} kinds of anomaly and {len(SEVERITIES)} severities; gap closed: share of the way from *coarse* to *real*, mean over replicates. "
+        "From `figures/robustness/findings.json`."
+    )
+
+
+def verdict_lines(found: Findings) -> list[str]:
+    """What the command says at its end."""
+    kept, total = share_c8(found)
+    lines = [
+        f"C8  {verdict_c8(found)}: with the paper's generated noise, false alarms and recall are near the real-trained ones "
+        f"in {kept} of {total} pairs of environment and detector"
+    ]
+    for name, bar in found["bars"].items():
+        words = {True: "reached", False: "not reached"}[bar["excess_reached"] and bar["recall_reached"] and bar["autoregression_reached"]]
+        lines.append(
+            f"    {name:15} second generator: excess of false alarms {points(bar['excess'])} points, recall {points(bar['recall_difference'])} points "
+            f"from the real-trained: {words}"
+        )
+    return lines

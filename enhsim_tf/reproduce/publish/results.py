@@ -1,0 +1,187 @@
+"""What a run leaves behind: the table on the terminal, `results.json`, and the generated parts of the README."""
+
+import collections
+import json
+import math
+import platform
+import re
+import shutil
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.reproduce.paper.claims import title_verdict
+from enhsim_tf.reproduce.paper.pipeline import Experiment
+from enhsim_tf.reproduce.settings import deviations
+from enhsim_tf.reproduce.stages import VERSIONS
+
+_SPEED = "C2"
+PAPER = "the paper's example"  # what `results.json` names as the source where no file of real telemetry is
+
+
+def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s: float) -> dict[str, Any]:
+    """Everything a run found, as `results.json` holds it; each stage with the seconds it took when it was done.
+
+    Args:
+        experiment: What was run.
+        claims: The judged claims.
+        drawn_s: Seconds that the figures took.
+        total_s: Seconds that this run took.
+    """
+    stages = experiment.stages
+    timings = stages.seconds | {"figures": drawn_s}
+    return {
+        "budget": experiment.settings.budget,
+        "seed": experiment.settings.seed,
+        "source": PAPER if experiment.is_paper else experiment.source.path.name,
+        "verdict": title_verdict(claims),
+        "versions": {"python": platform.python_version(), **VERSIONS},
+        "claims": claims,
+        "timings": {name: round(seconds, 2) for name, seconds in timings.items()},
+        "from_cache": [name for name, cached in stages.cached.items() if cached],
+        "this_run_s": round(total_s, 2),
+    }
+
+
+def table(claims: list[dict]) -> str:
+    """The claims as a table for the terminal, as wide as it is."""
+    width = max(60, min(shutil.get_terminal_size((120, 24)).columns, 140))
+    lines = []
+    for claim in claims:
+        lines.append(f"{claim['id']}  {claim['verdict']:24}  {claim['statistic']}: {short(claim['value'])} ({claim['tolerance']})")
+        lines += textwrap.wrap(claim["finding"], width, initial_indent="    ", subsequent_indent="    ")
+    return "\n".join(lines)
+
+
+def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The ranges and verdicts over further seeds, with this run's own in the place of those that its seed had before.
+
+    Those of another budget or of an older run say nothing of this one. A speed is of one machine at one time and has no
+    range over seeds.
+    """
+    path = folder / "spread.json"
+    spread = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    if spread is None or spread["budget"] != found["budget"] or found["seed"] not in spread["seeds"]:
+        return None
+    first, here = found["claims"][0], spread["seeds"].index(found["seed"])
+    if {claim["id"] for claim in found["claims"]} != set(spread["claims"]):
+        return None
+    if short(first["value"]) not in map(short, spread["claims"][first["id"]]["values"]):
+        return None
+    for claim in found["claims"]:
+        over = spread["claims"][claim["id"]]
+        over["values"][here], over["verdicts"][here] = claim["value"], claim["verdict"]
+        values = [value for value in over["values"] if value is not None]
+        over["range"] = [min(values), max(values)] if values and claim["id"] != _SPEED else None
+    return spread
+
+
+def disagreement(spread: Mapping[str, Any] | None, claim_id: str) -> str:
+    """The verdicts on a claim over seeds, counted, where seeds come to different ones; else nothing."""
+    counted = collections.Counter(spread["claims"][claim_id]["verdicts"]) if spread is not None else {}
+    return ", ".join(f"{number} {name}" for name, number in counted.items()) if len(counted) > 1 else ""
+
+
+def fill_readme(path: Path, folder: Path) -> None:
+    """Writes the generated parts of the README between their markers, and the verdict into its title.
+
+    Args:
+        path: The README; nothing is done where it does not exist.
+        folder: Holds `results.json` of a full run, and `spread.json` where further seeds were run.
+    """
+    if not path.is_file():
+        return
+    found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    text, spread = path.read_text(encoding="utf-8"), read_spread(folder, found)
+    if ": generated -->" not in text:  # somebody else's
+        return
+    parts = {
+        "claims": claims_table(found, spread),
+        "channels": channels_table(sorted(folder.glob("*/results.json"))),
+        "deviations": deviations_table(),
+        "timings": timings_table(found),
+    }
+    text = fill_parts(text, parts, path.name)
+    text = re.sub(r"\A# (\[.*?\] )?", f"# {title_verdict(found['claims'], spread)} ", text)
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def fill_parts(text: str, parts: Mapping[str, str], where: str) -> str:
+    """A text with new contents between its markers.
+
+    Args:
+        text: Markdown that holds the markers of each part once.
+        parts: Contents by name.
+        where: The text's name, for the error.
+
+    Raises:
+        InputError: If the markers of a part are not there once.
+    """
+    for name, content in parts.items():
+        pattern = re.compile(rf"(<!-- {name}: generated -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
+        text, count = pattern.subn(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
+        if count != 1:
+            raise InputError(f"Expected the markers of '{name}' once in {where}. Received: {count}. Put them back.")
+    return text
+
+
+def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = None) -> str:
+    """The claims as a Markdown table, with the range over seeds where it is known."""
+    lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
+    for claim in found["claims"]:
+        value, verdict, differ = short(claim["value"]), f"**{claim['verdict']}**", disagreement(spread, claim["id"])
+        if spread is not None and spread["claims"][claim["id"]]["range"] is not None:
+            value += " ({} to {})".format(*map(short, spread["claims"][claim["id"]]["range"]))
+        verdict += f" (over seeds: {differ})" if differ else ""
+        lines.append(
+            f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "
+            f"| {verdict} | {claim['finding']} |"
+        )
+    seeds = "" if spread is None else f"; in brackets the range over seeds {', '.join(map(str, spread['seeds']))}"
+    return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget{seeds}. From `figures/results.json`."
+
+
+def short(value: float | None) -> str:
+    """A number with three significant digits, from 1,000 on with all before the point; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.3g}" if abs(value) < 999.5 else f"{value:,.0f}"
+
+
+def channels_table(files: Sequence[Path]) -> str:
+    """What the pipeline reached on real channels, one row a `results.json`, in Markdown."""
+    names, judged = ("nrmse", "ridge_nrmse", "identity_nrmse"), ("C1", "C4", "C5", "C6", "C7")
+    lines = [
+        "| channel | enhanced | ridge regression | coarse | enhanced, in step | ridge, in step | coarse, in step "
+        f"| disjoint test windows | {' | '.join(judged)} |",
+        "|---|---|---|---|---|---|---|---|" + "---|" * len(judged),
+    ]
+    for file in files:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        claims = {claim["id"]: claim for claim in found["claims"]}
+        errors = [f"{claims['C1']['details'][prefix + name]:.3f}" for prefix in ("", "synchronised_") for name in names]
+        number = claims["C3"]["finding"].partition(" ")[0]  # why C3 is not measured begins with it
+        verdicts = " | ".join(claims[name]["verdict"] for name in judged)
+        lines.append(f"| `{found['source']}` | {' | '.join(errors)} | {number} | {verdicts} |")
+    return "\n".join(lines)
+
+
+def deviations_table() -> str:
+    """The deviations table in Markdown: each setting, the paper's and the author's value, and why ours is what it is."""
+    lines = ["| setting | ours | paper | author's code | source |", "|---|---|---|---|---|"]
+    lines += [f"| `{row['setting']}` | {row['ours']} | {row['paper']} | {row['author']} | {row['source']} |" for row in deviations()]
+    return "\n".join(lines)
+
+
+def timings_table(found: Mapping[str, Any]) -> str:
+    """Seconds of each stage in Markdown."""
+    rows = [f"| {name} | {seconds:.1f} |" for name, seconds in found["timings"].items()]
+    total = sum(found["timings"].values())
+    lines = ["| stage | seconds |", "|---|---|", *rows, f"| **sum** | **{total:.0f}** |"]
+    if found["from_cache"]:
+        lines += ["", f"Found in the cache, with the seconds that they took when they were done: {', '.join(found['from_cache'])}."]
+    return "\n".join(lines)

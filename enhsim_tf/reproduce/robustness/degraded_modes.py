@@ -1,0 +1,185 @@
+"""Degraded modes (claim C9), in full: where does the enhanced simulator stay near the truth, and does it know where not?
+
+In the example the true degraded signal is known. Enhancers and baselines are compared with it, mode by mode, inside and
+outside the severities that the randomised ones were trained on; and the out-of-range score of each window with its error.
+"""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
+from enhsim_tf.detection import metrics as detection
+from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.realism import measures as fidelity
+from enhsim_tf.reproduce import statistics as inference
+from enhsim_tf.reproduce.robustness.replicate import Replicate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from enhsim_tf.keras_tools.backend import keras
+
+SEVERITIES = (0.1, 0.25, 0.5, 0.75, 1.0)
+LARGEST_TRAINED = 0.5  # severity up to which the randomised enhancer has seen each mode
+WIDTHS = (11, 25, 49, 75, 121, 181, 241)  # of the moving average that smooths the coarse signal; the best in training is taken
+METHODS = {
+    "identity": "the coarse signal as it is",
+    "moving average": "the coarse signal, smoothed",
+    "ridge": "linear regression from nominal coarse windows",
+    "ridge, randomised": "the same from windows of all modes, with their true response",
+    "paper": "the paper's enhancer: 1,500 nominal windows, 40 epochs",
+    "more windows": "15,000 nominal windows, 2 epochs, a rate that falls",
+    "randomised": "the same over nominal and degraded configurations, with their true response",
+}
+"""From coarse windows to an estimate of the true ones."""
+SCORED = {"paper": "nominal", "more windows": "nominal", "randomised": "randomised"}
+"""Enhancers whose windows are scored, and which windows trained them."""
+TABLES = ("degraded", "trust", "trust_correlation")
+
+
+class DegradedModes:
+    """The grid of one replicate: methods by modes by severities.
+
+    Args:
+        replicate: The replicate, which has trained both nominal enhancers.
+    """
+
+    def __init__(self, replicate: Replicate):
+        self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
+        self.data = replicate.experiment.data
+
+    @functools.cached_property
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """`degraded` (error by method, mode and severity), `trust` (error by tenths of the score) and `trust_correlation`."""
+        import pandas as pd
+
+        _ = self.replicate.experiment.enhancer_folder, self.replicate.second_simulator
+        chosen = self.settings
+        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.modes, chosen.second, chosen.seed)
+        after, modules = ("telemetry", "enhancer", "second"), ("reproduce.robustness.degraded_modes",)
+        folder = self.stages.run("degraded modes", self._make, modules, depends, after)
+        return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
+
+    def _make(self, folder: Path) -> None:
+        import pandas as pd
+
+        nominal, randomised = self._nominal_pairs(), self._randomised_pairs()
+        methods = self._methods(nominal, randomised)
+        training = {"nominal": nominal[0], "randomised": randomised[0]}
+        scores = {name: OutOfRange().fit(windows) for name, windows in training.items()}
+        unit = float(np.std(self._pairs(None, self.settings.modes.num_windows, "unit")[1]))
+        limits = {}
+        for name, score in scores.items():
+            held_out = self._pairs(None, 1_000, f"limit {name}")[0]
+            limits[name] = detection.threshold(score.score(held_out), self.settings.robustness.false_alarm_rate)
+
+        cells, per_window = [], {name: [] for name in SCORED}
+        tried = [("nominal", 0.0), *((mode, severity) for mode in MODES for severity in SEVERITIES)]
+        told = self.stages.progress.loop("mode and severity", len(tried))
+        for done, (mode, severity) in enumerate(tried, 1):
+            scenario = None if mode == "nominal" else Degraded(mode, severity)
+            coarse, truth = self._pairs(scenario, self.settings.modes.num_windows, f"test {mode} {severity}")
+            found = {name: score.score(coarse) for name, score in scores.items()}
+            for method, estimate in methods.items():
+                errors = np.sqrt(np.mean((estimate(coarse) - truth) ** 2, axis=1, dtype=np.float64)) / unit
+                about = {"method": method, "mode": mode, "severity": severity, "nrmse": float(np.sqrt(np.mean(errors**2)))}
+                if method in SCORED:
+                    score = found[SCORED[method]]
+                    about |= {"score": float(np.mean(score)), "flagged": float(np.mean(score > limits[SCORED[method]]))}
+                    cell = np.full(len(score), len(cells))
+                    per_window[method].append(pd.DataFrame({"score": score, "error": errors, "cell": cell}))
+                cells.append(about)
+            told(done)
+
+        tenths, correlations = [], []
+        for method, parts in per_window.items():
+            windows = pd.concat(parts)
+            found = inference.rank_correlation(windows["score"], windows["error"], windows["cell"], num_resamples=200)
+            trusted = windows["score"] <= limits[SCORED[method]]
+            correlations.append(
+                {
+                    "method": method,
+                    "rank_correlation": found.estimate,
+                    "low": found.low,
+                    "high": found.high,
+                    "trusted": float(trusted.mean()),
+                    "error_trusted": float(windows["error"][trusted].median()),
+                    "error_flagged": float(windows["error"][~trusted].median()),
+                }
+            )
+            for tenth, group in windows.groupby(pd.qcut(windows["score"], 10, labels=False, duplicates="drop")):
+                low, median, high = group["error"].quantile([0.1, 0.5, 0.9])
+                tenths.append(
+                    {"method": method, "tenth": tenth, "score": group["score"].median(), "low": low, "median": median, "high": high}
+                )
+        for name, rows in zip(TABLES, (cells, tenths, correlations), strict=True):
+            pd.DataFrame(rows).assign(seed=self.settings.seed).to_parquet(folder / f"{name}.parquet")
+
+    def _pairs(self, scenario: Degraded | None, num_windows: int, purpose: str) -> tuple[np.ndarray, np.ndarray]:
+        """Coarse windows in a mode, and what the true vehicle's noiseless signal is, at the same times with the same draws."""
+        channel, chance = self.data.channels[0], int(self.data.draw(purpose).integers(2**31))
+        begins = np.random.default_rng(chance).integers(0, 10**6, num_windows)
+        times = self.settings.telemetry.interval_s * (begins[:, None] + np.arange(self.data.window, dtype=np.float64))
+        size, shortest = sum(channel.amplitudes), min(channel.periods_s)
+        coarse = channel.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
+        truth = degrade(channel.truth, times, scenario, (-size, size), shortest, np.random.default_rng(chance + 1))
+        return coarse, truth.astype(np.float32)
+
+    def _nominal_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        windows = self.data.windows("train", self.settings.second.num_windows, "nominal configurations")
+        return windows["coarse"], windows["target"]
+
+    def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coarse and noisy true windows of configurations drawn at random: a seventh nominal, the rest degraded."""
+        chosen, draws = self.settings, self.data.draw("configurations")
+        per_configuration = chosen.modes.windows_per_configuration
+        parts = []
+        for number in range(chosen.second.num_windows // per_configuration):
+            mode = (None, *MODES)[number % (1 + len(MODES))]
+            severity, onset = draws.uniform(0, LARGEST_TRAINED), draws.uniform(0, 0.75)
+            scenario = None if mode is None else Degraded(mode, severity, onset)
+            parts.append(self._pairs(scenario, per_configuration, f"configuration {number}"))
+        coarse, truth = (np.concatenate(each) for each in zip(*parts, strict=True))
+        noise = draws.normal(0, chosen.telemetry.noise_sd, truth.shape).astype(np.float32)
+        return coarse, truth + noise
+
+    def _methods(
+        self, nominal: tuple[np.ndarray, np.ndarray], randomised: tuple[np.ndarray, np.ndarray]
+    ) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+        from scipy.ndimage import uniform_filter1d
+        from sklearn.linear_model import Ridge
+
+        from enhsim_tf.enhancer import network as enhancer
+
+        def smooth(width: int) -> Callable[[np.ndarray], np.ndarray]:
+            return functools.partial(uniform_filter1d, size=width, axis=1, mode="nearest")
+
+        width = min(WIDTHS, key=lambda each: fidelity.nrmse(smooth(each)(nominal[0][:1_000]), nominal[1][:1_000]))
+        network = self._train(*randomised)
+        estimates = (
+            lambda coarse: coarse,
+            smooth(width),
+            Ridge(alpha=1.0).fit(*nominal).predict,
+            Ridge(alpha=1.0).fit(*randomised).predict,
+            self.replicate.experiment.simulator.enhance,
+            self.replicate.second_simulator.enhance,
+            functools.partial(enhancer.enhance, network),
+        )
+        return dict(zip(METHODS, estimates, strict=True))
+
+    def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
+        """The second pipeline's enhancer, as it is trained there, on other windows."""
+        from enhsim_tf.enhancer.network import build_enhancer
+        from enhsim_tf.keras_tools.backend import keras
+        from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
+
+        seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.enhancer.batch_size
+        network = build_enhancer(self.data.window, seed=seed)
+        rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
+        callbacks = [EpochsDone(self.stages.progress.loop("enhancer, epoch", epochs))]
+        fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=callbacks, verbose=self.replicate.verbose)
+        return network

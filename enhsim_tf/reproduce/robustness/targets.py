@@ -1,0 +1,59 @@
+"""The second generator against what it was asked for: aims that were fixed before the runs, and whether they are reached."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from enhsim_tf.reproduce.robustness.averages import by_block, by_replicate, interval
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KINDS_OF_NOISE = {"Gaussian": ("white", "autoregressive"), "not Gaussian": ("heteroscedastic", "shot")}
+BARS = {"white": (0.01, 0.02), "autoregressive": (0.01, 0.02), "heteroscedastic": (0.01, 0.02), "shot": (0.03, None)}
+"""Largest excess of the second generator's false-alarm rate over the real-trained arm's, and of its upper 95 % bound."""
+LARGEST_RECALL_DIFFERENCE, LARGEST_RATIO = 0.02, 2.0
+MARGIN = 0.005
+"""False alarms by which an arm may be above another and still count as not worse, at its upper 95 % bound."""
+
+
+def bars(alarms: "pd.DataFrame", recall: "pd.DataFrame", ratios: "pd.DataFrame", environments: Sequence[str]) -> dict[str, Any]:
+    """Excess of false alarms, recall, false alarms against a fitted autoregression's, and realism, environment by environment.
+
+    Args:
+        alarms: The table of that name.
+        recall: The table of that name.
+        ratios: As `realism_findings.floor_ratios` gives them.
+        environments: Which.
+    """
+    rate, found = by_block(alarms), by_replicate(recall, "recall")
+    excess, over = rate["ours + GAN"] - rate["real"], rate["ours + GAN"] - rate["ours + AR"]
+    difference = found["ours + GAN"] - found["real"]
+    reports = {}
+    for name in environments:
+        largest, bound = BARS[name]
+        about, recalled, against = interval(excess, name), interval(difference, name), interval(over, name)
+        is_gaussian, ratio = name in KINDS_OF_NOISE["Gaussian"], ratios.loc["ours + GAN", name]
+        reports[name] = {
+            "excess": about,
+            "largest_excess": largest,
+            "largest_bound": bound,
+            "excess_reached": bool(about["mean"] <= largest and (bound is None or about["high"] <= bound)),
+            "recall_difference": recalled,
+            "recall_reached": bool(abs(recalled["mean"]) <= LARGEST_RECALL_DIFFERENCE),
+            "over_autoregression": against,
+            "autoregression_asked": "not worse" if is_gaussian else "better",
+            "autoregression_reached": bool(against["high"] <= MARGIN if is_gaussian else against["high"] < 0),
+            "ratios": {measure: float(value) for measure, value in ratio.items()},
+            "measures_within": int((ratio <= LARGEST_RATIO).sum()),
+            "num_measures": int(len(ratio)),
+        }
+    return reports
+
+
+def not_inferior(alarms: "pd.DataFrame") -> dict[str, Any]:
+    """False alarms with each pipeline's GAN against those with blocks of the noise that it learnt from, within the margin."""
+    rate, found = by_block(alarms), {}
+    for pipeline in ("enhanced", "ours"):
+        about = interval(rate[f"{pipeline} + GAN"] - rate[f"{pipeline} + bootstrap"])
+        found[pipeline] = {"difference": about, "margin": MARGIN, "reached": bool(about["high"] <= MARGIN)}
+    return found

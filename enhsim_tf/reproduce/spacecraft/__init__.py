@@ -1,0 +1,1 @@
+"""The study of real spacecraft telemetry with labelled anomalies."""

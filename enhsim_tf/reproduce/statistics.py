@@ -1,0 +1,386 @@
+"""What an experiment allows to be said: intervals and tests whose replicates are environments, seeds and blocks of time.
+
+Windows of one trained detector share its training, so they are no replicates: a hundred thousand of them still make one
+run. What is resampled or tested here is therefore always a whole cluster. A table is a pandas DataFrame, a row an
+observation.
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_BATCH = 1_000_000  # rows drawn at a time
+
+
+@dataclasses.dataclass(frozen=True)
+class Interval:
+    """An estimate with its confidence interval.
+
+    Args:
+        estimate: The statistic of all the data.
+        low: Lower end.
+        high: Upper end.
+        level: Confidence, between 0 and 1.
+    """
+
+    estimate: float
+    low: float
+    high: float
+    level: float = 0.95
+
+
+@dataclasses.dataclass(frozen=True)
+class Contrast:
+    """What one arm does against another, over paired replicates; `dataclasses.asdict` makes it plain.
+
+    Args:
+        first: The arm that is subtracted from.
+        second: The arm that is subtracted.
+        num_replicates: Pairs.
+        num_clusters: Clusters of pairs that share draws.
+        mean: Mean of the differences, with a crossed bootstrap interval.
+        median: Their median, with its interval.
+        p_value: Two-sided, of the Wilcoxon signed-rank test of the clusters' means.
+        adjusted_p_value: The same by Holm over all contrasts that were declared together.
+        pooled_p_value: That of the same test of all pairs, as if they shared nothing: too small where they do.
+        parts: Mean difference in each label of the first factor.
+    """
+
+    first: str
+    second: str
+    num_replicates: int
+    num_clusters: int
+    mean: Interval
+    median: Interval
+    p_value: float
+    adjusted_p_value: float
+    pooled_p_value: float
+    parts: Mapping[str, float]
+
+
+def log_odds(alarms: np.ndarray, trials: np.ndarray) -> np.ndarray:
+    """Log-odds of a rate, with half a count added to both sides (Haldane and Anscombe), so that 0 and 1 stay finite.
+
+    Args:
+        alarms: Number of alarms, of any shape.
+        trials: Number of windows, of a shape that goes with it.
+
+    Raises:
+        InputError: If there are more alarms than trials, fewer than none, or no trials.
+    """
+    alarms, trials = np.asarray(alarms, np.float64), np.asarray(trials, np.float64)
+    if not np.all((alarms >= 0) & (alarms <= trials) & (trials > 0)):
+        raise InputError(f"Expected from 0 to as many alarms as trials, and trials. Received: alarms={alarms} of trials={trials}.")
+    return np.log((alarms + 0.5) / (trials - alarms + 0.5))
+
+
+def hierarchical_interval(
+    table: "pd.DataFrame",
+    value: str,
+    levels: Sequence[str],
+    statistic: Callable[[np.ndarray], float] = np.mean,
+    num_resamples: int = 2_000,
+    level: float = 0.95,
+    seed: int = 0,
+) -> Interval:
+    """Percentile interval by a hierarchical (nested, cluster) bootstrap.
+
+    Each resample draws, with replacement, as many clusters of the first level as there are, within each of them as many
+    of the second, and so on; the rows of a cluster of the last level stay together. Drawing on every level counts the
+    scatter of the lower ones twice and misses a share 1 / clusters of the highest one's variance: with ten clusters or
+    more on top the interval is slightly wide or about right, with four it is narrow.
+
+    Args:
+        table: The observations.
+        value: Its column of values.
+        levels: Columns that name the clusters, the outermost first; a label counts within the cluster above it.
+        statistic: From the values of a resample, shape `(rows,)`, to a number.
+        num_resamples: Bootstrap resamples.
+        level: Confidence, between 0 and 1.
+        seed: Seed of the draws.
+
+    Returns:
+        The statistic of the table and its interval.
+
+    Raises:
+        InputError: If a column is missing, a value is not finite, the table is empty or a number is out of range.
+    """
+    columns = [value, *levels]
+    if not levels or not 0 < level < 1 or num_resamples < 1 or not len(table) or not set(columns) <= set(table.columns):
+        raise InputError(
+            "Expected rows with a value and at least one level, 0 < level < 1 and num_resamples >= 1. "
+            f"Received: {len(table)} rows with columns {list(table.columns)}, columns asked for {columns}, level={level}, num_resamples={num_resamples}."
+        )
+    values = table[value].to_numpy(np.float64)
+    missing = int((~np.isfinite(values)).sum() + table[list(levels)].isna().any(axis=1).sum())
+    if missing:
+        raise InputError(f"Expected finite values and a label on every level. Received: {missing} rows of column {value!r} without.")
+    labels = [table[name].to_numpy() for name in levels]
+    found = [statistic(values[rows]) for rows in _resamples(labels, num_resamples, seed)]
+    return _percentile_interval(statistic(values), found, level)
+
+
+def crossed_interval(
+    table: "pd.DataFrame",
+    value: str,
+    factors: Sequence[str],
+    statistic: Callable[..., np.ndarray] = np.mean,
+    num_resamples: int = 2_000,
+    level: float = 0.95,
+    seed: int = 0,
+) -> Interval:
+    """Percentile interval by a bootstrap over crossed factors, such as environments that all were run with the same seeds.
+
+    Each resample draws, with replacement, labels of every factor, each factor for itself; takes the cells in which they
+    meet; and draws as many rows of each cell as it has, such as blocks of time (the pigeonhole bootstrap of Owen 2007,
+    with rows). What a seed does in all environments then stays together, where the nested bootstrap would average it
+    away. It errs on the wide side, but for a factor of few labels: with four the interval is narrow.
+
+    Args:
+        table: The observations, the same number of rows in each cell.
+        value: Its column of values.
+        factors: Columns of labels that are crossed.
+        statistic: `numpy.mean`, or another that takes an axis.
+        num_resamples: Bootstrap resamples.
+        level: Confidence, between 0 and 1.
+        seed: Seed of the draws.
+
+    Returns:
+        The statistic of the table and its interval.
+
+    Raises:
+        InputError: If a value is not finite or a cell has fewer rows than another.
+    """
+    import pandas as pd
+
+    values = table[value].to_numpy(np.float64)
+    codes = [pd.factorize(table[name])[0] for name in factors]
+    sizes = [int(each.max(initial=-1)) + 1 for each in codes]
+    cell = np.ravel_multi_index(codes, sizes) if len(values) else np.zeros(0, int)
+    counts = np.bincount(cell, minlength=int(np.prod(sizes)))
+    if not len(values) or not np.isfinite(values).all() or np.ptp(counts) or not 0 < level < 1 or num_resamples < 1:
+        raise InputError(
+            f"Expected finite values, as many in each cell of {' x '.join(factors)}, 0 < level < 1 and num_resamples >= 1. Received: "
+            f"{counts.min(initial=0)} to {counts.max(initial=0)} rows a cell, {int((~np.isfinite(values)).sum())} not finite, "
+            f"level={level}, num_resamples={num_resamples}."
+        )
+    cells = values[np.argsort(cell, kind="stable")].reshape(*sizes, counts[0])
+    rng, shape = np.random.default_rng(seed), (num_resamples, *cells.shape)
+    drawn = []
+    for axis, size in enumerate(sizes, 1):
+        labels = rng.integers(0, size, (num_resamples, size))
+        drawn.append(labels.reshape([size if each == axis else num_resamples if not each else 1 for each in range(len(shape))]))
+    found = cells[(*drawn, rng.integers(0, counts[0], shape))].reshape(num_resamples, -1)
+    return _percentile_interval(statistic(values), statistic(found, axis=1), level)
+
+
+def wilcoxon_signed_rank(differences: np.ndarray) -> float:
+    """Two-sided p-value of the Wilcoxon signed-rank test that differences of pairs are symmetric around zero.
+
+    It is exact, with ties as without: all signs are counted out.
+
+    Args:
+        differences: One a replicate, shape `(replicates,)`; zeros are left out, as Wilcoxon did.
+
+    Returns:
+        The p-value; 1 if all differences are zero.
+
+    Raises:
+        InputError: If there is no difference or one is not finite.
+    """
+    from scipy.stats import rankdata
+
+    differences = np.asarray(differences, np.float64)
+    if differences.ndim != 1 or not len(differences) or not np.isfinite(differences).all():
+        raise InputError(f"Expected finite differences of shape (replicates,). Received: {differences}.")
+    differences = differences[differences != 0]
+    ranks = np.rint(2 * rankdata(np.abs(differences))).astype(int)  # doubled: those of ties are halves
+    chance = np.zeros(ranks.sum() + 1)  # of each sum of the ranks with a plus
+    chance[0] = 1
+    for rank in ranks:
+        chance = (chance + np.concatenate([np.zeros(rank), chance[:-rank]])) / 2
+    found = ranks[differences > 0].sum()
+    return float(min(1, 2 * chance[: found + 1].sum(), 2 * chance[found:].sum()))
+
+
+def holm(p_values: Sequence[float]) -> np.ndarray:
+    """P-values adjusted for their number by Holm's step-down method: below 0.05, at most 5 % chance of any false finding.
+
+    Raises:
+        InputError: If one is not from 0 to 1.
+    """
+    p_values = np.asarray(p_values, np.float64)
+    if p_values.ndim != 1 or not np.all((p_values >= 0) & (p_values <= 1)):
+        raise InputError(f"Expected p-values from 0 to 1, of shape (tests,). Received: {p_values}.")
+    order = np.argsort(p_values, kind="stable")
+    adjusted = np.empty(len(p_values))
+    adjusted[order] = np.minimum(np.maximum.accumulate(p_values[order] * np.arange(len(p_values), 0, -1)), 1)
+    return adjusted
+
+
+def detector_averaged_log_odds(table: "pd.DataFrame", levels: Sequence[str] = ("environment", "seed")) -> "pd.DataFrame":
+    """The primary statistic of a replicate: log-odds of its false alarms, mean over detectors; a column an arm.
+
+    Args:
+        table: Rows with the columns of `levels`, `arm`, `detector`, `alarms` and `trials`; rows that agree in the first
+            ones (blocks of time) are added up.
+        levels: Columns whose values together name a replicate.
+
+    Returns:
+        Replicates in rows, their labels as index; arms in columns.
+
+    Raises:
+        InputError: If a replicate misses an arm or a detector that another one has.
+    """
+    names = [*levels, "arm", "detector"]
+    absent = {*names, "alarms", "trials"} - set(table.columns)
+    if absent or not len(table):
+        raise InputError(f"Expected rows with {', '.join(names)}, alarms and trials. Received: {len(table)} rows without {sorted(absent)}.")
+    counts = table.groupby(names, observed=True)[["alarms", "trials"]].sum()
+    cells = counts.assign(log_odds=log_odds(counts["alarms"], counts["trials"]))["log_odds"].unstack(["arm", "detector"])
+    every = table["arm"].nunique() * table["detector"].nunique()
+    if cells.isna().any(axis=None) or cells.shape[1] != every:
+        raise InputError(
+            f"Expected every arm and detector in each of {len(cells)} replicates. Received: {len(counts)} of {len(cells) * every}."
+        )
+    return cells.T.groupby(level="arm").mean().T
+
+
+def declared_contrasts(
+    table: "pd.DataFrame",
+    contrasts: Sequence[tuple[str, str]],
+    levels: Sequence[str] = ("environment", "seed"),
+    num_resamples: int = 2_000,
+    level: float = 0.95,
+    seed: int = 0,
+) -> list[Contrast]:
+    """Tests the contrasts that were declared before the experiment, all of them together.
+
+    A difference is that of the detector-averaged log-odds of two arms in one replicate. Below zero the first arm has the
+    fewer false alarms. Replicates of one seed share draws (of telemetry, weights and places), so the test takes the mean
+    of each seed over the environments, and speaks of the very environments that were tried; the interval draws
+    environments too, so it speaks of their like.
+
+    Args:
+        table: As `detector_averaged_log_odds` takes it.
+        contrasts: Pairs `(first, second)` of arms.
+        levels: Columns that together name a replicate, crossed; the last names what shares draws.
+        num_resamples: Bootstrap resamples of the intervals.
+        level: Confidence of the intervals.
+        seed: Seed of their draws.
+
+    Returns:
+        A contrast for each pair, in their order.
+
+    Raises:
+        InputError: If an arm is unknown or replicates are not paired.
+    """
+    averaged = detector_averaged_log_odds(table, levels)
+    unknown = {arm for pair in contrasts for arm in pair} - set(averaged.columns)
+    if unknown or not contrasts:
+        raise InputError(f"Expected pairs of arms, of: {', '.join(averaged.columns)}. Received: {list(contrasts)}.")
+    differences = [(averaged[first] - averaged[second]).rename("difference") for first, second in contrasts]
+    clusters = [difference.groupby(level=levels[-1]).mean() for difference in differences]
+    p_values = [wilcoxon_signed_rank(means) for means in clusters]
+    results = []
+    for (first, second), difference, means, p_value, adjusted in zip(
+        contrasts, differences, clusters, p_values, holm(p_values), strict=True
+    ):
+        mean, median = (
+            crossed_interval(difference.reset_index(), "difference", levels, statistic, num_resamples, level, seed)
+            for statistic in (np.mean, np.median)
+        )
+        results.append(
+            Contrast(
+                first=first,
+                second=second,
+                num_replicates=len(difference),
+                num_clusters=len(means),
+                mean=mean,
+                median=median,
+                p_value=p_value,
+                adjusted_p_value=float(adjusted),
+                pooled_p_value=wilcoxon_signed_rank(difference),
+                parts={str(label): float(each) for label, each in difference.groupby(level=levels[0]).mean().items()},
+            )
+        )
+    return results
+
+
+def rank_correlation(
+    x: np.ndarray,
+    y: np.ndarray,
+    clusters: np.ndarray | None = None,
+    num_resamples: int = 2_000,
+    level: float = 0.95,
+    seed: int = 0,
+) -> Interval:
+    """Spearman's rank correlation with a bootstrap interval.
+
+    Args:
+        x: One variable, shape `(rows,)`.
+        y: The other, same shape.
+        clusters: Label of each row's cluster, the rows of which stay together; None if rows are independent.
+        num_resamples: Bootstrap resamples; those that leave a variable constant say nothing and do not count.
+        level: Confidence, between 0 and 1.
+        seed: Seed of the draws.
+
+    Returns:
+        The correlation of all rows, and its interval.
+
+    Raises:
+        InputError: If the shapes differ, a number is not finite, or a variable is constant.
+    """
+    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    clusters = np.arange(len(x)) if clusters is None else np.asarray(clusters)
+    usable = x.ndim == 1 and x.shape == y.shape == clusters.shape and np.isfinite([x, y]).all()
+    if not usable or not len(x) or not np.ptp(x) or not np.ptp(y) or not 0 < level < 1:
+        raise InputError(
+            "Expected two finite variables of one shape (rows,), neither constant, and 0 < level < 1. "
+            f"Received: shapes {x.shape}, {y.shape} and {clusters.shape} of clusters, level={level}."
+        )
+    found = [_spearman(x[rows], y[rows]) for rows in _resamples([clusters], num_resamples, seed)]
+    return _percentile_interval(_spearman(x, y), found, level)
+
+
+def _spearman(x: np.ndarray, y: np.ndarray) -> float:
+    from scipy.stats import rankdata
+
+    ranks = rankdata([x, y], axis=1)
+    ranks -= ranks.mean(axis=1, keepdims=True)
+    (xx, xy), (_, yy) = ranks @ ranks.T
+    return xy / np.sqrt(xx * yy) if xx * yy > 0 else np.nan
+
+
+def _percentile_interval(estimate: float, found: list[float], level: float) -> Interval:
+    low, high = np.nanquantile(found, [(1 - level) / 2, (1 + level) / 2])
+    return Interval(float(estimate), float(low), float(high), level)
+
+
+def _resamples(labels: list[np.ndarray], num_resamples: int, seed: int) -> Iterator[np.ndarray]:
+    """Row numbers of each resample; many resamples are drawn at once, a level at a time."""
+    rng = np.random.default_rng(seed)
+    codes = np.stack([np.unique(label, return_inverse=True)[1] for label in labels])
+    order = np.lexsort(codes[::-1])  # rows of a cluster are neighbours in this order
+    ends = np.logical_or.accumulate(np.diff(codes[:, order]) != 0)  # a cluster ends wherever one above it ends
+    clusters = [np.flatnonzero(np.r_[True, end]) for end in ends]  # first row of each cluster, level by level
+    batch = max(1, _BATCH // len(order))
+    for begin in range(0, num_resamples, batch):
+        size = min(batch, num_resamples - begin)
+        resample, drawn = np.arange(size), np.zeros(size, int)
+        for parents, children in zip([np.zeros(1, int), *clusters], [*clusters, np.arange(len(order))], strict=True):
+            first = np.searchsorted(children, parents)
+            number = np.diff(first, append=len(children))[drawn]
+            if parents is clusters[-1]:  # the rows of a last cluster: all of them, once
+                place = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+            else:
+                place = rng.integers(0, np.repeat(number, number))
+            drawn, resample = np.repeat(first[drawn], number) + place, np.repeat(resample, number)
+        yield from np.split(order[drawn], np.searchsorted(resample, np.arange(1, size)))

@@ -1,0 +1,128 @@
+"""A raw column becomes numbers: text, objects, decimal commas.
+
+A cell that says nothing is missing; one that cannot be understood is refused by its place, or left to the caller to count.
+"""
+
+import decimal as decimal_module
+import numbers
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.report import Finding
+
+_MISSING = ("", "nan", "na", "n/a", "#n/a", "<na>", "null", "none", "nat")
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_INFINITE = r"[+-]?inf(?:inity)?"
+_COMMA = r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?"
+_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
+_LARGEST = float(np.finfo(np.float32).max)
+
+
+def numbers_of(values: Any, what: str, drop: bool = False, decimal: str | None = None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+    """Reads a column of values.
+
+    Args:
+        values: One-dimensional array, pandas Series or list of numbers, text or objects.
+        what: Where they come from, for messages.
+        drop: Whether what is no number becomes missing (and is marked) instead of being refused.
+        decimal: "," where commas part the decimals even where they look like thousands; None: told by the text.
+
+    Returns:
+        `(values, bad, findings)`: float64 with NaN where missing; marks of what could not be read; what was noted.
+
+    Raises:
+        InputError: If the values are not one column of numbers, or one of them is no number that float32 holds.
+    """
+    values = column(values, what)
+    if pd.api.types.is_bool_dtype(values.dtype) or pd.api.types.is_complex_dtype(values.dtype):
+        raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
+    if not (pd.api.types.is_numeric_dtype(values.dtype) or is_text(values)):
+        raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
+    findings: list[Finding] = []
+    if is_text(values):
+        parsed, bad, findings = _numbers_of_text(values.astype(object), decimal)
+    else:
+        with np.errstate(over="ignore"):
+            parsed = values.to_numpy(np.float64, na_value=np.nan)
+        bad = np.zeros(len(parsed), bool)
+        if values.dtype == np.longdouble:
+            bad = np.isinf(parsed) & np.isfinite(values.to_numpy())
+    too_fine = np.abs(parsed) > 2**53
+    if pd.api.types.is_integer_dtype(values.dtype) and too_fine.any():
+        findings.append(Finding("resolution", int(too_fine.sum()), f"integers beyond 2^53, rounded to float64: {too_fine.sum():,}"))
+    beyond = np.isfinite(parsed) & (np.abs(parsed) > _LARGEST)
+    if (bad | beyond).any() and not drop:
+        row = int(np.argmax(bad | beyond))
+        expected = f"values that float32 holds, up to {_LARGEST:.1e}" if beyond[row] else "numbers"
+        raise InputError(
+            f"Expected {expected}. Received: {shown(values.iloc[row])} at row {row} of {what}, and {int((bad | beyond).sum()) - 1:,} more. "
+            "Correct them, or leave them out with on_bad_values='drop' (--drop-bad)."
+        )
+    return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
+
+
+def column(values: Any, what: str) -> pd.Series:
+    """One column with its rows counted from 0, or an `InputError`: anything of another shape."""
+    if isinstance(values, pd.DataFrame) or np.ndim(values) != 1:
+        raise InputError(f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column.")
+    try:
+        cells = pd.Series(values).reset_index(drop=True)
+        return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
+    except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not hold
+        reason = (str(error).splitlines() or [""])[0]
+        raise InputError(f"Expected numbers. Received: {type(values).__name__} from {what} ({reason}). Give an array of numbers.") from None
+
+
+def is_text(values: pd.Series) -> bool:
+    """Whether cells are to be looked at one by one: text or objects."""
+    return values.dtype == object or pd.api.types.is_string_dtype(values.dtype)
+
+
+def shown(cell: Any) -> str:
+    """A cell as messages show it."""
+    text = repr(cell) if isinstance(cell, str) else str(cell)
+    return " ".join(text.split())[:60]
+
+
+def is_missing(cells: pd.Series) -> np.ndarray:
+    """Marks of cells that say nothing: None, NaN, and the words for it."""
+    missing = cells.isna().to_numpy(bool, copy=True)
+    of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+    missing[of_text] = cells[of_text].str.strip().str.casefold().isin(_MISSING).to_numpy(bool)
+    return missing
+
+
+def _numbers_of_text(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+    parsed, bad, findings = np.full(len(cells), np.nan), np.zeros(len(cells), bool), []
+    left = ~is_missing(cells)
+    of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+    for row in np.flatnonzero(left & ~of_text):
+        parsed[row], bad[row] = _number_of_object(cells.iloc[row])
+    rows = np.flatnonzero(left & of_text)
+    text = cells.iloc[rows].str.strip()
+    plain = text.str.fullmatch(f"{_NUMBER}|{_INFINITE}", case=False).to_numpy(bool)
+    commas = ~plain & text.str.fullmatch(_COMMA).to_numpy(bool)
+    if commas.any():
+        has_points = text[plain].str.contains(".", regex=False).any()
+        maybe_thousands = text[commas].str.fullmatch(_THOUSANDS).all() and decimal != ","
+        if has_points or maybe_thousands:  # one column is written in one way, and 1,500 can be read in two
+            commas[:] = False
+        else:
+            findings.append(Finding("decimal comma", int(commas.sum()), f"numbers written with a decimal comma: {commas.sum():,}"))
+    readable = plain | commas
+    parsed[rows[readable]] = text[readable].str.replace(",", ".", regex=False).astype(np.float64)
+    written_finite = readable & ~text.str.contains("inf", case=False).to_numpy(bool)
+    bad[rows[~readable]] = True
+    bad[rows[written_finite]] |= ~np.isfinite(parsed[rows[written_finite]])  # 1e999: a number, but none that can be held
+    return parsed, bad, findings
+
+
+def _number_of_object(cell: Any) -> tuple[float, bool]:
+    is_number = isinstance(cell, numbers.Real | decimal_module.Decimal) and not isinstance(cell, bool | np.bool_)
+    try:
+        return (float(cell), False) if is_number else (np.nan, True)
+    except (OverflowError, ValueError):  # an integer beyond float64, a signalling NaN
+        return np.nan, True

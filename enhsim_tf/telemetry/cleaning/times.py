@@ -1,0 +1,214 @@
+"""A raw column becomes times: date-times, ISO 8601 text, formats, epochs of any unit, zones and their clock changes.
+
+A cell that says nothing is missing; one that cannot be understood is refused by its place, or left to the caller to count.
+"""
+
+import datetime
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.numbers import column, is_missing, is_text, numbers_of, shown
+from enhsim_tf.telemetry.cleaning.report import Book, Finding, iso_time
+
+UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+_EPOCHS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+_YEARS_S = (3.1e8, 4.2e9)  # 1979 to 2103: numbers of this size count seconds since 1970
+_LARGEST_NS = 9.2e18  # what int64 nanoseconds since 1970 hold: years 1678 to 2262
+
+
+def stamps_of(
+    times: Any, what: str, drop: bool = False, unit: str | None = None, form: str | None = None
+) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+    """Reads a column of times.
+
+    Args:
+        times: Date-times, ISO 8601 text, objects, time spans, or numbers counted from 1970 (or from any zero).
+        what: Where they come from, for messages.
+        drop: Whether what is no time becomes missing (and is marked) instead of being refused.
+        unit: Unit of numbers, one of `UNITS_NS`; None: told by their size.
+        form: Format of text, as `datetime.strptime` takes it; None: ISO 8601.
+
+    Returns:
+        `(stamps, bad, findings)`: times with NaT where missing, in UTC where the source knows its zone, without a zone
+        where not; marks of what could not be read; what was noted.
+
+    Raises:
+        InputError: If the times cannot be read, or their unit cannot be told.
+    """
+    if unit is not None and unit not in UNITS_NS:
+        raise InputError(f"Expected time_unit, one of: {', '.join(UNITS_NS)}. Received: time_unit={unit!r}.")
+    if isinstance(times, pd.MultiIndex):
+        raise InputError(f"Expected one time for a row. Received: an index of {times.nlevels} levels from {what}. Name one time column.")
+    times = column(times, what)
+    if isinstance(times.dtype, pd.PeriodDtype):
+        times = (
+            pd.to_datetime(times.astype(str).where(times.notna()), format="ISO8601", errors="coerce")
+            if len(times)
+            else times.astype(object)
+        )
+    kind = times.dtype
+    if pd.api.types.is_datetime64_any_dtype(kind):
+        return _stamps_of_dates(times, what, drop)
+    if pd.api.types.is_timedelta64_dtype(kind):
+        return _stamps_of_numbers(times.dt.total_seconds(), what, drop, "s")
+    if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
+        raise InputError(f"Expected times as ISO 8601 date-times or seconds. Received: dtype {kind} from {what}. Name another time column.")
+    if not is_text(times):
+        return _stamps_of_numbers(times, what, drop, unit)
+    cells = times.astype(object)
+    missing = is_missing(cells)
+    given = cells[~missing]
+    if given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # a datetime is a date
+        aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
+        dates = pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")
+        return _stamps_of_dates(pd.Series(dates), what, drop)
+    if form is None and not numbers_of(given.iloc[:1], what, drop=True)[1].any():  # the first cell is a number: all may be
+        values, bad, _ = numbers_of(cells, what, drop=True)
+        if not bad.any():
+            exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # keeps integers of nanoseconds whole
+            is_exact = pd.api.types.is_integer_dtype(exact.dtype)
+            return _stamps_of_numbers(exact if is_exact else pd.Series(values), what, drop, unit)
+    return _stamps_of_text(cells, missing, what, drop, form)
+
+
+def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> None:
+    row = int(np.argmax(bad))
+    try:
+        received = shown(cells.iloc[row])
+    except (NotImplementedError, OverflowError, ValueError):  # a time so far off that its zone cannot tell it
+        received = "a time that is far off"
+    raise InputError(
+        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at row {row} of {what}, and "
+        f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
+    )
+
+
+def _stamps_of_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+    stamps, findings = pd.DatetimeIndex(times), []
+    if stamps.tz is not None:
+        if str(stamps.tz) != "UTC":
+            findings.append(Finding("time zone", len(stamps), f"times of the zone {stamps.tz}, turned into UTC: {len(stamps):,}"))
+        stamps = stamps.tz_convert("UTC")
+    coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
+    bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
+    if bad.any() and not drop:
+        _refuse_time(times, bad, what, "Give times from 1678 to 2261")
+    return stamps.where(~bad).as_unit("ns"), bad, findings
+
+
+def _stamps_of_numbers(times: pd.Series, what: str, drop: bool, unit: str | None) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+    values = times.to_numpy(np.float64, na_value=np.nan)
+    finite = np.isfinite(values)
+    told = unit or _unit_of(values[finite], what)
+    factor = UNITS_NS[told]
+    bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
+    if bad.any() and not drop:
+        _refuse_time(times, bad, what, "Correct them or name another time column")
+    usable = finite & ~bad
+    since = np.full(len(values), pd.NaT.value, np.int64)
+    if pd.api.types.is_integer_dtype(times.dtype):
+        since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # whole numbers stay whole
+    else:
+        whole = np.floor(values[usable])
+        since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
+    findings = []
+    if usable.any():
+        is_epoch = np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9
+        name = _EPOCHS.get(told, told)
+        text = f"times are numbers: {name} since 1970, the first is {iso_time(since[usable][0])}" if is_epoch else f"times count {name}"
+        findings.append(Finding("time unit", int(usable.sum()), text, details={"unit": told}))
+    return pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC"), bad, findings
+
+
+def _unit_of(values: np.ndarray, what: str) -> str:
+    size = float(np.median(np.abs(values))) if len(values) else 0.0
+    if len(values) and (values == np.floor(values)).all():
+        for digits, form in ((8, "%Y%m%d"), (14, "%Y%m%d%H%M%S")):
+            if 1.9 * 10 ** (digits - 1) <= values.min() and values.max() < 2.2 * 10 ** (digits - 1):
+                text = pd.Series(values[:1_000].astype(np.int64).astype(str))
+                if pd.to_datetime(text, format=form, errors="coerce").notna().all():
+                    raise InputError(
+                        f"Expected dates as text or times as numbers. Received: {text.iloc[0]} in {what}, which reads as both. "
+                        f"Give time_format='{form}', or time_unit='s'."
+                    )
+    for unit in _EPOCHS:
+        low, high = (bound * 1e9 / UNITS_NS[unit] for bound in _YEARS_S)
+        if (unit == "s" and size < low) or low <= size <= high:
+            return unit
+    raise InputError(
+        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:g} in {what}, which are none of them from 1980 to 2100. "
+        "Give time_unit."
+    )
+
+
+def _stamps_of_text(
+    cells: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str | None
+) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+    findings = []
+    text = cells.where(~missing).map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None)
+    of_text = text.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+    words = text[of_text].astype(str).str.strip()
+    leap, zoned = np.zeros((2, len(cells)), bool)
+    leap[of_text] = words.str.contains(r":\d\d:60")
+    zoned[of_text] = words.str.contains(r"(?:Z|[+-]\d\d:?\d\d)$")
+    text[of_text] = words.str.replace(r"(:\d\d):60", r"\1:59", regex=True)
+    try:
+        stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # a format that is none
+        raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
+    bad = (stamps.isna() & ~missing).to_numpy(bool)
+    if bad.any() and not drop:
+        _refuse_time(cells, bad, what, f"Give time_format (such as {'%d.%m.%y %H:%M:%S'!r}) or name another time column")
+    stamps, too_far, _ = _stamps_of_dates(stamps, what, drop)
+    stamps = stamps + pd.to_timedelta(leap.astype(np.int64), unit="s").as_unit("ns")
+    if leap.any():
+        rows = tuple(f"row {row}" for row in np.flatnonzero(leap)[:3])
+        findings.append(Finding("leap seconds", int(leap.sum()), f"leap seconds, taken as the second after them: {leap.sum():,}", rows))
+    given = zoned[~missing & ~bad]
+    aware = given.any()
+    if aware and not given.all():
+        findings.append(
+            Finding("time zone", int((~given).sum()), f"times without a zone among others with one, taken as UTC: {(~given).sum():,}")
+        )
+    if not aware and not (form and "%z" in form):
+        stamps = stamps.tz_localize(None)
+    return stamps, bad | too_far, findings
+
+
+def localised(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
+    """Times of a local clock, in its zone; NaT where a clock change gives none, or two that the order cannot part."""
+    try:
+        try:
+            return stamps.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
+        except ValueError:  # the order does not tell which of two equal hours it is
+            return stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
+    except (KeyError, ValueError, TypeError, OSError):
+        raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
+
+
+def refuse_local_clock(times: np.ndarray, numbers: np.ndarray, book: Book, name: str) -> None:
+    """Refuses times that a local clock, set back by an hour, gives twice: merged by time they would mix two hours into one.
+
+    Args:
+        times: int64 nanoseconds, in the order of the source.
+        numbers: Row of the source of each.
+        book: Knows the places.
+        name: Channel name, for the message.
+
+    Raises:
+        InputError: If the only steps back are of one hour.
+    """
+    steps = np.diff(times)
+    usual = np.median(np.abs(steps)) if len(steps) else 0
+    back = np.flatnonzero(steps < 0)
+    hour = UNITS_NS["h"]
+    if len(back) and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
+        place = book.place(numbers[back[0] + 1])
+        raise InputError(
+            f"Expected times that rise, or their zone. Received: times without a zone, set back by an hour at {place} of {name}, as local clocks "
+            "are. Give timezone (such as 'Europe/Berlin', or 'UTC' to take them as they are)."
+        )

@@ -1,0 +1,140 @@
+"""Telemetry at rest: the "storage and retrieval system" of the paper's section 2.
+
+One interface, `TelemetryStore`; a folder of Parquet files is the default behind it. A store keeps values, times,
+unit and name as they are and interprets none of them.
+"""
+
+import os
+import urllib.parse
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from enhsim_tf.common.atomic_files import encoded, make_folder, replace_file, replace_folder
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.size_limits import check_parquet, reason_of
+from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+
+_DAY_NS = 86_400 * 10**9
+
+
+class TelemetryStore(Protocol):
+    """What every store does."""
+
+    def write(self, telemetry: Telemetry) -> None:
+        """Keeps the series under its name, in place of what stood there."""
+
+    def read(self, name: str) -> Telemetry:
+        """The series kept under `name`; `InputError` if there is none."""
+
+    def names(self) -> list[str]:
+        """The names of the series kept here, sorted."""
+
+
+def write_windows(path: str | os.PathLike, chunks: Iterable[np.ndarray], window: int) -> None:
+    """Writes windows to one Parquet file as they come: column `window`, lists of `window` float32 numbers.
+
+    The file appears when it is complete. Read it with any tool: `np.stack(pandas.read_parquet(path)["window"])`.
+
+    Args:
+        path: The file.
+        chunks: Windows, float32 arrays of shape `(windows, window)`; each becomes a row group.
+        window: Samples of a window.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    schema = pa.schema([("window", pa.list_(pa.float32(), window))])
+    # the bytes of equal significance side by side: signs and exponents compress, the mantissas' noise does not
+    options = {"compression": "zstd", "use_dictionary": False, "column_encoding": "BYTE_STREAM_SPLIT", "write_statistics": False}
+    make_folder(Path(path).parent)
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
+        for chunk in chunks:
+            values = pa.FixedSizeListArray.from_arrays(pa.array(np.ravel(chunk)), window)
+            writer.write_table(pa.table([values], schema), row_group_size=max(1, len(chunk)))
+
+
+class ParquetStore:
+    """A folder with one folder a channel and in it one Parquet file a day (columns `time` and `value`).
+
+    Any tool that reads Parquet reads it: `pandas.read_parquet("store/attitude")`.
+
+    Args:
+        folder: Where the store lives; made when it does not exist.
+    """
+
+    def __init__(self, folder: str | os.PathLike):
+        self.folder = Path(folder)
+
+    def write(self, telemetry: Telemetry) -> None:
+        """Keeps the series under its name, in place of what stood there, whole or not at all."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        if not telemetry.name or not len(telemetry):
+            raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
+        channel = self._channel(telemetry.name)
+        others = sorted(path.name for path in channel.iterdir() if path.suffix != ".parquet") if channel.is_dir() else []
+        if others or channel.is_file():
+            what = f"which holds {others[0]!r}" if others else "a file"
+            raise InputError(f"Expected a place for the series. Received: {channel}, {what}. Name another folder for the store.")
+        make_folder(self.folder)
+        times = nanoseconds(telemetry)
+        described = {
+            "name": telemetry.name,
+            "unit": telemetry.unit,
+            "start": telemetry.start or "",
+            "interval_s": repr(telemetry.interval_s),
+            "offset_s": repr(telemetry.offset_s),
+        }
+        table = pa.table({"time": pa.array(times, pa.timestamp("ns", "UTC")), "value": pa.array(telemetry.values, pa.float32())})
+        table = table.replace_schema_metadata(described)
+        days = times // _DAY_NS
+        edges = np.flatnonzero(np.diff(days, prepend=days[0] - 1))
+        with replace_folder(channel) as folder:
+            for first, stop in zip(edges, [*edges[1:], len(days)], strict=True):
+                file = folder / f"{np.datetime64(int(days[first]), 'D')}.parquet"
+                pq.write_table(table.slice(first, stop - first), file, compression="zstd")
+
+    def read(self, name: str) -> Telemetry:
+        """The series kept under `name`.
+
+        Raises:
+            InputError: If there is none, or if samples are missing from it.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        files = sorted(self._channel(name).glob("*.parquet"))
+        if not files:
+            raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
+        try:
+            for file in files:
+                check_parquet(file)
+            table = pa.concat_tables([pq.read_table(file) for file in files])
+            about = {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
+            name, unit, start = about["name"], about["unit"], about["start"]
+            interval_s, offset_s = float(about["interval_s"]), float(about["offset_s"])
+            if not (len(table) and 0 < interval_s < np.inf and np.isfinite(offset_s)):
+                raise ValueError("an offset or an interval that no series has")
+            values = table["value"].to_numpy().astype(np.float32)
+            times = table["time"].cast(pa.int64()).to_numpy()
+        except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
+            raise InputError(
+                f"Expected Parquet files of this store in {files[0].parent}. Received: {reason_of(error)}. Write the series again."
+            ) from None
+        if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 1e-3 * interval_s * 1e9:
+            raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
+        telemetry = Telemetry(values, interval_s, offset_s, start or None, name, unit)
+        nanoseconds(telemetry)  # refuses a start that is none
+        return telemetry
+
+    def names(self) -> list[str]:
+        """The names of the series kept here, sorted."""
+        folders = self.folder.glob("[!.]*") if self.folder.is_dir() else ()
+        return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
+
+    def _channel(self, name: str) -> Path:
+        return self.folder / encoded(name)

@@ -1,0 +1,433 @@
+"""The commands, end to end: from a dirty table to a simulator, training data and scores; what they refuse, in one line."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.__main__ import main
+from enhsim_tf.cli import arguments as commands
+from enhsim_tf.cli.arguments import DETECTORS, parse
+from enhsim_tf.coarse_simulator.degraded import MODES
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.detection import detectors
+from enhsim_tf.enhanced_simulator import report_measure as channel_report
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.enhancer.network import build_enhancer
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.gan import NoiseGAN
+from enhsim_tf.noise.generator import build_generator
+
+ROOT = Path(__file__).parents[2]
+COMMAND = [sys.executable, "-m", "enhsim_tf"]
+TINY = ["--num-windows", "40", "--epochs", "1", "--iterations", "2", "--window", "64"]
+
+
+def table(num_samples=1_500, interval="10s"):
+    """Clean telemetry of two channels."""
+    rng, places = np.random.default_rng(0), np.arange(num_samples)
+    volts = 20 + 3 * np.sin(2 * np.pi * places / 40) + 0.2 * rng.standard_normal(num_samples)
+    amps = np.round(2 + np.sin(2 * np.pi * places / 50), 1)
+    return pd.DataFrame({"utc": pd.date_range("2024-01-01", periods=num_samples, freq=interval), "volts": volts, "amps": amps})
+
+
+def dirty():
+    """The same with a short and a long gap, doubles, missing values, a word and rows out of order."""
+    rows = table().astype({"volts": object})
+    rows.loc[100:102, "volts"] = np.nan
+    rows.loc[200, "volts"] = "offline"
+    rows = rows.drop(index=[*range(400, 403), *range(900, 1_000)])
+    return pd.concat([rows.iloc[:600], rows.iloc[590:600], rows.iloc[600:]])
+
+
+def small(window=60, interval_s=10.0):
+    """A simulator of narrow, untrained networks."""
+    generator, discriminator = build_generator(window, 4, 8, seed=0), build_discriminator(window, 8, seed=0)
+    noise = NoiseGAN(generator, discriminator, scale=0.1, seed=0)
+    return EnhancedSimulator(SquareWaveSimulator([SquareWave(400)]), build_enhancer(window, 16, seed=0), noise, interval_s)
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """Telemetry and fitted simulators, which nobody changes."""
+    folder = tmp_path_factory.mktemp("world")
+    table().to_csv(folder / "two.csv", index=False)
+    table()[["utc", "volts"]].to_csv(folder / "one.csv", index=False)
+    dirty().to_csv(folder / "dirty.csv", index=False)
+    table(interval="7s")[["utc", "volts"]].to_csv(folder / "faster.csv", index=False)
+    pd.DataFrame({"note": ["a", "b"]}).to_csv(folder / "words.csv", index=False)
+    table(50)[["utc", "volts"]].to_csv(folder / "short.csv", index=False)
+    pd.DataFrame({"volts": np.ones(1_500), "amps": np.arange(1_500) % 2 * 0.0}).to_csv(folder / "still.csv", index=False)
+    np.save(folder / "volts.npy", table()["volts"])
+    for name in ("volts", "amps"):
+        small().save(folder / "models" / name)
+    small().save(folder / "single" / "volts")
+    small().save(folder / "damaged" / "volts")
+    (folder / "damaged" / "volts" / "enhancer.keras").write_bytes(b"no network")
+    (folder / "empty").mkdir()
+    (folder / "foreign" / "volts").mkdir(parents=True)
+    (folder / "foreign" / "volts" / "notes.txt").write_text("mine")
+    return folder
+
+
+def files(folder):
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def told(world, tmp_path, monkeypatch, capfd):
+    """Runs the command in this process, in a folder of its own; returns exit code, output and lines of errors."""
+
+    def run(*arguments):
+        monkeypatch.chdir(tmp_path)
+        code = main([str(argument).replace("WORLD", str(world)) for argument in arguments])
+        out, error = capfd.readouterr()
+        return code, out, error.splitlines()
+
+    return run
+
+
+def shell(*arguments, cwd, **options):
+    """Runs the command as a shell does."""
+    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = os.environ | {"PYTHONPATH": path}
+    return subprocess.run([*COMMAND, *map(str, arguments)], cwd=cwd, env=environment, capture_output=True, text=True, **options)
+
+
+# help
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["fit", "--help"], ["generate", "--help"], ["score", "--help"], ["scrore"], []])
+def test_help_and_wrong_options_import_nothing_slow(arguments):
+    script = (
+        "import sys\nfrom enhsim_tf.__main__ import main\ncode = 0\n"
+        f"try:\n    code = main({arguments})\nexcept SystemExit as end:\n    code = end.code\n"
+        "print('loaded:', [name for name in ('pandas', 'tensorflow', 'keras', 'numpy', 'sklearn', 'matplotlib') if name in sys.modules])\n"
+        "sys.exit(code)"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert ended.stdout.splitlines()[-1] == "loaded: []"
+    assert ended.returncode == (0 if "--help" in arguments else 2), ended.stderr
+    if "--help" in arguments:
+        assert "usage: python -m enhsim_tf" in ended.stdout and "exit code" in ended.stdout and not ended.stderr
+    else:
+        assert len(ended.stderr.splitlines()) == 1 and ended.stderr.startswith("error: Expected ")
+
+
+def test_help_names_everything_that_can_be_chosen(capsys):
+    for command, words in (("generate", [*MODES, "stuck:0.5"]), ("score", DETECTORS), ("fit", ["influxdb://", "convolutional", "paper"])):
+        with pytest.raises(SystemExit):
+            parse([command, "--help"])
+        text = capsys.readouterr().out
+        assert all(word in text for word in words) and max(map(len, text.splitlines())) <= 140
+    assert [name.casefold().replace(" ", "-") for name in detectors.DETECTORS] == list(DETECTORS)
+
+
+# from end to end
+
+
+@pytest.fixture(scope="module")
+def fitted(world, tmp_path_factory):
+    """A simulator fitted by the command to the dirty table, and what the command said."""
+    folder = tmp_path_factory.mktemp("fitted")
+    ended = shell("fit", world / "dirty.csv", "--column", "volts", "--drop-bad", "--out", "models", *TINY, cwd=folder)
+    assert (ended.returncode, ended.stderr) == (0, ""), ended.stderr
+    return folder / "models", ended.stdout
+
+
+def test_fit_tells_what_it_cleaned_and_what_it_found(fitted):
+    models, said = fitted
+    assert {path.name for path in models.iterdir()} == {"volts"}
+    assert {"report.json", "report.png", "manifest.json"} <= {path.name for path in (models / "volts").iterdir()}
+    for words in (
+        "volts: 1,407 rows",  # 1,500 less 103 dropped, and 10 doubles
+        "rows that repeat the time and value of another: 10",
+        "gaps of more than 5 samples",
+        "filled by straight lines",
+        "values that cannot be read, taken as missing: 1",
+        "Signal: error",
+        "Noise: ",
+        "False alarms on telemetry it has not seen",
+        "Anomalies of 4 standard deviations",
+        "models/volts/",
+    ):
+        assert words in said
+
+
+def test_generate_makes_training_data_of_what_was_fitted(fitted, told, tmp_path):
+    scenarios = ["--scenario", "stuck:0.5", "--scenario", "drift:1:0.5"]
+    code, out, errors = told("generate", fitted[0], "--windows", 40, *scenarios, "--out", "deep/training.parquet", "--seed", 3)
+    first, second, third = out.splitlines()
+    assert (code, errors) == (0, []) and first == "volts: 40 windows of 64 samples in deep/training.parquet"
+    assert re.fullmatch(r"volts: stuck at 0\.5: \d+% of such windows are beyond what its enhancer learnt from", second)
+    assert third.startswith("volts: drift at 1: 100% of such")
+    frame = pd.read_parquet(tmp_path / "deep" / "training.parquet")
+    assert frame["scenario"].value_counts().to_dict() == {"nominal": 20, "stuck": 10, "drift": 10}
+    assert set(frame.loc[frame["scenario"] == "drift", "onset"]) == {32} and np.stack(frame["window"]).shape == (40, 64)
+    assert 10 < np.stack(frame["window"]).mean() < 30  # in the telemetry's unit
+
+
+def test_generate_makes_a_series_with_times(fitted, told, tmp_path):
+    arguments = ["generate", fitted[0], "--continuous", "6h", "--start", "2025-01-01", "--scenario", "stuck:1:0.75", "--out", "day.parquet"]
+    code, out, errors = told(*arguments)
+    assert (code, errors) == (0, []) and "2,160 samples, one every 10 s" in out
+    frame = pd.read_parquet(tmp_path / "day.parquet")
+    assert (pd.DatetimeIndex(frame["time"]) == pd.date_range("2025-01-01", periods=2_160, freq="10s", tz="UTC")).all()
+    assert (frame["scenario"] == "stuck").to_numpy().nonzero()[0].tolist() == list(range(1_620, 2_160))
+
+
+def test_score_gives_every_sample_a_score_and_a_flag(fitted, world, told, tmp_path):
+    code, out, errors = told("score", fitted[0], "WORLD/one.csv", "--windows", 60, "--out", "scores.csv")
+    assert (code, errors) == (0, []) and "of 1,500 scored samples" in out and "set to flag 1.0%" in out
+    frame = pd.read_csv(tmp_path / "scores.csv")
+    assert list(frame.columns) == ["time", "value", "score", "flag"] and len(frame) == 1_500 and frame["score"].notna().all()
+    assert (pd.DatetimeIndex(frame["time"]) == pd.date_range("2024-01-01", periods=1_500, freq="10s", tz="UTC")).all()
+    np.testing.assert_allclose(frame["value"], table()["volts"], rtol=1e-6)
+
+
+# several channels
+
+
+def test_several_channels_have_a_file_each(told, tmp_path):
+    code, out, errors = told("generate", "WORLD/models", "--windows", 10, "--out", "sets")
+    assert (code, errors, len(out.splitlines())) == (0, [], 2)
+    assert {path.name for path in (tmp_path / "sets").iterdir()} == {"volts.parquet", "amps.parquet"}
+    assert told("generate", "WORLD/models", "--channel", "amps", "--windows", 1, "--out", "one.parquet")[0] == 0
+    assert len(pd.read_parquet(tmp_path / "one.parquet")) == 1
+    code, out, errors = told(
+        "score", "WORLD/models", "WORLD/two.csv", "--windows", 30, "--detector", "limit-check", "--out", "scores.v2/new"
+    )
+    assert (code, errors) == (0, [])
+    assert {path.name for path in (tmp_path / "scores.v2" / "new").iterdir()} == {"volts.parquet", "amps.parquet"}
+    assert told("generate", "WORLD/single", "--windows", 1, "--out", "scores.v2")[0] == 0  # a folder that is there may have a dot
+
+
+def test_one_channel_and_one_simulator_belong_together_whatever_they_are_called(told, tmp_path):
+    code, _, errors = told("score", "WORLD/single", "WORLD/two.csv", "--column", "amps", "--windows", 30, "--out", "scores.parquet")
+    assert (code, errors) == (0, []) and len(pd.read_parquet(tmp_path / "scores.parquet")) == 1_500
+
+
+def test_a_channel_that_cannot_be_used_does_not_stop_the_others(told, world, tmp_path):
+    rows = table()
+    rows["volts"] = rows["volts"].where(rows.index < 30)  # shorter than a window
+    rows.to_csv(tmp_path / "new.csv", index=False)
+    code, out, errors = told("score", "WORLD/models", tmp_path / "new.csv", "--windows", 30, "--out", "scores")
+    assert code == 2 and len(errors) == 1 and errors[0].startswith("error: volts: Expected a stretch of at least a window")
+    assert [path.name for path in (tmp_path / "scores").iterdir()] == ["amps.parquet"] and "amps: " in out
+
+
+def test_every_channel_that_cannot_be_fitted_has_its_line(told, tmp_path):
+    code, out, errors = told("fit", "WORLD/still.csv", "--out", "models", "--workers", 1, *TINY)
+    assert code == 2 and [line.split(": ")[1] for line in errors] == ["volts", "amps"] and out == ""
+    assert all("Expected something periodic" in line for line in errors)
+    assert not list((tmp_path / "models").iterdir())
+
+
+# what the README says
+
+
+def test_the_commands_of_the_readme_can_be_asked():
+    texts = [(ROOT / "README.md").read_text(encoding="utf-8"), commands.EXAMPLES]
+    lines = [line.strip() for text in texts for line in text.splitlines()]
+    asked = [line.split()[3:] for line in lines if line.startswith("python -m enhsim_tf ") and "--help" not in line]
+    assert [words[0] for words in asked] == ["fit", "generate", "score"] * 2
+    for words in asked:
+        assert parse(words).command == words[0]
+
+
+@pytest.mark.usefixtures("narrow_enhancer")
+def test_the_python_of_the_readme_does_what_it_says(tmp_path, monkeypatch, capsys):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (snippet,) = [part.partition("```")[0] for part in readme.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
+    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
+        "num_windows=1000", "num_windows=20"
+    )
+    table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(channel_report, "_NUM_WINDOWS", 60)
+    made = {}
+    exec(snippet, made)
+    assert made["windows"].shape == (20, 64) and made["day"].shape == (8_640, 3) and made["scores"].shape == (1_500, 3)
+    assert all(isinstance(made[name].index, pd.DatetimeIndex) for name in ("day", "scores", "series"))
+    assert (tmp_path / "model_dir" / "manifest.json").is_file() and "Anomalies of 4 standard" in capsys.readouterr().out
+
+
+# what is refused
+
+FIT = ["fit", "WORLD/one.csv", "--out", "models"]
+GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
+SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
+WRONG = {
+    "no command": ([], "{fit,generate,verify,score}"),
+    "unknown command": (["train"], "'train'"),
+    "fit without a source": (["fit", "--out", "models"], "SOURCE"),
+    "fit without a place": (["fit", "WORLD/one.csv"], "--out"),
+    "source that is not there": (["fit", "nothing.csv", "--out", "models"], "nothing.csv"),
+    "source of unknown kind": (["fit", "WORLD/models/volts/settings.json", "--out", "models"], "settings.json"),
+    "source that is a folder": (["fit", "WORLD/empty", "--out", "models"], "empty"),
+    "source without numbers": (["fit", "WORLD/words.csv", "--out", "models"], "words.csv"),
+    "column that is not there": ([*FIT, "--column", "current"], "'current'"),
+    "column twice": ([*FIT, "--column", "volts", "--column", "volts"], "volts"),
+    "time column that is not there": ([*FIT, "--time", "when"], "'when'"),
+    "interval below zero": ([*FIT, "--interval", "-1"], "-1"),
+    "interval that is no number": ([*FIT, "--interval", "often"], "'often'"),
+    "zone that is none": ([*FIT, "--timezone", "Mars/Base"], "Mars/Base"),
+    "fill below zero": ([*FIT, "--max-fill", "-1"], "max_fill"),
+    "seed below zero": ([*FIT, "--seed", "-1"], "--seed -1"),
+    "seed too large": ([*GENERATE, "--windows", "5", "--seed", str(2**31)], str(2**31)),
+    "window too short": ([*FIT, "--window", "31"], "31"),
+    "window of nothing": ([*FIT, "--window", "0"], "window=0"),
+    "no training windows": ([*FIT, "--num-windows", "0"], "window"),
+    "no epoch": ([*FIT, "--epochs", "0"], "epoch"),
+    "iterations below zero": ([*FIT, "--iterations", "-1"], "iterations"),
+    "no workers": ([*FIT, "--workers", "0"], "worker"),
+    "workers that are no number": ([*FIT, "--workers", "two"], "'two'"),
+    "more workers than there can be": ([*FIT, "--workers", "513"], "513"),
+    "unknown engine": ([*FIT, "--engine", "slurm"], "'slurm'"),
+    "too much held out": ([*FIT, "--held-out", "0.9"], "0.9"),
+    "unknown noise": ([*FIT, "--noise", "loud"], "'loud'"),
+    "fit into a file": (["fit", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv"),
+    "fit into a foreign folder": (["fit", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
+    "fit into a model": (["fit", "WORLD/one.csv", "--out", "WORLD/single/volts"], "a model itself"),
+    "neither windows nor a length": (GENERATE, "--windows"),
+    "windows and a length": ([*GENERATE, "--windows", "5", "--continuous", "1d"], "--continuous"),
+    "no windows": ([*GENERATE, "--windows", "0"], "--windows 0"),
+    "windows that are no number": ([*GENERATE, "--windows", "many"], "'many'"),
+    "length that is none": ([*GENERATE, "--continuous", "long"], "'long'"),
+    "length of nothing": ([*GENERATE, "--continuous", "0"], "'0'"),
+    "length below a sample": ([*GENERATE, "--continuous", "1s"], "every 10 s"),
+    "length beyond memory": ([*GENERATE, "--continuous", "99999d"], "20,000,000"),
+    "unknown mode": ([*GENERATE, "--windows", "5", "--scenario", "rust:0.5"], "'rust:0.5'"),
+    "mode without a severity": ([*GENERATE, "--windows", "5", "--scenario", "stuck"], "'stuck'"),
+    "severity out of range": ([*GENERATE, "--windows", "5", "--scenario", "stuck:1.5"], "1.5"),
+    "onset at the end": ([*GENERATE, "--windows", "5", "--scenario", "stuck:0.5:1"], "onset"),
+    "share out of range": ([*GENERATE, "--windows", "5", "--scenario", "stuck:0.5", "--nominal-share", "2"], "2.0"),
+    "share without scenarios": ([*GENERATE, "--windows", "5", "--nominal-share", "0.5"], "--nominal-share"),
+    "fewer windows than scenarios": ([*GENERATE, "--windows", "2", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"], "2 scenarios"),
+    "two scenarios in a series": (
+        [*GENERATE, "--continuous", "1d", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"],
+        "at most one --scenario",
+    ),
+    "start without a series": ([*GENERATE, "--windows", "5", "--start", "2024-01-01"], "--start"),
+    "start that is no time": ([*GENERATE, "--continuous", "1d", "--start", "soon"], "'soon'"),
+    "models that are not there": (["generate", "nowhere", "--windows", "5", "--out", "x.parquet"], "nowhere"),
+    "models of a name no file can have": (["generate", "x" * 300, "--windows", "5", "--out", "x.parquet"], "xxx"),
+    "models that are none": (["generate", "WORLD/empty", "--windows", "5", "--out", "x.parquet"], "empty"),
+    "models that are damaged": (["generate", "WORLD/damaged", "--windows", "5", "--out", "x.parquet"], "enhancer.keras"),
+    "channel that was not fitted": ([*GENERATE, "--windows", "5", "--channel", "amps"], "'amps'"),
+    "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 channels"),
+    "training data as text": (["generate", "WORLD/single", "--windows", "5", "--out", "x.csv"], "x.csv"),
+    "output below a file": (["generate", "WORLD/single", "--windows", "5", "--out", "WORLD/one.csv/x.parquet"], "one.csv"),
+    "output of a name no file can have": (["generate", "WORLD/single", "--windows", "5", "--out", "x" * 300 + ".parquet"], "long"),
+    "score without a source": (["score", "WORLD/single", "--out", "x.parquet"], "SOURCE"),
+    "unknown detector": ([*SCORE, "--detector", "oracle"], "'oracle'"),
+    "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
+    "rate of half": ([*SCORE, "--false-alarm-rate", "0.5"], "0.5"),
+    "too few windows to learn from": ([*SCORE, "--windows", "9"], "num_windows=9"),
+    "channels that were not fitted": (["score", "WORLD/single", "WORLD/two.csv", "--out", "x"], "'amps'"),
+    "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
+    "telemetry below a window": (["score", "WORLD/single", "WORLD/short.csv", "--out", "x.parquet"], "60 samples"),
+    "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
+    "scores as a picture": (["score", "WORLD/single", "WORLD/one.csv", "--out", "x.png"], "x.png"),
+}
+
+
+def test_there_are_enough_wrong_uses():
+    assert len(WRONG) >= 60
+
+
+@pytest.mark.filterwarnings("error:::enhsim_tf")
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_use_is_one_line_and_changes_nothing(told, world, tmp_path, case):
+    arguments, word = WRONG[case]
+    before = files(world)
+    code, out, errors = told(*arguments)
+    assert (code, out, len(errors)) == (2, "", 1), errors
+    assert errors[0].startswith("error: ") and "Expected " in errors[0] and "Received: " in errors[0] and word in errors[0]
+    assert files(world) == before and not files(tmp_path)
+
+
+@pytest.mark.parametrize("case", ["unknown command", "source that is not there", "unknown mode", "models that are damaged"])
+def test_a_wrong_use_as_the_shell_sees_it(world, tmp_path, case):
+    arguments = [argument.replace("WORLD", str(world)) for argument in WRONG[case][0]]
+    ended = shell(*arguments, cwd=tmp_path)
+    assert (ended.returncode, ended.stdout, len(ended.stderr.splitlines())) == (2, "", 1), ended.stderr
+    assert not list(tmp_path.iterdir())
+
+
+# what the machine does
+
+
+def test_scores_of_a_folder_do_not_overwrite_the_telemetry(told, world, tmp_path):
+    table()[["utc", "volts"]].to_parquet(tmp_path / "volts.parquet")
+    before = (tmp_path / "volts.parquet").read_bytes()
+    code, _, errors = told("score", "WORLD/single", "volts.parquet", "--windows", 30, "--out", ".")
+    assert code == 2 and "for both" in errors[0] and (tmp_path / "volts.parquet").read_bytes() == before
+
+
+def test_an_output_that_is_a_folder_is_refused(told, tmp_path):
+    (tmp_path / "sets" / "volts.parquet").mkdir(parents=True)
+    code, _, errors = told("generate", "WORLD/single", "--windows", 5, "--out", "sets")
+    assert code == 2 and "a folder of that name" in errors[0]
+
+
+def test_a_full_disk_is_one_line(told, monkeypatch):
+    from enhsim_tf.datasets import labelled_windows as training_sets
+
+    def fail(*arguments):
+        raise OSError(28, "No space left on device", "x.parquet")
+
+    monkeypatch.setattr(training_sets, "write_windows_labelled", fail)
+    code, _, errors = told("generate", "WORLD/single", "--windows", 5, "--out", "x.parquet")
+    assert code == 2 and len(errors) == 1 and "No space left on device" in errors[0]
+
+
+def test_a_reader_that_leaves_ends_the_command_quietly(world, tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [*COMMAND, "generate", world / "models", "--windows", "5", "--out", tmp_path / "sets"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True)
+    process.stdout.close()
+    error = process.stderr.read()
+    assert (process.wait(), error) == (141, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are those of POSIX")
+@pytest.mark.parametrize(("engine", "after_s"), [("local", 1), ("local", 8), ("ray", 10)])
+def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_path):
+    if engine == "ray":
+        pytest.importorskip("ray", reason="the optional extra ray is not installed")
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "2"]
+    command += ["--iterations", "1000000", "--engine", engine]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True, start_new_session=True)
+    while not (tmp_path / "models").is_dir():
+        assert process.poll() is None
+        time.sleep(0.1)
+    time.sleep(after_s)  # the processes begin, or are at work; whichever it is
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
+    out, error = process.communicate(timeout=60)
+    assert (process.returncode, out, error) == (130, "", "interrupted; what was finished is kept\n")
+    with pytest.raises(ProcessLookupError):  # nobody is left in the session
+        while True:
+            os.killpg(process.pid, 0)
+            time.sleep(0.1)
+    assert not list((tmp_path / "models").iterdir())
+
+
+@pytest.mark.parametrize(("module", "said"), [("ray", "said"), ("json", "said, and more")])
+def test_a_process_that_used_ray_ends_at_once_with_all_it_said(module, said):
+    program = (
+        f"import atexit, sys, types; sys.modules[{module!r}] = types.ModuleType({module!r})\n"
+        "from enhsim_tf.common.console import leave\n"
+        "atexit.register(lambda: print(', and more', end=''))\n"
+        "print('said', end=''); leave(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    assert (done.returncode, done.stdout, done.stderr) == (3, said, "")

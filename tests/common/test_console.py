@@ -1,0 +1,34 @@
+"""How the commands speak: at once, in what characters a terminal shows, and without a word of Python's own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_a_line_is_told_at_once():
+    script = (
+        "import os\nfrom enhsim_tf.common.console import tell\ntell('a line')\nos._exit(0)"  # which throws away what is not yet written
+    )
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert ended.stdout == "a line\n"
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_narrow_terminal_shows_what_it_can(encoding):
+    script = "from enhsim_tf.common.console import tell\ntell('Größe 漢')"
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding})
+    assert (ended.stdout.decode(encoding), ended.stderr) == (
+        {"ascii": "Gr??e ?\n", "latin-1": "Größe ?\n"}.get(encoding, "Größe 漢\n"),
+        b"",
+    )
+
+
+def test_a_bar_of_a_process_that_is_ended_leaves_no_word_of_semaphores():
+    script = "import os\nfrom enhsim_tf.common.console import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert (ended.stdout, ended.stderr) == ("", "")

@@ -1,0 +1,155 @@
+"""Engines: every number once, whoever dies; one thread each; one line where they cannot work."""
+
+import functools
+import importlib.util
+import itertools
+import multiprocessing
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from enhsim_tf.common.parallel import engines
+from enhsim_tf.common.parallel import ray as ray_engine
+from enhsim_tf.common.parallel.local import ProcessesDiedError
+from tests.faults.small_data_set import PlainMaker, die_at_thirteen, meet, plan, refuse, threads_and_square, threads_of
+
+with_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
+
+
+def test_every_number_is_done_once_in_processes_of_one_thread():
+    found = list(engines.run("local", threads_and_square, range(20), 2))
+    assert sorted(square for square, *_ in found) == [number**2 for number in range(20)]
+    assert {(threads, tensorflow) for *_, threads, tensorflow in found} == {("1", False)}
+    assert os.getpid() not in {process for _, process, *_ in found}
+
+
+def test_threads_are_set_before_the_work_imports_anything():
+    assert list(engines.run("local", threads_of, [1], 1, threads=2)) == [("2", {1})]
+
+
+def test_numbers_are_drawn_as_there_is_room():
+    drawn = []
+    endless = (drawn.append(number) or number for number in itertools.count())
+    running = engines.run("local", threads_and_square, endless, 1)
+    for done in range(1, 6):
+        next(running)
+        assert len(drawn) <= done + 2
+    running.close()
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_killed_process_is_replaced_and_nothing_is_lost_or_doubled(seed):
+    running, found, killed = engines.run("local", threads_and_square, range(200), 2), [], 0
+    for done in running:
+        found.append(done[0])
+        if len(found) in (20 + seed, 90):
+            os.kill(done[1], signal.SIGKILL)
+            killed += 1
+    assert killed == 2 and sorted(found) == [number**2 for number in range(200)]
+
+
+def test_processes_that_die_without_end_are_given_up(refused):
+    with refused("died in a row", "--workers"):
+        try:
+            list(engines.run("local", die_at_thirteen, [13], 1))
+        except ProcessesDiedError as died:
+            assert died.items == (13,)
+            raise
+
+
+def test_a_mistake_found_by_the_work_comes_back_as_it_is(refused):
+    with refused("another number"):
+        list(engines.run("local", refuse, range(5), 1))
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize(("engine", "workers"), [("local", 0), ("local", 513), ("ray", -1), ("ray", 10**6), ("slurm", 1)])
+def test_engines_and_workers_that_cannot_be(engine, workers, refused):
+    with refused():
+        engines.run(engine, threads_and_square, range(3), workers)
+
+
+def test_nothing_to_do_starts_nothing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    assert list(engines.run("local", refuse, [], 2)) == list(engines.run("ray", refuse, [], 2)) == []
+    assert not multiprocessing.active_children()
+
+
+def test_without_ray_there_is_one_line(monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with refused("pip install"):
+        list(engines.run("ray", refuse, [1], 2))
+
+
+@with_ray
+def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, refused):
+    import ray
+
+    from enhsim_tf.common.parallel.ray import _cluster
+
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # where the work is found by its name
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    with _cluster():  # one cluster for all of it: starting one takes as long as the rest
+        running, found = engines.run("ray", threads_and_square, range(60), 2), []
+        for done in running:
+            found.append(done[0])
+            assert done[2:] == ("1", False)
+            if len(found) == 20:
+                os.kill(done[1], signal.SIGKILL)
+        assert sorted(found) == [number**2 for number in range(60)]
+        (tmp_path / "met").mkdir()
+        running, found = engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8), []
+        for done in running:
+            found.append(done)
+            if len(found) == 1:  # all eight at once, as a node that is lost takes all its actors
+                for process in os.listdir(tmp_path / "met"):
+                    os.kill(int(process), signal.SIGKILL)
+        assert sorted(found) == list(range(60)) and len(os.listdir(tmp_path / "met")) > 8
+        assert list(engines.run("ray", threads_of, [1], 1, threads=2)) == [("2", {1})]
+        with refused("another number"):
+            list(engines.run("ray", refuse, range(5), 1))
+        asked = plan(150, 50)
+        records = list(engines.run("ray", PlainMaker(asked, tmp_path), range(3), 3))  # on two cores: more actors than CPUs
+        (tmp_path / "here").mkdir()
+        assert sorted(records) == [PlainMaker(asked, tmp_path / "here")(shard) for shard in range(3)]
+    assert not ray.is_initialized()
+
+
+@with_ray
+@pytest.mark.parametrize("error", [Exception("The current node\ntimed out"), RuntimeError("timed out"), OSError(28, "timed out")])
+def test_a_cluster_that_does_not_start_is_one_line(error, monkeypatch, refused):
+    import ray
+
+    def init(*arguments, **options):
+        raise error
+
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setattr(ray, "init", init)
+    with refused("that starts here", "timed out"), ray_engine._cluster():
+        pass
+    error = KeyError("a mistake of ours")
+    with pytest.raises(KeyError), ray_engine._cluster():
+        pass
+
+
+@with_ray
+def test_after_a_server_that_is_not_there_a_cluster_of_this_machine_starts(monkeypatch, refused):
+    from enhsim_tf.common.parallel.ray import _cluster
+
+    monkeypatch.setenv("RAY_ADDRESS", "ray://127.0.0.1:9")
+    with refused("ray://127.0.0.1:9"), _cluster():
+        pass
+    monkeypatch.delenv("RAY_ADDRESS")
+    with _cluster() as ray:
+        assert ray.is_initialized()
+
+
+@with_ray
+def test_a_cluster_that_is_not_there_is_one_line(monkeypatch, refused):
+    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")
+    with refused("127.0.0.1:1"):
+        list(engines.run("ray", refuse, [1], 1))

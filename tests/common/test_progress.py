@@ -1,0 +1,342 @@
+"""A long run without a terminal says how far it is, and when it will end; a terminal, a notebook and a caller hear none of it."""
+
+import os
+import re
+import select
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.common import console as terminal
+from enhsim_tf.common.console import SILENT, Progress, time_left
+from enhsim_tf.reproduce.paper import measurements
+from enhsim_tf.reproduce.paper.pipeline import Experiment
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.reproduce.stages import Stages, Turns
+
+ROOT = Path(__file__).parents[2]
+SPOKEN = re.compile(r"(.*) ([\d,]+) of ([\d,]+), (\d+) %(, about [\d.]+ (s|min|h) left)?")
+
+
+class Clock:
+    """Seconds that pass when they are told to."""
+
+    def __init__(self):
+        self.now = 1_000.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """No time has to pass between two lines."""
+    monkeypatch.setattr(terminal, "INTERVAL_S", 0.0)
+
+
+# -- lines of a loop whose pace is known -----------------------------------------------------------------------------------
+
+
+def walk(clock, loop, steps, seconds):
+    for done in steps:
+        clock.now += seconds
+        loop(done)
+
+
+def test_a_loop_of_known_pace_tells_these_lines(clock):
+    told = []
+    loop = Progress(told.append, "noise GAN    ", clock).loop("iteration", 1_200)
+    walk(clock, loop, range(1, 1_201), 0.0625)  # 75 s in all; fifteen of them end with 240 iterations
+    assert told == [
+        "noise GAN    iteration 240 of 1,200, 20 %, about 60 s left",
+        "noise GAN    iteration 480 of 1,200, 40 %, about 45 s left",
+        "noise GAN    iteration 720 of 1,200, 60 %, about 30 s left",
+        "noise GAN    iteration 960 of 1,200, 80 %, about 15 s left",
+    ]
+
+
+def test_the_unit_under_way_is_the_one_that_is_named(clock):
+    told = []
+    loop = Progress(told.append, "enhancer     ", clock).loop("epoch", 40)
+    walk(clock, loop, [6.2, 7.0, 39.99, 40.0], 20)
+    assert told == [
+        "enhancer     epoch 7 of 40, 15 %",
+        "enhancer     epoch 7 of 40, 17 %, about 14 min left",
+        "enhancer     epoch 40 of 40, 99 %, about 1 s left",
+    ], "and what is done says no more"
+
+
+def test_a_slow_first_step_says_nothing_of_the_others(clock):
+    told = []
+    loop = Progress(told.append, "", clock).loop("iteration", 1_000)
+    walk(clock, loop, [1], 16)  # it builds the graph
+    walk(clock, loop, range(2, 152), 0.125)
+    assert told == ["iteration 1 of 1,000, 0 %", "iteration 121 of 1,000, 12 %, about 110 s left"]
+
+
+def test_a_loop_shorter_than_the_interval_says_nothing(clock):
+    told = []
+    walk(clock, Progress(told.append, "", clock).loop("epoch", 15), range(1, 16), 0.99)
+    assert told == []
+
+
+def test_the_interval_is_that_of_the_work_and_not_of_each_loop(clock):
+    told = []
+    progress = Progress(told.append, "second       ", clock)
+    clock.now += 12  # before the first loop begins
+    walk(clock, progress.loop("enhancer, epoch", 2), [1, 1.5], 4)
+    walk(clock, progress.loop("noise GAN, iteration", 10), range(1, 10), 2)
+    assert told == [
+        "second       enhancer, epoch 1 of 2, 50 %",
+        "second       noise GAN, iteration 6 of 10, 60 %, about 8 s left",
+    ]
+
+
+def test_a_step_of_several_to_a_unit(clock):
+    told = []
+    loop = Progress(told.append, "", clock).loop("arm", 5)
+    walk(clock, loop.within(2, 3), [1, 2], 15)
+    assert told == ["arm 3 of 5, 46 %", "arm 3 of 5, 53 %, about 105 s left"]
+
+
+def test_the_silent_one_says_nothing(at_once, capsys):
+    SILENT.loop("epoch", 3)(1)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (0.0, "about 1 s left"),
+        (65.4, "about 65 s left"),
+        (119.9, "about 120 s left"),
+        (120.0, "about 2 min left"),
+        (7_199.0, "about 120 min left"),
+        (9_000.0, "about 2.5 h left"),
+    ],
+)
+def test_the_time_that_is_left_in_words(seconds, words):
+    assert time_left(seconds) == words
+
+
+# -- what the loops of the library say of themselves -----------------------------------------------------------------------
+
+
+def test_the_enhancer_says_how_many_epochs_are_done():
+    from enhsim_tf.enhancer.network import build_enhancer
+    from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
+
+    windows, done = np.random.default_rng(0).standard_normal((5, 8)).astype(np.float32), []
+    fit_windows(build_enhancer(8, 4), windows, windows, 2, batch_size=2, seed=0, callbacks=[EpochsDone(done.append)], verbose=0)
+    assert done == pytest.approx([1 / 3, 2 / 3, 1, 4 / 3, 5 / 3, 2])
+
+
+def test_the_adversarial_loop_says_how_many_iterations_are_done():
+    from tests.noise.test_gan import fit, small
+
+    done = []
+    fit(small(), num_iterations=4, on_iteration=done.append)
+    assert done == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("follow", [False, True])
+def test_a_whole_fit_counts_the_epochs_of_all_its_rounds(at_once, follow, monkeypatch, capsys):
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.enhancer import network as enhancer
+    from enhsim_tf.telemetry.series import Telemetry
+
+    build = enhancer.build_enhancer
+    monkeypatch.setattr(enhancer, "build_enhancer", lambda window, seed: build(window, 8, seed=seed))
+    rng, told = np.random.default_rng(0), []
+    telemetry = Telemetry((np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32))
+    given = {"window": 60, "num_windows": 30, "epochs": 3, "num_iterations": 3, "noise": "paper", "follow": follow, "verbose": 0}
+    for progress in (SILENT, Progress(told.append, "volts: ")):
+        EnhancedSimulator.fit(telemetry, **given, progress=progress)
+        assert capsys.readouterr() == ("", ""), "its lines go where they were asked for"
+    found = [SPOKEN.fullmatch(line).groups()[:3] for line in told]
+    epochs = [int(number) for what, number, total in found if (what, total) == ("volts: enhancer, epoch", "3")]
+    assert epochs == sorted(epochs) and set(epochs) == {1, 2, 3}
+    assert [each for each in found if "epoch" not in each[0]] == [("volts: noise GAN, iteration", str(done), "3") for done in (1, 2)]
+
+
+def test_false_alarms_are_counted_by_arm_and_detector(clock, monkeypatch):
+    class Slow:
+        def fit(self, windows):
+            clock.now += 16
+            return self
+
+        def score(self, windows):
+            return windows[:, 0]
+
+    monkeypatch.setattr(measurements, "make_detectors", lambda settings, seed: {"a": Slow(), "b": Slow()})
+    windows, told = np.zeros((4, 3)), []
+    arms = dict.fromkeys(("coarse", "real"), (windows, windows))
+    progress = Progress(told.append, "false alarms ", clock)
+    measurements.false_alarms(arms, windows, {"stuck": windows}, make_settings("smoke").detectors, 0, progress)
+    assert told == [
+        "false alarms arm 1 of 2, 25 %",
+        "false alarms arm 1 of 2, 50 %, about 32 s left",
+        "false alarms arm 2 of 2, 75 %, about 16 s left",
+    ]
+
+
+# -- stages, replicates and channels ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speaks", [False, True])
+def test_a_stage_speaks_under_its_name_where_it_is_asked_to(tmp_path, at_once, speaks):
+    told = []
+    stages = Stages(tmp_path, tell=told.append, speaks=speaks)
+
+    def make(folder):
+        stages.progress.loop("epoch", 4)(1)
+
+    stages.run("enhancer", make, (), ())
+    assert told[1:-1] == ["enhancer     epoch 1 of 4, 25 %"] * speaks
+    assert stages.progress is SILENT, "nothing speaks in the name of a stage that is done"
+
+
+def test_a_stage_that_fails_speaks_no_longer(tmp_path):
+    stages = Stages(tmp_path, tell=lambda line: None, speaks=True)
+
+    def fails(folder):
+        assert stages.progress is not SILENT
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        stages.run("work", fails, (), ())
+    assert stages.progress is SILENT
+
+
+def test_an_experiment_called_from_python_is_silent(tmp_path, at_once, capsys):
+    told = []
+    _ = Experiment(make_settings("smoke", noise__filters=4), Stages(tmp_path, tell=told.append)).noise_folder
+    assert [line.split()[:2] for line in told if not line.startswith("telemetry")] == [["noise", "GAN"]] * 2
+    assert capsys.readouterr() == ("", "")
+
+
+def stages_of(*found_done):
+    return SimpleNamespace(cached=dict(enumerate(found_done)))
+
+
+def test_replicates_in_turn_say_how_long_the_others_take(clock):
+    told = []
+    turns = Turns("replicate", 4, told.append, clock)
+    for name, seconds, found_done in (("a", 2, True), ("b", 600, False), ("c", 200, False), ("d", 400, False)):
+        turns.begin(name)
+        clock.now += seconds
+        turns.end(stages_of(True, found_done))
+    assert told == [
+        "replicate 1 of 4: a",
+        "1 of 4 replicates in 2 s; about 6 s left",
+        "replicate 2 of 4: b",
+        "2 of 4 replicates in 602 s; about 20 min left",  # those in the cache took no time, and say nothing of the others
+        "replicate 3 of 4: c",
+        "3 of 4 replicates in 802 s; about 7 min left",
+        "replicate 4 of 4: d",
+        "4 of 4 replicates in 1202 s",
+    ]
+
+
+# -- the commands, for real ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def environment(tmp_path):
+    """Variables of a process, and of those that it starts, in which no time has to pass between two lines."""
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text("from enhsim_tf.common import console as terminal\nterminal.INTERVAL_S = 0.0\n")
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), str(ROOT)]), "TF_CPP_MIN_LOG_LEVEL": "3"}
+
+
+def spoken_in(text):
+    """What is counted, with its name, of all lines that say how far something is; and the largest number of each and its total."""
+    found = {}
+    for line in text.splitlines():
+        if match := SPOKEN.fullmatch(line):
+            what, number, total = match.groups()[:3]
+            found[what] = int(number.replace(",", "")), int(total.replace(",", ""))
+    return found
+
+
+def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke"]
+    command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment, timeout=600)
+    assert done.returncode == 0, done.stderr
+    assert spoken_in(done.stdout) == {
+        "enhancer     epoch": (2, 2),
+        "noise GAN    iteration": (19, 20),  # the last of all is told by the end of the stage
+        "false alarms arm": (5, 5),
+        "resemblance  comparison": (3, 4),
+    }
+    lines = done.stdout.splitlines()
+    early = lines.index(f"figures 2, 3, 8, 9, 10, 11 and 14 drawn in {tmp_path / 'out'}/ before any training")
+    assert early < lines.index("enhancer     ...") < lines.index("noise GAN    ...")
+    assert not any(SPOKEN.fullmatch(line) for line in lines[:early])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+def test_a_terminal_has_its_bars_and_none_of_the_lines(tmp_path, environment):
+    import fcntl
+    import pty
+    import struct
+    import termios
+
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", "--only", "fig13"]
+    command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))  # without a width, no bar has one
+    process = subprocess.Popen(command, cwd=ROOT, stdin=theirs, stdout=theirs, stderr=theirs, env=environment)
+    os.close(theirs)
+    shown = b""
+    while select.select([ours], [], [], 300)[0]:
+        try:
+            if not (part := os.read(ours, 65_536)):
+                break
+        except OSError:  # Linux says so that nobody is left on the other side
+            break
+        shown += part
+    os.close(ours)
+    text = shown.decode("utf-8", "replace")
+    assert process.wait(60) == 0, text
+    assert "Epoch 2/2" in text and "/step" in text and re.search(r"noise GAN: .*20/20", text)
+    assert " left" not in text and not spoken_in(text)
+
+
+def table(folder):
+    values = np.sin(2 * np.pi * np.arange(1_200) / 40) + 0.1 * np.random.default_rng(0).standard_normal((2, 1_200))
+    pd.DataFrame({"t": np.arange(1_200), "volts": values[0], "amperes": values[1]}).to_csv(folder / "x.csv", index=False)
+    return folder / "x.csv"
+
+
+FIT = ("--num-windows", "30", "--epochs", "3", "--iterations", "3", "--noise", "paper")
+
+
+def test_processes_that_fit_name_their_channel(tmp_path, environment):
+    command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--out", tmp_path / "models", "--workers", "2", *FIT]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=600)
+    assert (done.returncode, done.stderr) == (0, "")
+    expected = {"enhancer, epoch": (3, 3), "noise GAN, iteration": (2, 3)}
+    assert spoken_in(done.stdout) == {f"{name}: {what}": how for name in ("volts", "amperes") for what, how in expected.items()}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="exit code 141 is POSIX")
+def test_whoever_stops_reading_stops_no_fit(tmp_path, environment):
+    command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--column", "volts", "--out", tmp_path / "models", *FIT]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True)
+    assert process.stdout.readline().startswith("volts: enhancer, epoch 1 of 3")
+    process.stdout.close()
+    error = process.stderr.read()
+    assert (process.wait(), error) == (141, "")
+    assert (tmp_path / "models" / "volts" / "manifest.json").is_file()

@@ -1,0 +1,190 @@
+"""What a file declares of its size is compared with the file before memory is taken; what is as it says is read as it is."""
+
+import io
+import json
+import os
+import resource
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from enhsim_tf.common.size_limits import MOST_COLUMNS, check_parquet, read_json, whole_array, whole_arrays
+
+ROOT = Path(__file__).parents[2]
+
+
+def npy(path, descr, shape, content=b"", version=2):
+    """An array's file of any header."""
+    header = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    path.write_bytes(b"\x93NUMPY" + bytes([version, 0]) + len(header).to_bytes(4 if version > 1 else 2, "little") + header + content)
+    return path
+
+
+@pytest.mark.parametrize(
+    "array", [np.arange(6.0), np.asfortranarray(np.arange(6).reshape(2, 3)), np.zeros(0), np.array(["a", "ß"]), np.array(1)]
+)
+def test_an_array_is_read_as_it_was_written(tmp_path, array):
+    np.save(tmp_path / "x.npy", array)
+    found = whole_array(tmp_path / "x.npy")
+    assert type(found) is np.ndarray and found.dtype == array.dtype and found.shape == array.shape and (found == array).all()
+    np.savez_compressed(tmp_path / "x.npz", first=array, second=array)
+    kept = whole_arrays(tmp_path / "x.npz", 10_000)
+    assert list(kept) == ["first", "second"] and (kept["second"] == array).all() and kept["second"].shape == array.shape
+
+
+@pytest.mark.parametrize(
+    ("descr", "shape", "word"),
+    [
+        ("<f8", (10**12,), "greater than file"),
+        ("<f8", (61,), "greater than file"),
+        ("|u1", (10**5, 10**9), "greater than file"),
+        ("<f8", (10**30,), "too large"),
+        ("<f8", (-1,), "negative"),
+        ("|S0", (10**12,), "holds nothing"),
+        ("<U0", (10**6, 10**6), "holds nothing"),
+        ("|O", (60,), "objects"),
+        ("<U2", (60,), "Unicode"),
+    ],
+)
+def test_an_array_that_is_not_what_it_says_is_refused(tmp_path, descr, shape, word):
+    with pytest.raises(ValueError, match=word):
+        whole_array(npy(tmp_path / "x.npy", descr, shape, b"\xff" * 480))
+
+
+def zipped(path, compression=zipfile.ZIP_DEFLATED, **members):
+    with zipfile.ZipFile(path, "w", compression) as archive:
+        for name, content in members.items():
+            archive.writestr(f"{name}.npy", content)
+    return path
+
+
+def test_an_archive_of_arrays_that_unpacks_without_end_is_refused(tmp_path):
+    bomb = io.BytesIO()
+    np.lib.format.write_array(bomb, np.zeros(10**7))
+    path = zipped(tmp_path / "x.npz", value=bomb.getvalue())
+    assert path.stat().st_size < 10**6
+    with pytest.raises(ValueError, match="larger than"):
+        whole_arrays(path, 10**6)
+
+
+@pytest.mark.parametrize("shape", [(10**12,), (10**6,), (0,), (3,)])
+def test_an_array_in_an_archive_has_to_be_as_long_as_it_says(tmp_path, shape):
+    content = npy(tmp_path / "x.npy", "<f8", shape, bytes(32)).read_bytes()
+    with pytest.raises(ValueError, match="another size"):
+        whole_arrays(zipped(tmp_path / "x.npz", value=content), 10**6)
+
+
+def repeated(num_rows, word=None):
+    """A small file of many equal rows, which Parquet writes as one and a count."""
+    cells = pa.DictionaryArray.from_arrays(pa.array(np.zeros(num_rows, np.int32)), pa.array([1.5 if word is None else word]))
+    sink = io.BytesIO()
+    pq.write_table(
+        pa.table({"value": cells.cast(cells.type.value_type) if word is None else cells}), sink, compression="zstd", store_schema=False
+    )
+    return sink.getvalue()
+
+
+def test_a_table_that_would_fill_the_memory_is_refused(tmp_path):
+    path = tmp_path / "x.parquet"
+    path.write_bytes(repeated(30_000_000))
+    assert path.stat().st_size < 150_000
+    with pytest.raises(ValueError, match="30,000,000 values"):
+        check_parquet(path)
+    path.write_bytes(repeated(1_000_000, "long " * 20_000))  # 100 GB of text
+    assert path.stat().st_size < 100_000
+    with pytest.raises(ValueError, match="text that becomes"):
+        check_parquet(path)
+    lists = pa.array([[0.0] * 100_000] * 200, pa.list_(pa.float64()))  # 160 MB in few rows
+    pq.write_table(pa.table({"x": lists}), path, compression="zstd")
+    assert path.stat().st_size < 150_000
+    with pytest.raises(ValueError, match="20,000,000 values"):
+        check_parquet(path)
+    wide = pa.array([b"w" * 1_000_000] * 2, pa.binary(1_000_000)).dictionary_encode()
+    wide = pa.DictionaryArray.from_arrays(pa.array(np.zeros(4_000, np.int32)), wide.dictionary)
+    pq.write_table(pa.table({"x": wide}), path, row_group_size=50, compression="zstd")  # 4 GB, which the writer holds a group at a time
+    assert path.stat().st_size < 150_000
+    with pytest.raises(ValueError, match="fixed width|text that becomes"):
+        check_parquet(path)
+    pq.write_table(pa.table({str(number): [1.0] for number in range(MOST_COLUMNS + 1)}), path)
+    with pytest.raises(ValueError, match="columns"):
+        check_parquet(path)
+
+
+def test_tables_of_telemetry_pass(tmp_path):
+    path, rng = tmp_path / "x.parquet", np.random.default_rng(0)
+    times = pd.date_range("2024-01-01", periods=3_000_000, freq="s")
+    for values in (rng.standard_normal(len(times)).astype(np.float32), np.round(np.sin(np.arange(len(times)) / 900), 1)):
+        pd.DataFrame({"time": times, "value": values}).to_parquet(path)
+        check_parquet(path)
+    pd.DataFrame({"time": times[:200_000].astype(str), "value": values[:200_000], "mode": "nominal operation"}).to_parquet(path)
+    check_parquet(path)
+
+
+@pytest.mark.parametrize("content", ["[" * 100_000, "{", '{"a": ' * 50_000, "\ud800".encode("utf-8", "surrogatepass"), " " * 2_000])
+def test_json_that_is_none_or_too_large_or_too_deep_is_refused(tmp_path, content):
+    path = tmp_path / "x.json"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(ValueError, match=r".+"):
+        read_json(path, 1_000 if content == " " * 2_000 else 10**7)
+    path.write_text(json.dumps({"a": [1, None]}))
+    assert read_json(path, 100) == {"a": [1, None]}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes of a name")
+def test_a_pipe_is_no_file_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "x.json")
+    with pytest.raises(ValueError, match="no file"):
+        read_json(tmp_path / "x.json", 100)
+    with pytest.raises(FileNotFoundError):
+        read_json(tmp_path / "y.json", 100)
+
+
+BOMBS = {
+    "npy": lambda path: npy(path, "<f8", (10**12,), bytes(80)),
+    "rows.parquet": lambda path: path.write_bytes(repeated(30_000_000)),
+    "text.parquet": lambda path: path.write_bytes(repeated(1_000_000, "long " * 20_000)),
+    "yaml": lambda path: path.write_text(
+        "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(f"{b}: &{b} [{', '.join(9 * [f'*{a}'])}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
+    ),
+    "_manifest.json": lambda path: path.write_text('{"format": "enhsim_tf.datasets.generate/1", "settings": {"windows": 1000000000, "shard": 1, "window": 1,'
+                                                   ' "interval_s": 1.0, "models": []}, "shards": [' + "{}," * 300_000 + "{}]}"),
+}  # fmt: skip
+READS = """
+import resource, sys
+from pathlib import Path
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.datasets.folder import problems_of
+import pyarrow.parquet, pandas, yaml
+path = Path(sys.argv[1])
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    {"json": lambda: list(problems_of(path.parent)), "yaml": lambda: read_mix(path)}.get(path.suffix[1:], lambda: read_source(path))()
+except InputError as error:
+    print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024, error)
+"""
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_bomb_is_refused_in_one_line_and_little_memory(tmp_path, name):
+    path = tmp_path / ("x." + name if name != "_manifest.json" else name)
+    BOMBS[name](path)
+    limit = 4 * 2**30  # of address space; what is taken of it is told
+    ended = subprocess.run(
+        [sys.executable, "-c", READS, path],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+    )
+    assert ended.returncode == 0 and not ended.stderr, ended.stderr[-2_000:]
+    (line,) = ended.stdout.splitlines()
+    assert int(line.split(" ")[0]) < 1_024 and "Expected" in line

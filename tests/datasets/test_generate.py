@@ -1,0 +1,570 @@
+"""Data sets: the same bytes whoever worked and however often it was stopped; what is damaged is found; reading them back."""
+
+import importlib.metadata
+import itertools
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from enhsim_tf.__main__ import main
+from enhsim_tf.cli import generate_many as fleet_command
+from enhsim_tf.common.atomic_files import sha256
+from enhsim_tf.datasets import generate as fleet
+from enhsim_tf.datasets.generate import generate_fleet, verify
+from enhsim_tf.datasets.plan import plan_of
+from enhsim_tf.datasets.scenario_file import Mix
+from enhsim_tf.datasets.shard import file_of
+from tests.faults.small_data_set import PlainMaker, plan
+
+ROOT = Path(__file__).parents[2]
+WORKS = ROOT / "tests" / "faults" / "small_data_set.py"
+
+
+def serial(engine, work, numbers, workers=None):
+    """An engine in this process."""
+    yield from map(work, numbers)
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Makes data sets in this process, without networks; `made` lists the shards that were made."""
+    made = []
+
+    class Maker(PlainMaker):
+        def __call__(self, shard):
+            made.append(shard)
+            return super().__call__(shard)
+
+    monkeypatch.setattr(fleet, "ShardMaker", Maker)
+    monkeypatch.setattr(fleet.engines, "run", serial)
+    return made
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """The data set of 1,000 windows that the command of `small_data_set.py` makes, made without any disturbance."""
+    folder = tmp_path_factory.mktemp("undisturbed") / "set"
+    before = fleet.ShardMaker, fleet.engines.run
+    fleet.ShardMaker, fleet.engines.run = PlainMaker, serial
+    generate_fleet(folder, plan(), tell=lambda line: None)
+    fleet.ShardMaker, fleet.engines.run = before
+    return folder
+
+
+def content_of(folder):
+    return {path.name: sha256(path) for path in folder.iterdir()}
+
+
+def copy_of(folder, path):
+    shutil.copytree(folder, path)
+    return path
+
+
+def told(call, *arguments, **options):
+    """The lines that a call tells."""
+    lines = []
+    call(*arguments, tell=lines.append, **options)
+    return lines
+
+
+# what is written
+
+
+def test_the_manifest_says_what_the_data_set_is(undisturbed):
+    manifest = json.loads((undisturbed / "_manifest.json").read_text())
+    assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(file_of(shard) for shard in range(20))])
+    assert (
+        manifest["format"] == "enhsim_tf.datasets.generate/1" and manifest["settings"]["seed"] == 3 and manifest["settings"]["window"] == 60
+    )
+    assert manifest["settings"]["models"] == [{"name": "model-0", "share": 1.0, "sha256": "0" * 64}]
+    assert [shard["rows"] for shard in manifest["shards"]] == [50] * 20
+    for shard in manifest["shards"]:
+        assert sha256(undisturbed / shard["file"]) == shard["sha256"]
+    assert told(verify, undisturbed) == ["1,000 windows in 20 shards, all as they were recorded"]
+
+
+def test_a_second_run_finds_all_of_it(undisturbed, tmp_path, here):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    lines = told(generate_fleet, folder, plan())
+    assert lines[0].startswith("20 of 20 shards") and here == [] and content_of(folder) == content_of(undisturbed)
+
+
+DAMAGES = {
+    "shards removed": lambda folder: [(folder / file_of(shard)).unlink() for shard in (3, 7)],
+    "shards cut": lambda folder: [os.truncate(folder / file_of(shard), 1_000) for shard in (3, 7)],
+    "a byte changed": lambda folder: [flip(folder / file_of(shard)) for shard in (3, 7)],
+    "shards exchanged": lambda folder: exchange(folder / file_of(3), folder / file_of(7)),
+}
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def exchange(one, other):
+    one.rename(one.with_suffix(".x"))
+    other.rename(one)
+    one.with_suffix(".x").rename(other)
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damaged_shards_are_found_and_made_again(name, undisturbed, tmp_path, here):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    DAMAGES[name](folder)
+    lines = told(verify, folder)
+    assert len(lines) == 2 and [line.split(":")[0] for line in lines] == [file_of(3), file_of(7)]
+    assert told(generate_fleet, folder, plan())[0].startswith("18 of 20 shards") and here == [3, 7]
+    assert content_of(folder) == content_of(undisturbed) and verify(folder, lambda line: None) == 0
+
+
+def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
+    """A data set as a killed run leaves it."""
+    shutil.copytree(undisturbed, folder)
+    manifest = json.loads((folder / "_manifest.json").read_text())
+    lines = [json.dumps([shard, 50, manifest["shards"][shard]["sha256"]]).encode() + b"\n" for shard in done]
+    (folder / "_journal.jsonl").write_bytes(b"".join(lines) + tail)
+    (folder / "_manifest.json").write_text(json.dumps(manifest | {"shards": None}))
+    for shard in set(range(20)) - set(done):
+        (folder / file_of(shard)).unlink()
+    (folder / f".{file_of(9)}.host.123.0123abcd.parquet").write_bytes(b"half")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "tail",
+    [
+        b"",
+        b"[6, 50",
+        b'[7, 50, "0"]\n',
+        b"\xff\x00\n[]\n{}\nnull\n[8]\n[1e999,1,1]\n" + b"[" * 5_000 + b"\n",
+        b'[99, 50, "a"]\n[true, 50, "a"]\n',
+    ],
+)
+def test_a_run_goes_on_behind_what_is_finished(tail, undisturbed, tmp_path, here):
+    folder = begun(tmp_path / "set", undisturbed, tail=tail)
+    assert told(verify, folder)[0].startswith("not finished")
+    told(generate_fleet, folder, plan())
+    assert here == [shard for shard in range(20) if shard not in (0, 1, 2, 5)]
+    assert content_of(folder) == content_of(undisturbed)
+
+
+def test_a_journal_goes_on_behind_a_torn_line(undisturbed, tmp_path, monkeypatch, here):
+    folder = begun(tmp_path / "set", undisturbed, tail=b'[3, 50, "01')
+    monkeypatch.setattr(fleet.engines, "run", lambda engine, work, numbers, workers: serial(engine, work, itertools.islice(numbers, 3)))
+    with pytest.raises(KeyError):  # this engine stops after three
+        told(generate_fleet, folder, plan())
+    monkeypatch.setattr(fleet.engines, "run", serial)
+    assert told(generate_fleet, folder, plan())[0].startswith("7 of 20 shards")
+    assert content_of(folder) == content_of(undisturbed)
+
+
+def test_a_removed_manifest_is_made_again(undisturbed, tmp_path, here):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    (folder / "_manifest.json").unlink()
+    told(generate_fleet, folder, plan())
+    assert len(here) == 20 and content_of(folder) == content_of(undisturbed)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b"\xff",
+        b'{"format": "other"}',
+        b"[" * 100_000,
+        b'{"format": "enhsim_tf.datasets.generate/1", "settings": {}}',
+    ],
+)
+def test_a_damaged_manifest_is_one_line_that_says_what_to_do(content, undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    (folder / "_manifest.json").write_bytes(content)
+    for call in (lambda: generate_fleet(folder, plan()), lambda: verify(folder)):
+        with refused("_manifest.json", "Remove it"):
+            call()
+    assert not here
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_manifest_damaged_anywhere_is_seen(seed, undisturbed, tmp_path, capsys):
+    folder, rng = copy_of(undisturbed, tmp_path / "set"), np.random.default_rng(seed)
+    content = bytearray((folder / "_manifest.json").read_bytes())
+    places = [place for place, byte in enumerate(content) if chr(byte).isalnum()]
+    place = rng.choice(places)
+    content[place] = ord("7") if content[place] != ord("7") else ord("3")
+    (folder / "_manifest.json").write_bytes(content)
+    assert main(["verify", str(folder)]) == 2
+    spoken = capsys.readouterr()
+    assert spoken.out + spoken.err and "Traceback" not in spoken.err
+
+
+def test_a_record_that_does_not_come_true_is_not_passed_over(undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    manifest = json.loads((folder / "_manifest.json").read_text())
+    manifest["shards"][4]["sha256"] = "0" * 64
+    (folder / "_manifest.json").write_text(json.dumps(manifest))
+    with refused(file_of(4), "computes otherwise"):
+        generate_fleet(folder, plan())
+
+
+def test_a_shard_that_another_machine_kept_is_not_believed(tmp_path, here, monkeypatch, refused):
+    class Elsewhere(fleet.ShardMaker):
+        def __call__(self, shard):
+            record = super().__call__(shard)
+            if shard == 3:
+                (self.folder / file_of(shard)).unlink()
+            return record
+
+    maker = fleet.ShardMaker
+    monkeypatch.setattr(fleet, "ShardMaker", Elsewhere)
+    with refused(file_of(3), "all machines share"):
+        generate_fleet(tmp_path / "set", plan())
+    monkeypatch.setattr(fleet, "ShardMaker", maker)
+    assert told(generate_fleet, tmp_path / "set", plan())[0].startswith("3 of 20 shards")
+
+
+def test_shards_of_a_larger_data_set_are_not_left_beside_a_smaller(undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    (folder / "_manifest.json").unlink()
+    with refused(file_of(10)):
+        generate_fleet(folder, plan(500))
+    assert not here
+
+
+def test_what_looks_at_a_folder_writes_nothing_but_the_lock(tmp_path, refused):
+    from enhsim_tf.datasets.folder import held
+
+    with held(tmp_path / "above" / "set"):
+        assert os.listdir(tmp_path / "above" / "set") == [".lock"]
+    (tmp_path / "file").touch()
+    with refused("can be written to"):
+        generate_fleet(tmp_path / "file" / "set", plan())
+
+
+def test_a_line_without_end_in_the_journal_takes_no_memory(undisturbed, tmp_path):
+    import tracemalloc
+
+    from enhsim_tf.datasets.folder import read_records
+
+    folder = copy_of(undisturbed, tmp_path / "set")
+    manifest = json.loads((folder / "_manifest.json").read_text())
+    lines = [json.dumps([shard, 50, manifest["shards"][shard]["sha256"]]).encode() + b"\n" for shard in (1, 2)]
+    (folder / "_manifest.json").write_text(json.dumps(manifest | {"shards": None}))
+    (folder / "_journal.jsonl").write_bytes(lines[0] + b"[" * 5_000_000 + b"\n" + lines[1])
+    tracemalloc.start()
+    found = read_records(folder)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert sorted(found) == [1, 2] and peak < 1_000_000
+
+
+def test_a_reader_who_has_left_is_no_fault_of_the_folder(tmp_path, here):
+    def left(line):
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        generate_fleet(tmp_path / "set", plan(), tell=left)
+
+
+# other folders
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        (plan(seed=4), ["seed", "3", "4"]),
+        (plan(2_000), ["windows", "1000", "2000"]),
+        (plan(shard=100), ["shard"]),
+        (plan(mix=Mix()), ["nominal"]),
+        (plan(shares=(0.5, 0.5)), ["models"]),
+    ],
+    ids=["seed", "windows", "shard", "mix", "models"],
+)
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_data_set_of_other_settings_is_left_as_it_is(other, words, finished, undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set") if finished else begun(tmp_path / "set", undisturbed)
+    before = content_of(folder)
+    with refused(*words, "--out"):
+        generate_fleet(folder, other)
+    assert content_of(folder) == before and not here
+
+
+def test_other_versions_do_not_go_on(undisturbed, tmp_path, here, monkeypatch, refused):
+    folder, known = begun(tmp_path / "set", undisturbed), importlib.metadata.version
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "9.9" if name == "keras" else known(name))
+    with refused("versions", "9.9"):
+        generate_fleet(folder, plan())
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "shard-000000.parquet", "training.parquet", "folder"])
+def test_a_folder_of_something_else_is_left_as_it_is(name, tmp_path, here, refused):
+    (tmp_path / name).mkdir() if name == "folder" else (tmp_path / name).write_text("mine")
+    with refused(name):
+        generate_fleet(tmp_path, plan())
+    assert [path.name for path in tmp_path.iterdir()] == [name] and not here
+
+
+def test_shards_of_another_data_set_are_not_written_over(undisturbed, tmp_path, here, refused):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    (folder / "_manifest.json").unlink()
+    with refused(file_of(0)):
+        generate_fleet(folder, plan(seed=4))
+
+
+def test_outputs_that_are_no_folder_are_refused(tmp_path, here, refused):
+    (tmp_path / "file").touch()
+    with refused("folder"):
+        generate_fleet(tmp_path / "file", plan())
+    with refused("folder"):
+        generate_fleet(tmp_path / "set.parquet", plan())
+
+
+@pytest.mark.parametrize("extra", ["shard-000020.parquet", "_journal.jsonl"])
+def test_verify_names_what_does_not_belong(extra, undisturbed, tmp_path):
+    folder = copy_of(undisturbed, tmp_path / "set")
+    (folder / extra).touch()
+    assert told(verify, folder) == [f"{extra}: not of this data set"]
+
+
+def test_verify_sees_what_checksums_vouch_for(undisturbed, tmp_path):
+    import pyarrow.parquet as pq
+
+    folder = copy_of(undisturbed, tmp_path / "set")
+    manifest = json.loads((folder / "_manifest.json").read_text())
+    pq.write_table(pq.read_table(folder / file_of(0)).slice(1), folder / file_of(0))
+    pq.write_table(pq.read_table(folder / file_of(1)).drop(["onset"]), folder / file_of(1))
+    (folder / file_of(2)).write_text("no table")
+    for shard in range(3):
+        manifest["shards"][shard]["sha256"] = sha256(folder / file_of(shard))
+    (folder / "_manifest.json").write_text(json.dumps(manifest))
+    lines = told(verify, folder)
+    assert [line.split(":")[0] for line in lines] == [file_of(0), file_of(1), file_of(2)]
+    assert "49 windows, 50 recorded" in lines[0] and "columns" in lines[1] and "no Parquet" in lines[2]
+
+
+# faults, for real
+
+
+def started(folder, *options, **how):
+    return subprocess.Popen(
+        [sys.executable, WORKS, folder, *map(str, options)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how
+    )
+
+
+def wait_for(folder, num_shards, process):
+    """Waits until a run has written some shards; the moment is that of a file, not of a clock."""
+    while len(list(folder.glob("shard-*"))) < num_shards and process.poll() is None:
+        time.sleep(0.002)
+
+
+def children_of(process):
+    """The processes of a run's pool."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+            if int(fields[1]) == process.pid and b"spawn_main" in (stat.parent / "cmdline").read_bytes():
+                found.append(int(stat.parent.name))
+        except OSError:  # it has ended meanwhile
+            continue
+    return found
+
+
+linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+
+
+@linux
+@pytest.mark.parametrize(("who", "seed"), [("driver", 0), ("driver", 1), ("worker", 2), ("worker", 3)])
+def test_killed_runs_are_recovered_bit_for_bit(who, seed, undisturbed, tmp_path):
+    folder, rng = tmp_path / "set", np.random.default_rng(seed)
+    folder.mkdir()
+    process = started(folder)
+    wait_for(folder, rng.integers(1, 15), process)
+    time.sleep(rng.uniform(0, 0.03))
+    workers = children_of(process)
+    os.kill(process.pid if who == "driver" else workers[0], signal.SIGKILL)
+    process.communicate()
+    if who == "driver":
+        assert process.returncode == -signal.SIGKILL
+        again = started(folder)  # its orphans may still be at work
+        assert "shards are there" in again.communicate()[0] and again.returncode == 0
+    else:
+        assert process.returncode == 0
+    assert content_of(folder) == content_of(undisturbed)
+    deadline = time.monotonic() + 20
+    while any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()], "an orphan lives on"
+
+
+def test_an_interrupt_is_one_line_and_nothing_is_lost(undisturbed, tmp_path):
+    folder = tmp_path / "set"
+    folder.mkdir()
+    process = started(folder, start_new_session=True)
+    wait_for(folder, 4, process)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers are told, too
+    out, err = process.communicate()
+    assert (process.returncode, err, out) == (130, "interrupted; what was finished is kept\n", "")
+    assert not [name for name in os.listdir(folder) if name.startswith(".shard")]
+    assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
+
+
+def test_a_full_disk_is_one_line_and_what_was_finished_is_kept(undisturbed, tmp_path):
+    folder = tmp_path / "set"
+    process = started(folder, "--limit", 9_000)  # no file may grow beyond: what writing to a full disk looks like to a program
+    out, err = process.communicate()
+    assert process.returncode == 2 and err.startswith("error: Expected ") and len(err.splitlines()) == 1 and "large" in err
+    assert not [name for name in os.listdir(folder) if "shard" in name]
+    assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
+
+
+def test_a_disk_that_fills_up_while_records_are_written(undisturbed, tmp_path, here, monkeypatch, refused):
+    from enhsim_tf.datasets import folder as shard_folder
+
+    folder, dumps = tmp_path / "set", shard_folder.json.dumps
+
+    def full(content, **options):
+        if isinstance(content, tuple) and content.shard == 5:
+            raise OSError(28, "No space left on device")
+        return dumps(content, **options)
+
+    monkeypatch.setattr(shard_folder.json, "dumps", full)
+    with refused("No space left"):
+        generate_fleet(folder, plan())
+    monkeypatch.undo()
+    assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
+
+
+def test_a_folder_that_cannot_be_written_is_one_line():
+    as_another = ["--user", 65534] if os.geteuid() == 0 else []  # the superuser may write anywhere
+    with tempfile.TemporaryDirectory() as outer:  # which others may enter, unlike `tmp_path`
+        folder = Path(outer) / "set"
+        folder.mkdir()
+        folder.chmod(0o555)
+        Path(outer).chmod(0o755)
+        process = started(folder, *as_another)
+        out, err = process.communicate()
+        assert (process.returncode, out, os.listdir(folder)) == (2, "", [])
+        assert "can be written" in err and "Permission denied" in err and len(err.splitlines()) == 1
+        folder.chmod(0o755)
+
+
+def test_a_second_run_into_the_same_folder_is_refused(undisturbed, tmp_path):
+    folder = tmp_path / "set"
+    folder.mkdir()
+    first = started(folder)
+    wait_for(folder, 2, first)
+    second = started(folder)
+    assert "no other run" in second.communicate()[1] and second.returncode == 2
+    assert first.wait() == 0 and content_of(folder) == content_of(undisturbed)
+
+
+# the command, with networks
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    """A folder of two saved simulators of tiny networks."""
+    from tests.enhanced_simulator.test_simulator import small
+
+    folder = tmp_path_factory.mktemp("models")
+    for seed, name in enumerate(("volts", "amps")):
+        small(window=60, seed=seed).save(folder / name)
+    return folder
+
+
+def test_the_command_makes_what_one_process_makes(models, tmp_path, monkeypatch, capsys):
+    mix = tmp_path / "mix.yaml"
+    mix.write_text("windows: 150\nshard: 50\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n")
+    mix.write_text(mix.read_text() + "models: [{folder: amps, share: 0.4}, {folder: volts, share: 0.6}]\n")
+    assert main(["generate", str(models), "--scenarios", str(mix), "--workers", "2", "--out", str(tmp_path / "set")]) == 0
+    assert capsys.readouterr().out.startswith("150 windows of 60 samples in 3 shards")
+    monkeypatch.setattr(fleet.engines, "run", serial)
+    generate_fleet(tmp_path / "serial", plan_of(fleet_command.read_mix(mix), models, 5, 150), tell=lambda line: None)
+    assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
+    assert main(["verify", str(tmp_path / "set")]) == 0
+
+
+def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(fleet, "ShardMaker", PlainMaker)
+    monkeypatch.setattr(fleet.engines, "run", serial)
+    options = ["generate", str(models), "--windows", "1_000", "--workers", "auto", "--scenario", "stuck:0.5", "--seed", "4"]
+    assert main([*options, "--out", str(tmp_path / "both")]) == 0
+    assert main([*options, "--channel", "volts", "--out", str(tmp_path / "one")]) == 0
+    assert sorted(os.listdir(tmp_path / "both")) == ["amps", "volts"]
+    assert content_of(tmp_path / "both" / "volts") == content_of(tmp_path / "one")
+    settings = json.loads((tmp_path / "one" / "_manifest.json").read_text())["settings"]
+    assert (settings["seed"], settings["nominal"], settings["models"][0]["name"]) == (4, 0.5, "volts")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--workers", "two", "--windows", "9"], "--workers"),
+        (["--workers", "0", "--windows", "9"], "--workers"),
+        (["--workers", "1"], "windows"),
+        (["--workers", "1", "--continuous", "1d"], "--continuous"),
+        (["--scenarios", "mix.yaml", "--scenario", "stuck:0.5"], "--scenario"),
+        (["--scenarios", "mix.yaml", "--windows", "9"], "10 in the scenario file"),
+        (["--scenarios", "mix.yaml", "--seed", "2"], "seed"),
+        (["--scenarios", "mix.yaml", "--seed", "0"], "seed"),
+        (["--workers", "1", "--windows", "9", "--start", "2024-01-01"], "--start"),
+        (["--workers", "1", "--windows", "9", "--nominal-share", "0.3"], "--nominal-share"),
+        (["--workers", "1", "--windows", "9", "--scenario", "stuck:0.5:0.9995"], "0.9995"),
+        (["--scenarios", "mix.yaml", "--channel", "volts"], "--channel"),
+        (["--engine", "local", "--windows", "9", "--channel", "x"], "'x'"),
+        (["--engine", "spark", "--windows", "9"], "spark"),
+        (["--workers", "1", "--windows", "20_000_000_000"], "windows"),
+        ([], "--windows"),
+    ],
+)
+def test_options_that_do_not_go_together(options, words, models, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mix.yaml").write_text("windows: 10\nseed: 1\nmodels: [{folder: volts}]\n")
+    assert main(["generate", str(models), *options, "--out", "set"]) == 2
+    spoken = capsys.readouterr().err
+    assert spoken.startswith("error: Expected ") and len(spoken.splitlines()) == 1 and words in spoken
+    assert not (tmp_path / "set").exists()
+
+
+# reading
+
+
+DOCS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize(("number", "library"), list(enumerate(("pandas", "pyarrow.dataset", "tensorflow"))))
+def test_what_the_documentation_reads_is_what_was_made(number, library, undisturbed, monkeypatch):
+    monkeypatch.chdir(undisturbed.parent)
+    code = DOCS[number].replace('"training"', '"set"')
+    assert f"import {library}" in code and len(DOCS) == 3
+    names = {}
+    exec(compile(code, "docs/fleet.md", "exec"), names)
+    import pandas as pd
+
+    table = pd.read_parquet(sorted(undisturbed.glob("shard-*.parquet")))
+    windows, nominal = np.stack(table["window"]), (table["scenario"] == "nominal").to_numpy()
+    if library == "pandas":
+        assert np.array_equal(names["windows"], windows) and len(names["table"]) == 1_000
+    elif library == "pyarrow.dataset":
+        stuck = table[(table["scenario"] == "stuck") & (table["severity"] > 0.5)]
+        assert names["stuck"].num_rows == len(stuck) > 0
+        assert names["num_windows"] == 1_000
+    else:
+        batches = list(names["data"].as_numpy_iterator())
+        assert np.array_equal(np.concatenate([batch for batch, _ in batches]), windows)
+        assert np.array_equal(np.concatenate([label for _, label in batches]), ~nominal)

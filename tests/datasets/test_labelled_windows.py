@@ -1,0 +1,277 @@
+"""Labelled training data: what the labels say is what was generated, and files are whole or not there."""
+
+import hashlib
+
+import keras
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.datasets.labelled_windows import (
+    Share,
+    num_samples_of,
+    parse_length,
+    parse_scenario,
+    series_labelled,
+    shares_of,
+    start_of,
+    write_series_labelled,
+    write_windows_labelled,
+)
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.noise.surrogates import GaussianNoise
+
+WINDOW = 60
+COARSE = SquareWaveSimulator([SquareWave(48, low=-0.5, high=0.5)])
+
+
+def known(noise_sd=0.1, interval_s=2.0):
+    """Made of known processes: the coarse signal itself plus white noise."""
+    enhancer = keras.Sequential([keras.Input((WINDOW,)), keras.layers.Dense(WINDOW)])
+    enhancer.layers[0].set_weights([np.eye(WINDOW), np.zeros(WINDOW)])
+    return EnhancedSimulator(COARSE, enhancer, GaussianNoise(noise_sd, WINDOW), interval_s, trained={"telemetry": "volts"})
+
+
+# what is asked for
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("stuck:0.5", Degraded("stuck", 0.5)),
+        ("drift:1:0", Degraded("drift", 1.0, 0.0)),
+        ("period_change:0:0.99", Degraded("period_change", 0.0, 0.99)),
+        ("dropout:1e-2", Degraded("dropout", 0.01)),
+    ],
+)
+def test_scenarios_are_read(text, expected):
+    assert parse_scenario(text) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "stuck",
+        "stuck:",
+        "stuck:half",
+        "stuck:0.5:",
+        "stuck:2",
+        "stuck:-0.1",
+        "stuck:nan",
+        "stuck:0.5:1",
+        "stuck:0.5:0.1:7",
+        "nominal:0.5",
+    ],
+)
+def test_what_is_no_scenario_is_refused(refused, text):
+    with refused():
+        parse_scenario(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "interval_s", "expected"),
+    [
+        ("5000", 17.0, 5_000),
+        ("1d", 1.0, 86_400),
+        ("1d", 60.0, 1_440),
+        ("6h", 0.5, 43_200),
+        ("90min", 10.0, 540),
+        ("1ms", 0.001, 1),
+        ("365d", 60.0, 525_600),
+        ("100 s", 8.0, 12),
+        ("0.5D", 86.4, 500),
+        ("2.5 min", 10.0, 15),
+    ],
+)
+def test_lengths_are_samples(text, interval_s, expected):
+    assert num_samples_of(text, interval_s) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "0", "-5", "0s", "-1d", "nan", "NaT", "inf", "long", "1 fortnight", "5000.5", "1e3", "²", "1m", "1d 6h", "1.d", "d", "9" * 5_000],
+)
+def test_what_is_no_length_is_refused(refused, text):
+    with refused("1d, 6h", "5000"):
+        parse_length(text)
+
+
+@pytest.mark.parametrize(("text", "interval_s"), [("1s", 10.0), ("1000d", 1.0), ("20000001", 1.0)])
+def test_lengths_out_of_range_are_refused_where_the_interval_is_known(refused, text, interval_s):
+    assert parse_length(text)
+    with refused(f"one every {interval_s:g} s", repr(text)):
+        num_samples_of(text, interval_s)
+
+
+def test_starts_are_in_utc():
+    assert start_of("2024-01-01") == pd.Timestamp("2024-01-01", tz="UTC")
+    assert start_of("2024-06-01T12:00+02:00") == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+    assert start_of(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+
+
+@pytest.mark.parametrize("text", ["", "soon", "01.02.2024", "1066-10-14", "9999-01-01", "2024-13-01"])
+def test_what_is_no_start_is_refused(refused, text):
+    with refused("2024-01-01"):
+        start_of(text)
+
+
+# how windows are divided
+
+
+@pytest.mark.parametrize(
+    ("num_scenarios", "num_windows", "nominal_share", "expected"),
+    [
+        (0, 100, 0.5, [100]),
+        (1, 100, 0.5, [50, 50]),
+        (2, 101, 0.5, [50, 26, 25]),
+        (3, 100, 0.1, [10, 30, 30, 30]),
+        (2, 7, 0.0, [4, 3]),
+        (1, 7, 1.0, [7]),
+    ],
+)
+def test_windows_are_divided(num_scenarios, num_windows, nominal_share, expected):
+    scenarios = [Degraded(mode) for mode in list(MODES)[:num_scenarios]]
+    shares = shares_of(scenarios, num_windows, nominal_share, seed=3)
+    assert [share.num_windows for share in shares] == expected and sum(expected) == num_windows
+    present = ([None] if nominal_share or not scenarios else []) + (scenarios if nominal_share < 1 else [])
+    assert [share.scenario for share in shares] == present
+    assert len({share.seed for share in shares}) == len(shares)
+    assert shares == shares_of(scenarios, num_windows, nominal_share, seed=3) != shares_of(scenarios, num_windows, nominal_share, seed=4)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
+def test_a_share_that_is_none_is_refused(refused, share):
+    with refused("from 0 to 1"):
+        shares_of([Degraded("stuck")], 10, share, 0)
+
+
+def test_no_scenario_is_dropped_silently(refused):
+    with refused("each of 3 scenarios", "4 windows"):
+        shares_of([Degraded("stuck"), Degraded("drift"), Degraded("dropout")], 4, 0.5, 0)
+
+
+# windows
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A training set, its shares and the simulator that made it."""
+    scenarios = [Degraded("stuck", 0.5, 0.4), Degraded("drift", 0.8, 0.29), Degraded("gain_loss", 0.0)]
+    shares, path = shares_of(scenarios, 80, 0.25, seed=7), tmp_path / "deep" / "training.parquet"
+    write_windows_labelled(path, known(), shares)
+    return path, shares
+
+
+def test_labels_say_what_was_generated(written):
+    path, shares = written
+    frame, first = pd.read_parquet(path), 0
+    assert list(frame.columns) == ["window", "scenario", "severity", "onset"] and len(frame) == 80
+    for share in shares:
+        rows = frame.iloc[first : first + share.num_windows]
+        expected = known().generate(share.num_windows, share.scenario, share.seed)
+        np.testing.assert_array_equal(np.stack(rows["window"]), expected)
+        first += share.num_windows
+    counts = frame.groupby(["scenario", frame["severity"].round(6)]).size().to_dict()
+    assert counts == {("nominal", 0.0): 20 + 20, ("stuck", 0.5): 20, ("drift", np.float32(0.8)): 20}  # severity 0 is nominal
+    assert frame["onset"].isna().sum() == 40 and frame.loc[frame["scenario"] == "nominal", "onset"].isna().all()
+
+
+@pytest.mark.parametrize("onset", [0.0, 0.25, 0.29, 0.4, 0.99])
+def test_the_onset_is_the_first_sample_concerned(tmp_path, onset):
+    # a drift of the coarse signal alone begins with nothing: the first difference is one sample later
+    scenario = Degraded("drift", 1.0, onset)
+    write_windows_labelled(tmp_path / "x.parquet", known(noise_sd=0), [Share(None, 5, 1), Share(scenario, 5, 1)])
+    frame = pd.read_parquet(tmp_path / "x.parquet")
+    nominal, drifting = np.stack(frame["window"][:5]), np.stack(frame["window"][5:])
+    (label,) = set(frame["onset"][5:])
+    assert label == int(round(onset * WINDOW, 6))
+    np.testing.assert_array_equal(drifting[:, : int(label) + 1], nominal[:, : int(label) + 1])
+    if label + 1 < WINDOW:
+        assert (drifting[:, int(label) + 1 :] != nominal[:, int(label) + 1 :]).all()
+
+
+def test_an_onset_behind_the_last_sample_is_refused(tmp_path, refused):
+    late = Degraded("friction", 0.5, 1 - 1e-9)
+    with refused("onset within 60 samples"):
+        write_windows_labelled(tmp_path / "x.parquet", known(), [Share(late, 5, 1)])
+    with refused("onset within 30 samples"):
+        write_series_labelled(tmp_path / "y.parquet", known(), 30, late, 0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_other_programs_can_read_it(written):
+    path, _ = written
+    schema = pq.read_schema(path)
+    assert str(schema.field("window").type) == "fixed_size_list<element: float>[60]" or schema.field("window").type.list_size == WINDOW
+    assert [str(schema.field(name).type) for name in ("scenario", "severity", "onset")] == ["string", "float", "int32"]
+    assert schema.metadata[b"interval_s"] == b"2.0" and schema.metadata[b"channel"] == b"volts"
+    assert pq.read_table(path, filters=[("scenario", "==", "stuck")]).num_rows == 20
+
+
+def test_same_seed_same_bytes(tmp_path):
+    scenarios = [Degraded("friction", 0.5), Degraded("dropout", 0.9)]
+
+    def sums(seed):
+        write_windows_labelled(tmp_path / "windows.parquet", known(), shares_of(scenarios, 50, 0.5, seed))
+        write_series_labelled(tmp_path / "series.parquet", known(), 700, scenarios[1], seed)
+        return [hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() for name in ("windows.parquet", "series.parquet")]
+
+    once = sums(5)
+    assert once == sums(5) and all(one != other for one, other in zip(once, sums(6), strict=True))
+
+
+# series
+
+
+@pytest.mark.parametrize("scenario", [None, Degraded("dropout", 0.7, 0.3), Degraded("stuck", 0.0)], ids=str)
+def test_a_series_is_that_of_the_simulator(tmp_path, scenario):
+    write_series_labelled(tmp_path / "x.parquet", known(), 1_234, scenario, 9)
+    frame = pd.read_parquet(tmp_path / "x.parquet")
+    assert list(frame.columns) == ["time_s", "value", "scenario", "severity"]
+    np.testing.assert_array_equal(frame["value"], known().generate_series(1_234, scenario, 9))
+    np.testing.assert_array_equal(frame["time_s"], 2.0 * np.arange(1_234))
+    late = np.arange(1_234) >= (370 if scenario and scenario.severity else 1_234)  # 0.3 * 1234 = 370.2
+    np.testing.assert_array_equal(frame["scenario"] == "dropout", late)
+    np.testing.assert_array_equal(frame["scenario"] == "nominal", ~late)
+    np.testing.assert_allclose(frame["severity"], np.where(late, 0.7, 0), rtol=1e-6)
+
+
+def test_a_series_with_a_start_has_times(tmp_path):
+    frame = series_labelled(known(interval_s=0.1), 1_000, Degraded("stuck", 0.5, 0.5), 1, "2024-02-28T23:59:59")
+    assert isinstance(frame.index, pd.DatetimeIndex) and str(frame.index.tz) == "UTC" and frame.index.name == "time"
+    expected = pd.date_range("2024-02-28T23:59:59", periods=1_000, freq="100ms", tz="UTC")
+    assert (frame.index == expected).all()  # to the nanosecond
+    assert (frame["scenario"].iloc[:500] == "nominal").all() and (frame["scenario"].iloc[500:] == "stuck").all()
+    write_series_labelled(tmp_path / "x.parquet", known(interval_s=0.1), 1_000, Degraded("stuck", 0.5, 0.5), 1, "2024-02-28T23:59:59")
+    read = pd.read_parquet(tmp_path / "x.parquet")
+    assert (pd.DatetimeIndex(read["time"]) == expected).all() and (read["value"].to_numpy() == frame["value"].to_numpy()).all()
+
+
+# nothing half
+
+
+class Broken(EnhancedSimulator):
+    """Fails after the first windows."""
+
+    def generate_chunks(self, *arguments):
+        yield from [np.zeros((3, WINDOW), np.float32)]
+        raise KeyboardInterrupt
+
+    def generate_series(self, *arguments):
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("there_before", [False, True])
+def test_nothing_is_written_when_it_fails(tmp_path, there_before):
+    broken = Broken(COARSE, known().enhancer, GaussianNoise(0.1, WINDOW))
+    for name in ("windows.parquet", "series.parquet") if there_before else ():
+        (tmp_path / name).write_text("the old one")
+    with pytest.raises(KeyboardInterrupt):
+        write_windows_labelled(tmp_path / "windows.parquet", broken, [Share(None, 10, 0)])
+    with pytest.raises(KeyboardInterrupt):
+        write_series_labelled(tmp_path / "series.parquet", broken, 100, None, 0)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["the old one"] * (2 * there_before)

@@ -1,0 +1,248 @@
+"""Shards: what each window is, shown on closed forms; a pure function of plan and number; plans that cannot be are refused."""
+
+import json
+import zipfile
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.datasets.plan import key_of, plan_of
+from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare
+from enhsim_tf.datasets.shard import draw_rows, file_of, make_windows, schema_of, systematic
+from tests.faults.small_data_set import COARSE, INTERVAL_S, WINDOW, Plain, PlainMaker, plan
+
+EVERY_MODE = ("stuck", "drift", "gain_loss", "period_change")  # those that leave nothing to chance
+ALL = Mix(0.2, tuple(ScenarioShare(mode, 0.2, (0.2, 0.9), (0.1, 0.7)) for mode in EVERY_MODE))
+
+
+def table_of(maker, shard):
+    record = maker(shard)
+    return record, pq.read_table(maker.folder / file_of(shard)).to_pandas()
+
+
+def test_each_window_is_what_its_labels_say(tmp_path):
+    maker = PlainMaker(plan(200, 100, mix=ALL), tmp_path)
+    maker.__class__ = type("Silent", (PlainMaker,), {"simulators": [Plain(noise_sd=0)]})
+    times = INTERVAL_S * (np.arange(240)[:, None] + np.arange(WINDOW))  # every phase that there is
+    severities = []
+    for shard in range(2):
+        record, table = table_of(maker, shard)
+        assert record.rows == len(table) == 100
+        assert table["scenario"].value_counts().to_dict() == dict.fromkeys(("nominal", *EVERY_MODE), 20)
+        for row in table.itertuples():
+            scenario = None if row.scenario == "nominal" else Degraded(row.scenario, float(row.severity), row.onset / WINDOW)
+            candidates = COARSE.simulate(times, scenario)
+            assert np.abs(candidates - row.window).max(axis=1).min() < 1e-6
+            if scenario is None:
+                assert row.severity == 0 and np.isnan(row.onset)
+            else:
+                assert 0.2 <= row.severity <= 0.9 and 6 <= row.onset <= 42
+                severities.append(row.severity)
+    assert len(set(severities)) == len(severities) == 160
+    assert np.mean(severities) == pytest.approx(0.55, abs=5 * 0.7 / np.sqrt(12 * 160))
+
+
+def test_windows_have_the_levels_and_the_noise_of_their_simulator():
+    levels = np.array([(10.0, 1.0), (20.0, 2.0), (30.0, 3.0)])
+    nominal = plan(600, 600, mix=Mix())
+    windows, _ = make_windows(nominal, [Plain(0, levels)], 0)
+    at = {}
+    for shift, gain in levels:
+        inside = np.abs((windows - shift) / gain).max(axis=1) <= 0.7501  # the coarse signal's range
+        at[shift] = inside.sum()
+    assert sum(at.values()) == 600 and min(at.values()) > 200 - 5 * np.sqrt(600 * 2 / 9)
+    noise = make_windows(nominal, [Plain(0.3)], 0)[0] - make_windows(nominal, [Plain(0)], 0)[0]
+    assert np.std(noise) == pytest.approx(0.3, rel=5 / np.sqrt(2 * noise.size))
+
+
+def test_a_shard_is_a_function_of_plan_and_number_alone(tmp_path):
+    folders = [tmp_path / name for name in ("forth", "back", "alone")]
+    for folder in folders:
+        folder.mkdir()
+    two = plan(230, 50, shares=(0.7, 0.3))
+    forth = [PlainMaker(two, folders[0])(shard) for shard in range(5)]
+    maker = PlainMaker(two, folders[1])
+    assert [maker(shard) for shard in reversed(range(5))][::-1] == forth
+    assert PlainMaker(plan(100_000, 50, shares=(0.7, 0.3)), folders[2])(3) == forth[3], "however many there are"
+    assert len({record.sha256 for record in forth}) == 5 and [record.rows for record in forth] == [50, 50, 50, 50, 30]
+    for other in (plan(230, 50, seed=4, shares=(0.7, 0.3)), plan(230, 50), plan(230, 50, mix=ALL, shares=(0.7, 0.3))):
+        assert PlainMaker(other, folders[2])(3) != forth[3]
+
+
+def test_shards_do_not_repeat_each_other():
+    drawn = [draw_rows(plan(2_000, 500, seed=seed), shard)[0].begin for seed in (0, 1) for shard in range(4)]
+    assert len({values.tobytes() for values in drawn}) == 8
+    assert len(np.unique(np.concatenate(drawn))) > 3_980  # of 4,000 among a million: 8 meet by chance
+
+
+@settings(max_examples=100, derandomize=True, deadline=None)
+@given(st.lists(st.integers(0, 20), min_size=1, max_size=8).filter(any), st.integers(1, 200), st.integers(0, 2**32))
+def test_each_part_has_its_share_of_the_rows(weights, num_rows, seed):
+    shares = np.array(weights) / np.sum(weights)
+    counts = np.bincount(systematic(shares, num_rows, np.random.default_rng(seed)), minlength=len(shares))
+    assert counts.sum() == num_rows and (np.abs(counts - shares * num_rows) < 1 + 1e-9).all()
+    assert (counts[shares == 0] == 0).all()
+
+
+def test_rare_parts_and_the_order_are_left_to_chance():
+    drawn = np.stack([systematic([0.999, 0.001], 100, np.random.default_rng(seed)) for seed in range(4_000)])
+    assert drawn.sum() == pytest.approx(400, abs=5 * 20)  # a tenth of a window a shard
+    halves = np.stack([systematic([0.5, 0.5], 10, np.random.default_rng(seed)) for seed in range(2_000)])
+    np.testing.assert_allclose(halves.mean(axis=0), 0.5, atol=5 * 0.5 / np.sqrt(2_000))  # at every place alike
+
+
+def test_what_stands_in_the_file(tmp_path):
+    family = plan(100, 100, shares=(0.25, 0.75))
+    maker = PlainMaker(family, tmp_path)
+    record, table = table_of(maker, 0)
+    schema = pq.read_schema(tmp_path / file_of(0))
+    assert list(table) == ["window", "scenario", "severity", "onset", "model"]
+    assert table["model"].value_counts().to_dict() == {"model-0": 25, "model-1": 75}
+    stated = json.loads(json.dumps(family.settings()))
+    assert schema.equals(schema_of(stated, key_of(stated))) and schema.metadata[b"settings"].decode() == family.key
+    assert np.stack(table["window"]).dtype == np.float32 and np.stack(table["window"]).shape == (100, WINDOW)
+    assert [path.name for path in tmp_path.iterdir()] == ["shard-000000.parquet"]
+
+
+def test_a_worker_of_other_versions_refuses(tmp_path, monkeypatch, refused):
+    from enhsim_tf.datasets import plan as fleet_plan
+    from enhsim_tf.datasets.shard import ShardMaker
+
+    maker = ShardMaker(plan(), tmp_path)
+    monkeypatch.setattr(fleet_plan.importlib.metadata, "version", lambda name: "0.0")
+    with refused("every machine", "tensorflow"):
+        maker(0)
+
+
+# plans
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    """A saved simulator of tiny networks; nobody writes there."""
+    from tests.enhanced_simulator.test_simulator import small
+
+    folder = tmp_path_factory.mktemp("models") / "volts"
+    small(window=60).save(folder)
+    return folder
+
+
+@pytest.fixture
+def copied(model, tmp_path):
+    folder = tmp_path / "volts"
+    folder.mkdir()
+    for file in model.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    return folder
+
+
+def test_a_plan_knows_its_model_without_loading_it(model):
+    made = plan_of(Mix(), model, seed=1, num_windows=20_000)
+    assert (made.window, made.models[0].interval_s, made.models[0].name) == (60, 2.0, "volts")
+    assert (made.shard, made.num_shards, made.rows_of(2)) == (8_192, 3, 20_000 - 2 * 8_192)
+    assert str(model) not in json.dumps(made.settings())
+
+
+def test_shards_of_real_networks_are_what_the_simulator_makes(model, tmp_path):
+    from enhsim_tf.datasets.shard import ShardMaker
+
+    made = plan_of(Mix(shard=40), model, seed=1, num_windows=80)
+    maker = ShardMaker(made, tmp_path)
+    windows = np.stack(table_of(maker, 1)[1]["window"])
+    (simulator,), (rows, _, noise) = maker.simulators, draw_rows(made, 1)
+    coarse = simulator.coarse.simulate(2.0 * (rows.begin[:, None] + np.arange(60)))
+    np.testing.assert_allclose(windows, simulator.enhance(coarse) + simulator.noise.generate(40, noise), atol=1e-5)
+
+
+@pytest.mark.parametrize("file", ["enhancer.keras", "generator.keras", "settings.json", "manifest.json"])
+@pytest.mark.parametrize("damage", ["cut", "changed", "missing"])
+def test_damaged_models_are_refused(copied, file, damage, refused):
+    path = copied / file
+    content = path.read_bytes()
+    if damage == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(content[: len(content) // 2] if damage == "cut" else content.replace(content[50:60], b"\x00" * 10))
+    with refused():
+        plan_of(Mix(), copied, 0, 10)
+
+
+@pytest.mark.parametrize("interval", ["1" + "0" * 400, "-1", "1e999", "true", '"2"', "null"])
+def test_an_interval_that_is_none_is_refused(copied, interval, refused):
+    settings = json.loads((copied / "settings.json").read_text())
+    (copied / "settings.json").write_text(json.dumps(settings | {"interval_s": 12345}).replace("12345", interval))
+    vouch(copied)
+    with refused("interval_s"):
+        plan_of(Mix(), copied, 0, 10)
+
+
+def vouch(folder):
+    from tests.enhanced_simulator.test_simulator import vouch_for
+
+    vouch_for(folder)
+
+
+@pytest.mark.parametrize("config", ["{}", "[]", "1", "{", '{"config": {"layers": [{"config": {"batch_shape": [null, true]}}]}}'])
+def test_enhancers_without_a_width_are_refused(copied, config, refused):
+    with zipfile.ZipFile(copied / "enhancer.keras", "w") as archive:
+        for name, content in {"config.json": config, "metadata.json": "{}", "model.weights.h5": ""}.items():
+            archive.writestr(name, content)
+    vouch(copied)
+    with refused("width"):
+        plan_of(Mix(), copied, 0, 10)
+
+
+def test_descriptions_that_unpack_without_end_are_refused(copied, refused):
+    with zipfile.ZipFile(copied / "enhancer.keras", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("config.json", b" " * 60_000_000)
+    vouch(copied)
+    with refused("too large"):
+        plan_of(Mix(), copied, 0, 10)
+
+
+@pytest.mark.parametrize("interval", ["0", "-1", "true", '"1"', "NaN", "null", "1e999"])
+def test_intervals_that_are_none_are_refused(copied, interval, refused):
+    path = copied / "settings.json"
+    path.write_text(path.read_text().replace('"interval_s": 2.0', f'"interval_s": {interval}'))
+    vouch(copied)
+    with refused("interval_s"):
+        plan_of(Mix(), copied, 0, 10)
+
+
+def test_a_model_that_was_exchanged_meanwhile_is_refused(copied, tmp_path, refused):
+    from enhsim_tf.datasets.shard import ShardMaker
+
+    maker = ShardMaker(plan_of(Mix(), copied, 0, 10), tmp_path)
+    path = copied / "settings.json"
+    path.write_text(path.read_text().replace('"offset": 0.1', '"offset": 0.2'))
+    vouch(copied)
+    with refused("begun with"):
+        maker(0)
+
+
+def test_families_need_one_window(model, tmp_path, refused):
+    from tests.enhanced_simulator.test_simulator import small
+
+    small(window=64).save(tmp_path / "wide")
+    (tmp_path / "narrow").symlink_to(model)
+    mix = Mix(models=(ModelShare("a", "narrow", 0.5), ModelShare("b", "wide", 0.5)))
+    with refused("one window", "60", "64"):
+        plan_of(mix, tmp_path, 0, 10)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"num_windows": 0}, "windows"),
+        ({"num_windows": 10**10 + 1}, "windows"),
+        ({"shard": 10**9}, "shards"),
+        ({"num_windows": 10**9, "shard": 1}, "shard:"),
+    ],
+)
+def test_data_sets_beyond_any_size_are_refused(changes, words, refused):
+    with refused(words):
+        plan(**changes)

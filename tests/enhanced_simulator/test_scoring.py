@@ -1,0 +1,154 @@
+"""Scores of telemetry: the rate asked for on what is alike, flags where something is wrong, none where nothing can be said."""
+
+import keras
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.detection.detectors import DETECTORS
+from enhsim_tf.enhanced_simulator import scoring
+from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.sources import to_series
+
+WINDOW = 60
+COARSE = SquareWaveSimulator([SquareWave(48, low=-0.5, high=0.5)])
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Made of known processes: the coarse signal itself plus white noise."""
+    enhancer = keras.Sequential([keras.Input((WINDOW,)), keras.layers.Dense(WINDOW)])
+    enhancer.layers[0].set_weights([np.eye(WINDOW), np.zeros(WINDOW)])
+    return EnhancedSimulator(COARSE, enhancer, GaussianNoise(0.1, WINDOW), interval_s=2.0)
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """A short series sets the threshold."""
+    monkeypatch.setattr(scoring, "_THRESHOLD_WINDOWS", 100)
+
+
+def telemetry(known, num_samples=3_000, seed=99, **fields):
+    values = known.generate_series(num_samples, seed=seed)
+    return Telemetry(values, **{"interval_s": 2.0, "start": "2024-01-01T00:00:00+00:00", "name": "volts"} | fields)
+
+
+@pytest.mark.parametrize("detector", ["PCA residual", "nearest neighbours"])
+def test_what_is_alike_is_flagged_at_the_rate_asked_for(known, short, detector):
+    # scores within two windows depend on each other, so a series of 100 windows has 50 independent places: at a rate of a
+    # tenth, sd = sqrt(0.09 / 50) for the flags and as much again for the threshold, over as many seeds as there are
+    num_seeds, rate = 12, 0.1
+    shares = []
+    for seed in range(num_seeds):
+        options = ScoreOptions(detector, num_windows=150, false_alarm_rate=rate, seed=seed)
+        shares.append(score_channel(known, [telemetry(known, 100 * WINDOW, 1_000 + seed)], options)["flag"].mean())
+    sd = np.sqrt(2 * rate * (1 - rate) / 50 / num_seeds)
+    assert abs(np.mean(shares) - rate) < 4 * sd
+    assert 4 * sd < rate  # else nothing would be shown
+
+
+@pytest.mark.parametrize("detector", [name for name in DETECTORS if "autoencoder" not in name])
+def test_a_gross_anomaly_is_flagged_at_its_place(known, short, detector):
+    series = telemetry(known)
+    series.values[1_500:1_520] += 4.0  # 40 times the noise
+    frame = score_channel(known, [series], ScoreOptions(detector, num_windows=300, seed=1))
+    assert frame["flag"].iloc[1_500:1_520].all()
+    assert frame["flag"].iloc[: 1_500 - WINDOW].mean() < 0.1 and frame["flag"].iloc[1_520 + WINDOW :].mean() < 0.1
+    assert 1_500 - WINDOW < int(np.argmax(frame["score"])) < 1_520 + WINDOW
+
+
+def test_a_sensor_that_is_stuck_is_flagged(known, short):
+    series = telemetry(known)
+    series.values[900:1_300] = series.values[900]
+    frame = score_channel(known, [series], ScoreOptions("nearest neighbours", num_windows=300))
+    assert frame["flag"].iloc[960:1_240].all()
+
+
+def test_flags_begin_where_the_score_is_one(known, short):
+    frame = score_channel(known, [telemetry(known)], ScoreOptions(num_windows=100, false_alarm_rate=0.2))
+    np.testing.assert_array_equal(frame["flag"], frame["score"] > 1)
+    assert 0 < frame["flag"].mean() < 1 and frame["flag"].dtype == bool
+    assert frame.attrs["expected_false_alarm_rate"] == 0.2
+
+
+def test_scores_stay_on_their_side_where_the_threshold_is_not_positive():
+    # a limit check scores below zero inside its limits: a quotient of two such numbers would turn the order round
+    scores = np.array([-3.0, -1.0, 0.5])
+    for threshold in (2.0, 0.0, -1.5):
+        relative = scoring._relative(scores, threshold)
+        np.testing.assert_array_equal(relative > 1, scores > threshold)
+        assert (np.diff(relative) > 0).all()
+
+
+@pytest.mark.parametrize("has_time", [True, False])
+def test_the_index_is_that_of_the_series(known, short, has_time):
+    fields = {} if has_time else {"start": None}
+    series = telemetry(known, 1_000, **fields)
+    first, rest = series.part(0, 400), series.part(450, 1_000)
+    frame = score_channel(known, [first, rest], ScoreOptions(num_windows=100))
+    expected = pd.concat([to_series(first), to_series(rest)])
+    assert frame.index.equals(expected.index) and frame.index.name == expected.index.name
+    assert isinstance(frame.index, pd.DatetimeIndex) is has_time
+    np.testing.assert_array_equal(frame["value"], expected)
+    assert list(frame.columns) == ["value", "score", "flag"] and frame["score"].notna().all()
+
+
+def test_stretches_shorter_than_a_window_have_no_score(known, short):
+    series = telemetry(known, 500)
+    parts = [series.part(0, WINDOW - 1), series.part(100, 100 + WINDOW), series.part(200, 500)]
+    frame = score_channel(known, parts, ScoreOptions(num_windows=100))
+    is_short = np.arange(len(frame)) < WINDOW - 1
+    np.testing.assert_array_equal(frame["score"].isna(), is_short)
+    assert not frame["flag"][is_short].any()
+    assert frame["score"].iloc[WINDOW - 1 : 2 * WINDOW - 1].nunique() == 1  # one window, one score
+
+
+def test_same_seed_same_scores_and_another_differs(known, short):
+    frames = [score_channel(known, [telemetry(known, 600)], ScoreOptions(num_windows=100, seed=seed)) for seed in (3, 3, 4)]
+    pd.testing.assert_frame_equal(frames[0], frames[1])
+    assert (frames[0]["score"] != frames[2]["score"]).any()
+
+
+def test_what_cannot_be_scored_is_refused(known, refused):
+    with refused("every 2 s", "every 1 s"):
+        score_channel(known, [telemetry(known, interval_s=1.0)])
+    with refused(f"{WINDOW} samples", "Received: 59"):
+        score_channel(known, [telemetry(known, 59), telemetry(known, 10)])
+    with refused("Received: 0"):
+        score_channel(known, [])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"detector": "a crystal ball"},
+        {"false_alarm_rate": 0.0},
+        {"false_alarm_rate": 0.5},
+        {"false_alarm_rate": float("nan")},
+        {"num_windows": 9},
+    ],
+)
+def test_options_that_cannot_be_are_refused(refused, options):
+    with refused():
+        ScoreOptions(**options)
+
+
+def test_a_rate_slightly_off_is_the_same_rate(known, short):
+    series = telemetry(known, 300, interval_s=2.0 * (1 + 5e-4))  # what was told from times with jitter
+    assert len(score_channel(known, [series], ScoreOptions(num_windows=50))) == 300
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_written_scores_come_back(known, short, tmp_path, suffix):
+    frame = score_channel(known, [telemetry(known, 300)], ScoreOptions(num_windows=50))
+    path = tmp_path / f"scores{suffix}"
+    write_scores(path, frame)
+    read = pd.read_parquet(path) if suffix == ".parquet" else pd.read_csv(path, index_col="time", parse_dates=["time"])
+    assert (read.index == frame.index).all() and (read["flag"] == frame["flag"]).all()
+    np.testing.assert_allclose(read["score"], frame["score"], rtol=1e-12)
+    np.testing.assert_allclose(read["value"], frame["value"], rtol=1e-6)
+    assert [path.name for path in tmp_path.iterdir()] == [path.name]

@@ -1,0 +1,588 @@
+"""The product: a sum of known parts, series without seams, folders that come back to the bit or are refused."""
+
+import copy
+import functools
+import inspect
+import json
+import sys
+
+import keras
+import numpy as np
+import pytest
+
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.atomic_files import sha256
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator import simulator as enhanced_simulator
+from enhsim_tf.enhanced_simulator import simulator as simulator_module
+from enhsim_tf.enhanced_simulator.simulator import PAPER, EnhancedSimulator
+from enhsim_tf.enhancer.network import build_enhancer
+from enhsim_tf.enhancer.training_pairs import cut_pairs, even_places
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.extraction import extract_noise, noise_unit
+from enhsim_tf.noise.gan import NoiseGAN
+from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.telemetry.series import Telemetry
+
+pytestmark = pytest.mark.usefixtures("narrow_enhancer")
+COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
+FILES = ["discriminator.keras", "enhancer.keras", "generator.keras", "manifest.json", "settings.json"]
+
+
+def identity(window):
+    """An enhancer that answers its input, to the bit."""
+    model = keras.Sequential([keras.Input((window,)), keras.layers.Dense(window)])
+    model.layers[0].set_weights([np.eye(window), np.zeros(window)])
+    return model
+
+
+def known(noise_sd=0.0, window=500, **arguments):
+    """Made of known processes: the coarse signal itself plus white noise."""
+    return EnhancedSimulator(COARSE, identity(window), GaussianNoise(noise_sd, window), **arguments)
+
+
+def small(window=60, seed=0):
+    """Made of real, untrained, narrow networks."""
+    generator, discriminator = build_generator(window, 4, 8, seed=seed), build_discriminator(window, 8, seed=seed)
+    noise = NoiseGAN(generator, discriminator, latent_span=1.5, scale=0.3, seed=seed)
+    return EnhancedSimulator(
+        COARSE, build_enhancer(window, 16, seed=seed), noise, interval_s=2.0, offset=0.1, scale=0.7, trained={"seed": seed}
+    )
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A simulator and the folder it was saved to; nobody writes there."""
+    simulator, folder = small(), tmp_path_factory.mktemp("saved") / "model"
+    simulator.save(folder)
+    return simulator, folder
+
+
+@pytest.fixture
+def copied(saved, tmp_path):
+    """A copy of the saved folder that a test may damage."""
+    for file in saved[1].iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    return tmp_path
+
+
+def vouch_for(folder):
+    """Makes the manifest agree with the files, as somebody who means harm would."""
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["sha256"] = {name: sha256(folder / name) for name in manifest["sha256"]}
+    (folder / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+
+
+# windows
+
+
+def test_coarse_windows_begin_at_random_samples_of_the_coarse_simulator():
+    windows = known(interval_s=2.0).generate_coarse(300, seed=0)
+    assert windows.shape == (300, 500) and windows.dtype == np.float32
+    begins = {COARSE.simulate(begin + 2.0 * np.arange(500)[None]).tobytes(): begin for begin in range(0, 480, 2)}
+    phases = [begins[window.tobytes()] for window in windows]  # every window is one of the 240 there are
+    assert len(set(phases)) > 0.6 * 240 and np.mean(phases) == pytest.approx(239, abs=5 * 480 / np.sqrt(12 * 300))
+
+
+def test_enhanced_windows_are_in_the_telemetry_s_unit():
+    coarse = COARSE.simulate(np.arange(60.0)[None])
+    same = known(window=60, offset=0.25, scale=4.0).enhance(coarse)
+    np.testing.assert_allclose(same, coarse, atol=1e-6)
+    constant = identity(60)
+    constant.layers[0].set_weights([np.zeros((60, 60)), np.ones(60)])  # always answers one scale above the offset
+    enhanced = EnhancedSimulator(COARSE, constant, GaussianNoise(0, 60), offset=0.25, scale=4.0).enhance(coarse)
+    assert (enhanced == 4.25).all() and enhanced.dtype == np.float32
+    doubled = identity(60)
+    doubled.layers[0].set_weights([2 * np.eye(60), np.zeros(60)])
+    enhanced = EnhancedSimulator(COARSE, doubled, GaussianNoise(0, 60), offset=0.25, scale=4.0).enhance(coarse)
+    np.testing.assert_allclose(enhanced - 0.25, 2 * (coarse - 0.25), atol=1e-5)
+
+
+def test_generated_windows_are_the_enhanced_signal_plus_the_noise():
+    simulator = known(noise_sd=0.3)
+    noise = simulator.generate(200, seed=4) - simulator.generate_coarse(200, seed=4)
+    assert np.std(noise) == pytest.approx(0.3, rel=5 / np.sqrt(2 * noise.size))
+    assert (known().generate(20, Degraded("drift"), seed=4) == known().generate_coarse(20, Degraded("drift"), seed=4)).all()
+
+
+@pytest.mark.parametrize("scenario", [None, Degraded("dropout", 0.8), Degraded("friction", 0.8)], ids=str)
+def test_same_seed_same_windows_and_series(scenario):
+    simulator = small()
+    keras.utils.set_random_seed(1)  # must not matter
+    windows, series = simulator.generate(20, scenario, seed=3), simulator.generate_series(500, scenario, seed=3)
+    keras.utils.set_random_seed(2)
+    assert windows.shape == (20, 60) and windows.dtype == series.dtype == np.float32
+    assert (windows == simulator.generate(20, scenario, seed=3)).all()
+    assert (series == simulator.generate_series(500, scenario, seed=3)).all()
+    assert (windows != simulator.generate(20, scenario, seed=4)).any(axis=1).all()
+    assert (series != simulator.generate_series(500, scenario, seed=4)).any()
+
+
+# series
+
+
+@pytest.mark.parametrize("num_samples", [1, 499, 500, 501, 12_345])
+def test_series_of_any_length(num_samples):
+    series = small(window=500).generate_series(num_samples, seed=1)
+    assert series.shape == (num_samples,) and series.dtype == np.float32 and np.isfinite(series).all()
+
+
+def test_series_of_no_length_is_refused(refused):
+    for number in (0, -5):
+        with refused(f"num_samples={number}"):
+            known(window=60).generate_series(number)
+
+
+@pytest.mark.parametrize("window", [60, 61])
+@pytest.mark.parametrize("num_samples", [1, 59, 60, 61, 90, 1_234])
+def test_series_of_an_identity_enhancer_is_the_coarse_series(window, num_samples):
+    simulator = known(window=window, interval_s=3.0)
+    for start_s in (0.0, 97.0):
+        expected = COARSE.simulate(start_s + 3.0 * np.arange(num_samples)[None])[0]
+        assert (simulator.generate_series(num_samples, start_s=start_s) == expected).all()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("num_samples", [40, 60, 700, 1_234])
+def test_scenario_of_a_series_is_that_of_its_own_length(mode, num_samples):
+    # not of the last window, which may reach beyond the end
+    scenario, times = Degraded(mode, severity=0.6, onset=0.35), np.arange(float(num_samples))[None]
+    series = known(window=60).generate_series(num_samples, scenario, seed=6)
+    expected = COARSE.simulate(times, scenario, np.random.default_rng(6))[0]
+    np.testing.assert_allclose(series, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("onset", [0.1, 0.29, 0.5, 0.73])
+def test_onset_of_a_series_lands_where_it_was_asked_for(onset):
+    for num_samples in (300, 1_000, 1_111):
+        degraded = known(window=60).generate_series(num_samples, Degraded("drift", 1.0, onset))
+        changed = np.flatnonzero(degraded != known(window=60).generate_series(num_samples))
+        assert changed[0] == int(round(onset * num_samples, 6)) + 1  # the ramp begins at zero
+
+
+def test_noise_of_a_series_has_no_seams():
+    window, sd = 100, 0.3
+    noise = known(noise_sd=sd, window=window).generate_series(200_000, seed=2) - known(window=window).generate_series(200_000)
+    by_position = noise.reshape(-1, window // 2)  # a window begins and another ends at position 0
+    edges, middle = by_position[:, [0, 1, -2, -1]], by_position[:, 2:-2]
+    for part in (edges, middle):
+        assert np.var(part) == pytest.approx(sd**2, rel=5 * np.sqrt(2 / part.size))
+    # position for position
+    assert np.var(by_position, axis=0) == pytest.approx(np.full(window // 2, sd**2), rel=5 * np.sqrt(2 / len(by_position)))
+    # white noise stays white, across the seams too
+    assert np.mean(noise[1:] * noise[:-1]) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(len(noise)))
+    across = by_position[1:, 0] * by_position[:-1, -1]
+    assert np.mean(across) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(len(across)))
+
+
+@pytest.mark.parametrize("num_samples", [1_000, 1_400])
+def test_noise_of_a_series_fades_at_neither_end(num_samples):
+    noise = known(noise_sd=0.3, window=1_000).generate_series(num_samples, seed=2) - known(window=1_000).generate_series(num_samples)
+    for part in (noise, noise[:400], noise[-400:]):
+        assert np.var(part) == pytest.approx(0.3**2, rel=5 * np.sqrt(2 / part.size))
+
+
+def test_noise_has_draws_of_its_own():
+    # with the seed of the coarse windows its draws would be made of the same random bits
+    class Drawing(GaussianNoise):
+        def _draw(self, shape, seed):
+            drawn.append(np.random.default_rng(copy.deepcopy(seed)).integers(1_000_000))
+            return super()._draw(shape, seed)
+
+    drawn, simulator = [], EnhancedSimulator(COARSE, identity(60), Drawing(0.1, 60))
+    for seed in (0, 1, 2, 1):
+        simulator.generate(2, seed=seed)
+        simulator.generate_series(70, seed=seed)
+    assert drawn[2:4] == drawn[6:8] and len(set(drawn)) == 3
+    assert not set(drawn) & {np.random.default_rng(seed).integers(1_000_000) for seed in (0, 1, 2)}
+
+
+# folders
+
+
+def test_saved_folder_holds_what_it_says(saved):
+    simulator, folder = saved
+    assert sorted(file.name for file in folder.iterdir()) == FILES
+    assert [file.name for file in folder.parent.iterdir()] == ["model"]
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["sha256"] == {name: sha256(folder / name) for name in FILES if name != "manifest.json"}
+
+
+def test_save_load_generate_gives_equal_bits(saved):
+    simulator, folder = saved
+    loaded = EnhancedSimulator.load(folder)
+    assert loaded.coarse.waves == COARSE.waves
+    assert (loaded.window, loaded.interval_s, loaded.offset, loaded.scale) == (60, 2.0, 0.1, 0.7)
+    assert loaded.trained == simulator.trained == {"seed": 0}
+    scenario = Degraded("friction", 0.5)
+    assert loaded.generate(50, scenario, seed=3).tobytes() == simulator.generate(50, scenario, seed=3).tobytes()
+    assert loaded.generate_series(500, seed=3).tobytes() == simulator.generate_series(500, seed=3).tobytes()
+    rows = np.random.default_rng(0).standard_normal((4, 60, 1)).astype(np.float32)
+    judged = [np.asarray(each.noise.discriminator(rows)) for each in (loaded, simulator)]
+    assert (judged[0] == judged[1]).all()
+
+
+def test_a_simulator_that_takes_the_place_of_another_while_that_is_read_is_not_mixed_with_it(copied, monkeypatch, refused):
+    load, other = keras.saving.load_model, small(seed=1)
+
+    def replaced_meanwhile(path, **options):
+        if path.name == "generator.keras":
+            other.save(copied)
+        return load(path, **options)
+
+    monkeypatch.setattr(keras.saving, "load_model", replaced_meanwhile)
+    with refused("try again"):
+        EnhancedSimulator.load(copied)
+    monkeypatch.undo()
+    assert (EnhancedSimulator.load(copied).generate(3, seed=0) == other.generate(3, seed=0)).all()
+
+
+def test_saving_again_replaces_the_folder(saved, copied):
+    (copied / "stray.txt").write_text("x")
+    other = small(seed=1)
+    other.save(copied)
+    assert sorted(file.name for file in copied.iterdir()) == FILES
+    assert (EnhancedSimulator.load(copied).generate(3, seed=0) == other.generate(3, seed=0)).all()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_flipped_byte_is_noticed(copied, refused, name):
+    content = (copied / name).read_bytes()
+    every = 3 if name == "manifest.json" else len(content) // 4  # nothing but its own form protects the manifest
+    for place in range(0, len(content), every):
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        (copied / name).write_bytes(damaged)
+        with refused(str(copied)):
+            EnhancedSimulator.load(copied)
+            pytest.fail(f"a change of byte {place} went unnoticed, after {content[:place][-30:]}")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_missing_file_is_noticed(copied, refused, name):
+    (copied / name).unlink()
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+MANIFESTS = {
+    "not JSON": "not JSON",
+    "no text": b"\xff\xfe\x00",
+    "nothing": "",
+    "a list": "[]",
+    "a number": "3",
+    "another format": lambda manifest: {**manifest, "format": "somebody.else/7"},
+    "a format of two lines": lambda manifest: {**manifest, "format": "a\nb"},
+    "no format": lambda manifest: {"sha256": manifest["sha256"]},
+    "no checksums": lambda manifest: {"format": manifest["format"]},
+    "checksums in a list": lambda manifest: {**manifest, "sha256": list(manifest["sha256"])},
+    "a file too few": lambda manifest: {**manifest, "sha256": dict(list(manifest["sha256"].items())[1:])},
+    "a file too many": lambda manifest: {**manifest, "sha256": {**manifest["sha256"], "../manifest.json": "0"}},
+    "another checksum": lambda manifest: {**manifest, "sha256": {**manifest["sha256"], "settings.json": "0"}},
+}
+
+
+@pytest.mark.parametrize("name", MANIFESTS)
+def test_foreign_manifest_is_refused(copied, refused, name):
+    content, path = MANIFESTS[name], copied / "manifest.json"
+    if callable(content):
+        content = json.dumps(content(json.loads(path.read_text())))
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+def test_foreign_folders_are_refused(tmp_path, refused):
+    with refused("absent"):
+        EnhancedSimulator.load(tmp_path / "absent")
+    with refused(str(tmp_path)):
+        EnhancedSimulator.load(tmp_path)  # empty
+    (tmp_path / "notes.txt").write_text("x")
+    with refused(str(tmp_path)):
+        EnhancedSimulator.load(tmp_path)
+    with refused("notes.txt"):
+        EnhancedSimulator.load(tmp_path / "notes.txt")
+
+
+SETTINGS = {
+    "no settings": "{}",
+    "a list": "[]",
+    "a wave too many words": lambda settings: {**settings, "coarse": {"waves": [{"period_s": 3, "colour": "red"}]}},
+    "no waves": lambda settings: {**settings, "coarse": {"waves": []}},
+    "a wave without a period": lambda settings: {**settings, "coarse": {"waves": [{}]}},
+    "words for numbers": lambda settings: {**settings, "interval_s": "often"},
+    "an argument nobody knows": lambda settings: {**settings, "noise": {"colour": "pink"}},
+}
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_that_cannot_be_are_refused_though_their_checksum_is_right(copied, refused, name):
+    content, path = SETTINGS[name], copied / "settings.json"
+    path.write_text(json.dumps(content(json.loads(path.read_text()))) if callable(content) else content)
+    vouch_for(copied)
+    with refused():
+        EnhancedSimulator.load(copied)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive"])
+def test_network_that_cannot_be_is_refused_though_its_checksum_is_right(copied, refused, content):
+    (copied / "enhancer.keras").write_bytes(content)
+    vouch_for(copied)
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+def test_network_that_carries_code_is_refused(copied, refused):
+    model = keras.Sequential([keras.Input((60,)), keras.layers.Lambda(lambda values: values + 1)])
+    model.save(copied / "enhancer.keras")
+    vouch_for(copied)
+    with refused(str(copied)):
+        EnhancedSimulator.load(copied)
+
+
+# the fit
+
+
+def measured(number=1_500):
+    """A noisy sine of 50 samples in a unit far from one."""
+    times = 2.0 * np.arange(number)
+    values = 1_000 + 50 * np.sin(2 * np.pi * times / 100) + 4 * np.random.default_rng(0).standard_normal(number)
+    return Telemetry(values.astype(np.float32), interval_s=2.0)
+
+
+@pytest.fixture
+def small_batches(monkeypatch):
+    """A step of the noise networks on 200 rows takes long to trace."""
+    monkeypatch.setattr(enhanced_simulator, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
+
+
+def fitted(seed=0, **arguments):
+    """In the manner of the paper, with small counts."""
+    counts = {"num_windows": 60, "epochs": 4, "num_iterations": 2, "window": 60, "verbose": 0}
+    return EnhancedSimulator.fit(measured(), seed=seed, **{**PAPER, **counts, **arguments})
+
+
+def test_the_recipe_of_the_paper_is_that_of_the_reproduction():
+    chosen = make_settings("full")
+    assert (PAPER["num_windows"], PAPER["epochs"]) == (chosen.telemetry.num_windows, chosen.enhancer.epochs) == (1_500, 40)
+    assert (PAPER["noise"], PAPER["extraction"], PAPER["decay"]) == ("paper", "moving average", False)
+
+
+def test_the_defaults_are_the_second_pipeline():
+    defaults = inspect.signature(EnhancedSimulator.fit).parameters
+    assert [defaults[name].default for name in ("noise", "extraction", "decay")] == ["convolutional", "enhancer", True]
+
+
+def test_fit_to_short_telemetry_end_to_end(small_batches):
+    simulator = fitted()
+    assert (simulator.window, simulator.interval_s) == (60, 2.0)
+    assert simulator.coarse.waves[0].period_s == pytest.approx(100, rel=0.005)
+    # the enhancer has learnt the sine: it is nearer to it than the coarse square wave is
+    windows = simulator.generate_coarse(40, seed=1)
+    clean = simulator.enhance(windows)
+    amplitude = np.sqrt(2) * np.std(clean)
+    assert np.mean(clean) == pytest.approx(1_000, abs=5) and amplitude == pytest.approx(50, rel=0.15)
+    phases = np.fft.rfft(windows, axis=1)[:, 1]
+    assert np.mean(np.abs(np.diff(clean, axis=1))) < 0.6 * 50 and np.isfinite(phases).all()
+    # the noise, hardly trained, is at the scale of the telemetry's noise: ten standard deviations at most
+    noise, _ = extract_noise(measured().values, 25)
+    added = simulator.generate(40, seed=1) - clean
+    assert simulator.noise.scale == pytest.approx(noise_unit(noise), rel=0.03)  # of the windows that were drawn
+    assert added.any() and np.abs(added).max() <= simulator.noise.scale * 1.001
+
+    again = fitted()
+    assert (simulator.generate(5, seed=2) == again.generate(5, seed=2)).all()
+
+
+def test_fit_with_another_seed_and_without_normalisation(small_batches):
+    simulator = fitted(seed=5, normalise=False, epochs=1, num_iterations=0, coarse=COARSE)
+    assert (simulator.offset, simulator.scale, simulator.noise.scale) == (0, 1, 1)
+    assert simulator.coarse is COARSE
+    for weight, begun in zip(simulator.noise.generator.weights, build_generator(60, seed=5).weights, strict=True):
+        assert (np.asarray(weight) == np.asarray(begun)).all()
+
+
+def test_fit_of_the_convolutional_noise_to_what_the_enhancer_leaves(tmp_path):
+    simulator = fitted(noise="convolutional", extraction="enhancer", num_windows=300, epochs=8, decay=True, held_out=0.25)
+    # white noise of 4 and what error the enhancer has: at least 4, and far below the 35 that the sine's own deviation is
+    assert 3.9 < simulator.noise.scale < 10
+    series = simulator.generate_series(1_000, seed=3)
+    assert series.shape == (1_000,) and abs(np.mean(series) - 1_000) < 10
+    simulator.save(tmp_path / "model")
+    loaded = EnhancedSimulator.load(tmp_path / "model")
+    assert loaded.trained["noise"] == "convolutional" and loaded.trained["decay"] is True
+    assert (loaded.generate_series(1_000, seed=3) == series).all()
+    assert (loaded.generate(7, seed=4) == simulator.generate(7, seed=4)).all()
+
+
+def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batches):
+    # noise that is constant over 50 samples: a moving average over 5 takes most of it away with the signal
+    steps = np.repeat(np.random.default_rng(1).normal(0, 4, 60), 50)
+    clean = 1_000 + 50 * np.sin(2 * np.pi * 2.0 * np.arange(3_000) / 100)
+    telemetry = Telemetry((clean + steps).astype(np.float32), interval_s=2.0)
+    settings = {"num_windows": 300, "epochs": 40, "num_iterations": 0, "window": 60, "verbose": 0, "decay": True, "moving_average": 5}
+    settings |= {"noise": "paper", "held_out": 0.25}
+    scales = {
+        extraction: EnhancedSimulator.fit(telemetry, seed=0, extraction=extraction, **settings).noise.scale * 0.1
+        for extraction in ("moving average", "enhancer")
+    }
+    true = np.std(steps[2_250:])  # of the quarter that the noise is taken from
+    assert scales["moving average"] < 0.3 * true
+    assert 0.9 * true < scales["enhancer"] < 1.5 * true  # the error of a little trained enhancer comes on top
+
+
+# telemetry that drifts away
+
+
+def drifting(number=4_000):
+    """A sine of 40 samples whose level and amplitude grow for ever: at its end both are far outside what the beginning had."""
+    places = np.arange(number)
+    clean = 100 + 0.005 * places + (1 + places / 1_000) * np.sin(2 * np.pi * places / 40)
+    return Telemetry((clean + 0.02 * np.random.default_rng(0).standard_normal(number)).astype(np.float32))
+
+
+@pytest.fixture(scope="module")
+def followers():
+    """Simulators that follow the telemetry and that do not, fitted to its first half."""
+    coarse, counts = SquareWaveSimulator([SquareWave(40, low=99, high=101)]), {"window": 80, "num_windows": 300, "epochs": 6}
+    settings = {"num_iterations": 2, "verbose": 0}
+    learnt = drifting().part(0, 2_000)
+    parts = [learnt.part(0, 1_100), learnt.part(1_150, 2_000)]
+    return {follow: EnhancedSimulator.fit(parts, coarse, 0, **counts, **settings, follow=follow) for follow in (True, False)}
+
+
+def test_following_keeps_the_error_small_where_level_and_amplitude_have_left_their_range(followers):
+    later, errors = drifting().part(2_500, 4_000), {}
+    for follow, simulator in followers.items():
+        pairs = cut_pairs([later], simulator.coarse, even_places([later], 80, 50), 80, follow)
+        enhanced = simulator.follow(pairs)
+        errors[follow] = np.median(np.sqrt(np.mean((enhanced - pairs.target) ** 2, axis=1)) / pairs.target.std(axis=1))
+    assert errors[True] < 0.3 and errors[False] > 3  # units of each window's own deviation
+    assert followers[False].levels is None
+    levels = followers[True].levels
+    assert levels.shape == (500, 2) and np.corrcoef(levels[:, 1], np.arange(500))[0, 1] > 0.95  # in the order of time: it grows
+    middle = levels[:, 0] + 100 * levels[:, 1]  # of each window
+    assert middle.min() > 99.5 and middle.max() < 100.5 + 0.005 * 2_000 and np.ptp(middle) > 8
+
+
+def test_generated_windows_have_levels_and_amplitudes_that_were_seen(followers):
+    simulator = followers[True]
+    windows = simulator.generate_coarse(400, seed=1)
+    centre, amplitude = (windows.max(axis=1) + windows.min(axis=1)) / 2, np.ptp(windows, axis=1) / 2
+    shift, gain = simulator.levels.T
+    known_levels = np.stack([shift + 100 * gain, gain], axis=1)  # the coarse simulator's own are 100 and 1
+    nearest = np.abs(known_levels[None] - np.stack([centre, amplitude], axis=1)[:, None]).max(axis=2).min(axis=1)
+    assert nearest.max() < 1e-3
+    assert np.ptp(centre) > 8 and len(np.unique(np.round(amplitude, 4))) > 100
+
+
+def test_levels_come_back_from_the_folder(followers, tmp_path):
+    for follow, simulator in followers.items():
+        simulator.save(tmp_path / str(follow))
+        loaded = EnhancedSimulator.load(tmp_path / str(follow))
+        assert (loaded.levels is None) is (not follow) and loaded.trained["follow"] is follow
+        if follow:
+            assert (loaded.levels == simulator.levels).all()
+        assert (loaded.generate(7, seed=4) == simulator.generate(7, seed=4)).all()
+        assert (loaded.generate_series(500, seed=4) == simulator.generate_series(500, seed=4)).all()
+
+
+def test_a_series_with_levels_has_no_seams():
+    # a coarse signal of one value: each window is a constant, and the series goes from one to the next as the fade does
+    one = SquareWaveSimulator([SquareWave(1e9, low=0.0, high=1.0)])
+    levels = np.random.default_rng(2).normal(0, 1, (7, 2))
+    simulator = EnhancedSimulator(one, identity(60), GaussianNoise(0.0, 60), levels=levels)
+    series = simulator.generate_series(3_000, seed=5).astype(np.float64)
+    constants = levels.sum(axis=1)
+    largest = np.abs(np.diff(constants)).max()  # there and back again: neighbours in time only
+    assert np.abs(np.diff(series)).max() <= largest * np.pi / 60 + 1e-6
+    assert series.min() >= constants.min() - 1e-6 and series.max() <= constants.max() + 1e-6
+    assert np.ptp(series) > 0.9 * np.ptp(constants)  # in 100 half windows every level has its turn
+
+
+def test_a_fitted_series_with_levels_has_no_seams(followers):
+    fitted = followers[True]
+    simulator = EnhancedSimulator(fitted.coarse, fitted.enhancer, GaussianNoise(0.0, 80), 1.0, fitted.offset, fitted.scale, fitted.levels)
+    series = simulator.generate_series(8_000, seed=3)
+    steps, inside = np.abs(np.diff(series)), np.abs(np.diff(simulator.generate(200, seed=3), axis=1))
+    assert steps.max() < 1.2 * inside.max()
+    seams = np.arange(40, 7_960, 40) - 1  # where a window begins or ends
+    assert steps[seams].max() < 1.2 * inside.max() and np.ptp(series) > np.ptp(fitted.levels[:, 1])
+
+
+def test_fit_refuses_what_it_does_not_know(refused):
+    with refused("noise='pink'"):
+        fitted(noise="pink")
+    with refused("extraction='sieve'"):
+        fitted(extraction="sieve")
+
+
+@pytest.mark.parametrize("number", [-1, 2.5, "3", None])
+def test_a_number_of_windows_that_cannot_be_is_refused(refused, tmp_path, number):
+    simulator = known(window=60)
+    words = f"num_windows={number!r}"
+    for made in (simulator.generate, simulator.generate_coarse, lambda count: list(simulator.generate_chunks(count))):
+        with refused(words):
+            made(number)
+    with refused(words):
+        simulator.generate_to_parquet(tmp_path / "windows.parquet", number)
+    assert not list(tmp_path.iterdir())
+    with refused(words):
+        simulator.residual_windows(measured(), number, np.random.default_rng(0))
+    assert simulator.generate(np.int64(0)).shape == (0, 60)
+
+
+@pytest.mark.parametrize("shape", [(3, 59), (60,), (3, 60, 1)])
+def test_windows_of_another_width_are_refused(refused, shape):
+    with refused("(windows, 60)", str(shape)):
+        known(window=60).enhance(np.zeros(shape, np.float32))
+
+
+@pytest.mark.parametrize("count", ["num_windows", "epochs", "window", "num_iterations"])
+def test_fit_refuses_counts_below_one(refused, count):
+    for number in (-1, 0) if count != "num_iterations" else (-1,):
+        with refused(f"{count}={number}"):
+            fitted(**{count: number})
+
+
+def test_what_is_no_telemetry_is_refused(refused):
+    values = measured().values
+    for made in (lambda: EnhancedSimulator.fit(values), lambda: EnhancedSimulator.fit(values, coarse=COARSE)):
+        with refused("Expected a Telemetry", "ndarray"):
+            made()
+    with refused("Expected a Telemetry", "list"):
+        SquareWaveSimulator.fit(values.tolist())
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_bars_of_the_fit_are_for_terminals(small_batches, capsys, monkeypatch, is_terminal):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: is_terminal)
+    fitted(verbose="auto", epochs=1, num_iterations=1)
+    out, error = capsys.readouterr()
+    assert ("/step" in out) == is_terminal and bool(out) == is_terminal
+    assert not error, "the other bar goes to standard error, which is a file here"
+
+
+def test_fit_refuses_less_than_two_windows(refused):
+    with refused("119", "120 samples"):
+        EnhancedSimulator.fit(measured(119), window=60, verbose=0, **PAPER)
+    with refused("479", "480 samples"):
+        EnhancedSimulator.fit(measured(479), window=60, verbose=0)
+
+
+@pytest.mark.parametrize("width", [4, 1, 2_000])
+def test_a_moving_average_of_a_wrong_width_is_refused_before_training(monkeypatch, width):
+    monkeypatch.setattr(simulator_module, "fit_windows", lambda *arguments, **options: pytest.fail("trained first"))
+    values = np.sin(np.arange(1_500) / 5).astype(np.float32)
+    with pytest.raises(InputError, match="width|window"):
+        EnhancedSimulator.fit(Telemetry(values), window=60, moving_average=width, **PAPER)
+
+
+def test_saving_leaves_a_folder_with_a_foreign_manifest_alone(tmp_path):
+    (tmp_path / "manifest.json").write_text('{"name": "an extension"}')
+    with pytest.raises(InputError, match="something else"):
+        small().save(tmp_path)
+    assert (tmp_path / "manifest.json").read_text() == '{"name": "an extension"}'

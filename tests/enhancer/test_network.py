@@ -1,0 +1,147 @@
+"""Network one: the paper's shape, known maps learnt to known errors, every draw owned."""
+
+import keras
+import numpy as np
+import pytest
+
+from enhsim_tf.enhancer.network import build_enhancer, enhance
+from enhsim_tf.keras_tools.training import dense_stack, fit_windows
+
+
+def windows(number, samples=20, seed=0):
+    return np.random.default_rng(seed).standard_normal((number, samples)).astype(np.float32)
+
+
+def small(seed=0):
+    return build_enhancer(window=20, hidden_units=64, seed=seed)
+
+
+def weights_of(model):
+    return np.concatenate([weight.ravel() for weight in model.get_weights()])
+
+
+def fit_small(model, seed, inputs=None, **arguments):
+    inputs = windows(150) if inputs is None else inputs
+    arguments = {"epochs": 3, "batch_size": 15, "verbose": 0, **arguments}
+    return fit_windows(model, inputs, np.cumsum(inputs, axis=1), seed=seed, **arguments)
+
+
+def test_layers_of_figure_3():
+    model = build_enhancer()
+    layers = [(layer.name, layer.output.shape, layer.count_params()) for layer in model.layers]
+    assert layers == [
+        ("Input", (None, 500), 500 * 500 + 500),
+        ("Hidden_1", (None, 3_200), 500 * 3_200 + 3_200),
+        ("Hidden_2", (None, 3_200), 3_200 * 3_200 + 3_200),
+        ("Output", (None, 500), 3_200 * 500 + 500),
+    ]
+    assert model.count_params() == 250_500 + 1_603_200 + 10_243_200 + 1_600_500 == 13_697_400
+    assert model.input_shape == (None, 500)
+    assert [layer.activation.__name__ for layer in model.layers] == ["relu", "relu", "relu", "linear"]
+    # He's uniform initialiser: limit sqrt(6 / inputs)
+    for layer, inputs in zip(model.layers, (500, 500, 3_200, 3_200), strict=True):
+        kernel, limit = np.asarray(layer.kernel), np.sqrt(6 / inputs)
+        assert 0.99 * limit < np.abs(kernel).max() <= limit
+        assert np.std(kernel) == pytest.approx(limit / np.sqrt(3), rel=0.01)
+        assert not np.asarray(layer.bias).any()
+
+
+def test_arguments_set_the_shape():
+    model = build_enhancer(window=20, hidden_units=7, num_hidden=3)
+    assert [layer.units for layer in model.layers] == [20, 7, 7, 7, 20]
+    assert [layer.units for layer in dense_stack(9, (4, 2, 9), seed=0, name="narrow").layers] == [4, 2, 9]
+
+
+def test_layers_of_one_seed_are_independent():
+    first, second = dense_stack(50, (50, 50, 50), seed=0, name="equal").layers[:2]
+    assert abs(np.corrcoef(np.ravel(first.kernel), np.ravel(second.kernel))[0, 1]) < 5 / 50
+
+
+def test_enhance_is_the_network_of_the_paper_in_numpy():
+    model, coarse = small(), windows(300)
+    expected = coarse.astype(np.float64)
+    for number, layer in enumerate(model.layers):
+        expected = expected @ np.asarray(layer.kernel) + np.asarray(layer.bias)
+        expected = np.maximum(expected, 0) if number < 3 else expected
+    enhanced = enhance(model, coarse, batch_size=128)
+    assert enhanced.dtype == np.float32
+    np.testing.assert_allclose(enhanced, expected, rtol=1e-4, atol=1e-4)
+
+
+def test_known_linear_map_is_learnt_to_a_known_error():
+    # the target is a linear map of the source plus noise that nobody can learn: the held-out error is the noise's variance
+    noise_sd, (basis, _) = 0.3, np.linalg.qr(windows(20, seed=1))
+
+    def pairs(number, seed):
+        factors = 2 * windows(number, 3, seed=seed)
+        clean = factors @ basis[3:6]
+        return factors @ basis[:3], clean, clean + noise_sd * windows(number, seed=seed + 100)
+
+    source, _, target = pairs(3_000, 2)
+    held_out, clean, noisy = pairs(1_000, 3)
+    model = small()
+    untrained = np.mean((enhance(model, held_out) - noisy) ** 2)
+    history = fit_windows(model, source, target, 15, 50, seed=0, validation=(held_out, noisy), verbose=0)
+    enhanced = enhance(model, held_out)
+    error = np.mean((enhanced - noisy) ** 2)
+    assert untrained > np.var(clean) > 5 * noise_sd**2  # there is something to learn
+    assert error == pytest.approx(np.mean((noisy - clean) ** 2), rel=0.1)
+    assert np.mean((enhanced - clean) ** 2) < 0.1 * noise_sd**2  # the noise is averaged away, not learnt
+    assert history["val_loss"].shape == history["loss"].shape == (15,)
+    assert history["val_loss"][-1] == pytest.approx(error, rel=1e-4)
+
+
+def test_loss_is_the_mean_squared_error():
+    model, inputs = small(), windows(60)
+    expected = np.mean((enhance(model, inputs) - np.cumsum(inputs, axis=1)) ** 2)
+    history = fit_small(model, 0, inputs, epochs=1, batch_size=60, learning_rate=1e-9)
+    assert history["loss"] == pytest.approx([expected], rel=1e-4)
+
+
+@pytest.mark.parametrize("arguments", [{}, {"learning_rate": 0.02}], ids=str)
+def test_first_step_is_adam_s(arguments):
+    # whose first step is the learning rate, against the sign of the gradient
+    model = small()
+    before = weights_of(model)
+    fit_small(model, 0, windows(40), epochs=1, batch_size=40, **arguments)
+    steps = np.abs(weights_of(model) - before)
+    assert np.median(steps) == pytest.approx(arguments.get("learning_rate", 0.001), rel=1e-3)
+    assert steps.max() <= 1.001 * arguments.get("learning_rate", 0.001)
+
+
+def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
+    # a network that answers the sum of its weight and moves not at all: the batch losses tell the order of the targets
+    class Order(keras.callbacks.Callback):
+        losses = []
+
+        def on_train_batch_end(self, batch, logs=None):
+            self.losses.append(logs["loss"] * (batch + 1))  # Keras gives the mean so far
+
+    model = keras.Sequential([keras.Input((1,)), keras.layers.Dense(1, kernel_initializer="zeros")])
+    targets = np.sqrt(np.arange(12, dtype=np.float32))[:, None]
+    fit_windows(model, targets, targets, 3, 1, seed=0, learning_rate=0.0, callbacks=[Order()], verbose=0)
+    sums = np.array(Order.losses).reshape(3, 12)
+    orders = np.round(np.diff(sums, axis=1, prepend=0)).astype(int)
+    assert np.sort(orders, axis=1).tolist() == [list(range(12))] * 3
+    assert len({tuple(order) for order in orders}) == 3 and list(range(12)) not in orders.tolist()
+
+
+def test_every_draw_is_owned():
+    def run(global_seed, weights_seed, order_seed):
+        keras.utils.set_random_seed(global_seed)  # must not matter
+        model = small(weights_seed)
+        history = fit_small(model, order_seed, validation=(windows(20, seed=9), windows(20, seed=9)))
+        return {"weights": weights_of(model), **history}
+
+    first, again, other_weights, other_order = run(1, 0, 0), run(2, 0, 0), run(1, 5, 0), run(1, 0, 5)
+    assert set(first) == {"weights", "loss", "val_loss"}
+    for key, values in first.items():
+        assert (values == again[key]).all()
+        assert (values != other_weights[key]).any() and (values != other_order[key]).any()
+
+
+def test_compiled_and_plain_training_are_the_same():
+    compiled, plain = small(), small()
+    histories = [fit_small(model, 0, jit_compile=jit) for model, jit in ((compiled, True), (plain, False))]
+    assert histories[0]["loss"] == pytest.approx(histories[1]["loss"], rel=1e-3)
+    np.testing.assert_allclose(weights_of(compiled), weights_of(plain), atol=1e-3)

@@ -1,0 +1,98 @@
+"""Faults, tried for real on the commands with tiny networks: `python -m tests.faults fleet|reproduce --out docs/faults.json`.
+
+Each try starts a command, does it some harm at a random moment, runs the same command again until it ends well, and
+compares what it made with what was made without any disturbance: every byte of the data set of `generate`; every figure's
+arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
+tries the same in small; this takes minutes for `fleet` and about an hour for `reproduce`. `python -m tests.faults readme --out
+docs/faults.json` fills the README's table from the file.
+"""
+
+import argparse
+import json
+import signal
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.common.atomic_files import replace_file, write_json
+from enhsim_tf.reproduce.publish.results import fill_parts
+from tests.faults import of_data_sets, of_reproduce
+from tests.faults.in_common import MISSED
+
+ROOT = Path(__file__).parents[2]
+
+BENCHES = {
+    "fleet": (of_data_sets.FleetBench, of_data_sets.FAULTS),
+    "reproduce": (of_reproduce.ReproduceBench, of_reproduce.FAULTS),
+}
+TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)"), 20)  # of the others 3
+
+
+def as_markdown(table):
+    """The README's table: what was tried on which command, how often, and what came of it."""
+    commands = {"fleet": "`generate --workers`", "reproduce": "`enhsim_tf.reproduce`"}
+    lines = ["| fault | command | tries | outcome |", "|---|---|---|---|"]
+    for row in table:
+        outcomes = row["outcomes"]
+        words = "; ".join(f"{count} × {outcome}" if len(outcomes) > 1 else outcome for outcome, count in outcomes.items())
+        lines.append(f"| {row['fault']} | {commands[row['of']]} | {row['tries']} | {words} |")
+    return (
+        "\n".join(lines)
+        + "\n\nFrom `docs/faults.json`, which `python -m tests.faults fleet --out docs/faults.json` and the same with `reproduce` wrote."
+    )
+
+
+def fill_readme(table):
+    """Writes the table between the README's markers."""
+    path = ROOT / "README.md"
+    filled = fill_parts(path.read_text(encoding="utf-8"), {"faults": as_markdown(table)}, path.name)
+    with replace_file(path) as temporary:
+        temporary.write_text(filled, encoding="utf-8")
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Faults, tried for real.")
+    choices = [*BENCHES, "readme"]
+    parser.add_argument(
+        "of", choices=choices, help="what is tried: large data sets, or the cache of the paper's reproduction; readme: nothing"
+    )
+    parser.add_argument("--tries", type=int, help="of each fault (default: 20 of those that kill, 3 of the others)")
+    parser.add_argument(
+        "--only",
+        choices=sorted({fault for _, faults in BENCHES.values() for fault in faults}),
+        action="append",
+        help="this fault alone; may be repeated",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the moments and places")
+    parser.add_argument("--out", type=Path, required=True, help="the table, as JSON")
+    options = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it, and so would what it starts
+    kept = json.loads(options.out.read_text()) if options.out.exists() else []
+    if options.of == "readme":
+        fill_readme(kept)
+        return 0
+    make, faults = BENCHES[options.of]
+    table = [row for row in kept if row["of"] != options.of or (options.only and row["fault"] not in options.only)]
+    with tempfile.TemporaryDirectory() as folder:
+        bench = make(Path(folder))
+        for number, (fault, harm) in enumerate(faults.items()):
+            if options.only and fault not in options.only:
+                continue
+            rng, outcomes, attempts = np.random.default_rng([options.seed, number]), {}, 0
+            tries = options.tries or TRIES.get(fault, 3)
+            while sum(outcomes.values()) < tries and attempts < 3 * tries:
+                outcome = harm(bench, f"try-{number}-{attempts}", rng)
+                attempts += 1
+                if not outcome.startswith(MISSED) or "NOT" in outcome:
+                    outcomes[outcome] = outcomes.get(outcome, 0) + 1
+            row = {"of": options.of, "fault": fault, "tries": sum(outcomes.values()), "outcomes": outcomes}
+            table.append(row | {"missed": attempts - sum(outcomes.values()), "seed": options.seed})
+            print(f"{fault:34} {row['tries']:3}  " + "; ".join(f"{count} {outcome}" for outcome, count in outcomes.items()), flush=True)
+            write_json(options.out, sorted(table, key=lambda row: (row["of"], list(BENCHES[row["of"]][1]).index(row["fault"]))))
+    return int(any("NOT" in outcome for row in table for outcome in row["outcomes"]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

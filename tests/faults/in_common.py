@@ -1,0 +1,215 @@
+"""What the tries of `faults.py` share: a place to try in, and the harm that is the same whichever command it is done to."""
+
+import abc
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from tests.datasets.test_generate import children_of
+
+ROOT = Path(__file__).parents[2]
+MISSED = "too early or late"  # begins the outcome of a try that met nobody: it does not count, and is done again
+
+
+class Bench(abc.ABC):
+    """A place for tries, with what the command makes without any fault; each try has a name and a folder of that name."""
+
+    same: str  # what is equal after a recovery
+    disks = (".",)  # the folders of a try that a file system of its own is mounted on, one of them at random
+
+    def __init__(self, folder):
+        self.folder = folder
+        began = time.monotonic()
+        code, _, err = self.ran("undisturbed")
+        if code:
+            raise SystemExit(f"the undisturbed run failed: {err}")
+        self.seconds = time.monotonic() - began
+
+    @abc.abstractmethod
+    def command(self, name):
+        """What follows `python` on the command's line."""
+
+    @abc.abstractmethod
+    def wrong(self, name):
+        """What is wrong with what a run left, if anything."""
+
+    def start(self, name, *options, **how):
+        how = {"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True} | how
+        return subprocess.Popen(list(map(str, [sys.executable, *self.command(name), *options])), **how)
+
+    def ran(self, name, *options, **how):
+        """A run to its end: its exit code, what it said, and its errors."""
+        process = self.start(name, *options, **how)
+        out, err = process.communicate()
+        return process.returncode, out, err
+
+    def moment(self, rng):
+        """Waits for a random moment of a run."""
+        time.sleep(rng.uniform(0.02, 0.95) * self.seconds)
+
+    def copy(self, name):
+        """What a finished run left, to be damaged."""
+        return Path(shutil.copytree(self.folder / "undisturbed", self.folder / name))
+
+    def again(self, name, said=None):
+        """What is wrong after the same command, given again: how it ends, what it leaves, and the word it has to say once."""
+        code, out, err = self.ran(name)
+        if code or err:
+            return f"NOT recovered: {code} {err.strip()[-200:]}"
+        return self.wrong(name) or (f"NOT said: {said}" if said is not None and out.count(said) != 1 else None)
+
+    def recovered(self, name, said=None):
+        """The outcome of a try: the same command is given again; where all is well, the try's folder goes."""
+        wrong = self.again(name, said)
+        if wrong is None:
+            shutil.rmtree(self.folder / name)
+        return wrong or f"recovered, {self.same}"
+
+
+def not_one_line(code, err, expected=2):
+    """What is wrong with how a command refused, if anything: a user's mistake ends in one line."""
+    begins = "error: " if expected == 2 else "interrupted"
+    one_line = code == expected and len(err.splitlines()) == 1 and err.startswith(begins)
+    return None if one_line else f"NOT one line: {code} {err.strip()[-300:]}"
+
+
+def kill(bench, name, rng):
+    process = bench.start(name)
+    bench.moment(rng)
+    was_running = process.poll() is None
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    return ("" if was_running else f"{MISSED}; ") + bench.recovered(name)
+
+
+def interrupt(bench, name, rng):
+    process = bench.start(name)
+    bench.moment(rng)
+    os.killpg(process.pid, signal.SIGINT)
+    err = process.communicate()[1]
+    if process.returncode == 0:
+        return f"{MISSED}; {bench.recovered(name)}"
+    return not_one_line(process.returncode, err, expected=130) or f"one line; {bench.recovered(name)}"
+
+
+@contextlib.contextmanager
+def small_disk(folder, size):
+    """Yields whether a file system of this size, in kilobytes, could be mounted on a folder; it goes with all that it holds."""
+    folder.mkdir(parents=True, exist_ok=True)
+    mounted = not subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", folder], capture_output=True).returncode
+    try:
+        yield mounted
+    finally:
+        if mounted:
+            subprocess.run(["umount", folder], check=True)
+
+
+NOT_MOUNTED = "not tried: no file system can be mounted here"
+
+
+def full_disk(bench, name, rng):
+    """A file system that fills up while the command writes; made larger afterwards."""
+    total = sum(path.stat().st_size for path in (bench.folder / "undisturbed").rglob("*")) // 1024
+    place = bench.folder / name
+    with small_disk(place, int(rng.uniform(0.001, 0.99) * total)) as mounted:
+        if not mounted:
+            return NOT_MOUNTED
+        code, _, err = bench.ran(name)
+        if wrong := not_one_line(code, err):
+            return wrong
+        subprocess.run(["mount", "-o", f"remount,size={10 * total}k", place], check=True)
+        wrong = bench.again(name)
+    shutil.rmtree(place)
+    return wrong or f"one line; recovered, {bench.same}"
+
+
+def read_only(bench, name, rng):
+    """A folder becomes read-only after a run was killed at a random moment; writable again afterwards."""
+    which = bench.disks[rng.integers(len(bench.disks))]
+    place = bench.folder / name / which
+    with small_disk(place, 1_000_000) as mounted:
+        if not mounted:
+            return NOT_MOUNTED
+        process = bench.start(name)
+        bench.moment(rng)
+        workers = children_of(process)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        while any(Path(f"/proc/{worker}").exists() for worker in workers):  # they may have files open
+            time.sleep(0.01)
+        subprocess.run(["mount", "-o", "remount,ro", place], check=True)
+        code, _, err = bench.ran(name)
+        subprocess.run(["mount", "-o", "remount,rw", place], check=True)
+        wrong = not_one_line(code, err) or bench.again(name)
+    shutil.rmtree(bench.folder / name)
+    return wrong or f"one line{f' ({which})' if len(bench.disks) > 1 else ''}; recovered, {bench.same}"
+
+
+def flip(path, rng):
+    """One bit of a file is another."""
+    content = bytearray(path.read_bytes())
+    content[rng.integers(len(content))] ^= 1 << rng.integers(8)
+    path.write_bytes(content)
+
+
+CLOCK = """
+import os, time
+_time, _time_ns = time.time, time.time_ns
+def _step():
+    with open(os.environ["CLOCK_STEP"]) as file:
+        return float(file.read() or 0)
+time.time, time.time_ns = lambda: _time() + _step(), lambda: _time_ns() + int(1e9 * _step())
+"""
+
+
+@contextlib.contextmanager
+def stepping(folder):
+    """Yields what steps the clock of a running command by seconds, and the environment to start it with.
+
+    The machine's own clock stays: a `sitecustomize.py` in front of the command's modules shifts `time.time`, by what a file
+    says at that moment. `time.monotonic` goes on evenly, as it does when an administrator steps the clock. Files are stamped
+    by the kernel; `stepped` shifts their times as the clock would have.
+    """
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(CLOCK)
+
+    def step(seconds):
+        (folder / "new").write_text(str(seconds))
+        os.replace(folder / "new", folder / "seconds")
+
+    step(0)
+    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        yield step, os.environ | {"PYTHONPATH": path, "CLOCK_STEP": str(folder / "seconds")}
+    finally:
+        shutil.rmtree(folder)
+
+
+def stepped(folder, seconds):
+    """Moves the times of a folder and of all in it."""
+    for path in (folder, *folder.rglob("*")):
+        with contextlib.suppress(FileNotFoundError):  # a run may be at work there
+            about = path.stat()
+            os.utime(path, (about.st_atime + seconds, about.st_mtime + seconds))
+
+
+def clock_change(bench, name, rng):
+    """The clock jumps by years in the middle of a run; the next run finds files of another time, and the clock as it was."""
+    with stepping(bench.folder / f"{name}.clock") as (step, environment):
+        process = bench.start(name, env=environment)
+        bench.moment(rng)
+        step(seconds := float(rng.choice([-1, 1]) * rng.uniform(2, 20) * 365 * 86_400))
+        if (bench.folder / name).is_dir():
+            stepped(bench.folder / name, seconds)
+        err = process.communicate()[1]
+        if process.returncode or err:
+            return f"NOT undisturbed: {process.returncode} {err.strip()[-300:]}"
+        if wrong := bench.wrong(name):
+            return wrong
+        stepped(bench.folder / name, -2 * seconds)
+        return f"went on; {bench.recovered(name)}"

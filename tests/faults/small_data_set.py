@@ -1,0 +1,125 @@
+"""A data set that needs no networks, as a command: what the tests stop, kill, starve and start twice.
+
+`python -m tests.faults.small_data_set OUT`: its simulator is a coarse one with white noise, so that it starts in a second.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
+from enhsim_tf.common.console import finish  # noqa: E402
+from enhsim_tf.datasets import generate as fleet  # noqa: E402
+from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
+from enhsim_tf.datasets.scenario_file import Mix, ScenarioShare  # noqa: E402
+from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
+from enhsim_tf.noise.surrogates import GaussianNoise  # noqa: E402
+
+COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
+WINDOW, INTERVAL_S = 60, 2.0
+MIX = Mix(0.5, (ScenarioShare("stuck", 0.3, (0.2, 0.9), (0.0, 0.5)), ScenarioShare("gain_loss", 0.2, (0.5, 0.5), (0.25, 0.25))))
+
+
+class Plain:
+    """What an enhanced simulator is to a shard, without a network: the coarse signal, a level, and white noise."""
+
+    def __init__(self, noise_sd=0.1, levels=None):
+        self.coarse, self.noise, self.levels, self.interval_s = COARSE, GaussianNoise(noise_sd, WINDOW), levels, INTERVAL_S
+
+    def enhance(self, coarse):
+        return coarse
+
+
+class PlainMaker(ShardMaker):
+    """Makes shards with plain simulators, and takes its time."""
+
+    delay_s = 0.0
+
+    @property
+    def simulators(self):
+        time.sleep(self.delay_s)
+        return [Plain(0.1 * (number + 1)) for number, _ in enumerate(self.plan.models)]
+
+
+class SlowMaker(PlainMaker):
+    delay_s = 0.03
+
+
+def plan(num_windows=1_000, shard=50, seed=3, mix=MIX, shares=(1.0,)):
+    models = [Model(f"model-{number}", Path("nowhere"), share, str(number) * 64, WINDOW, INTERVAL_S) for number, share in enumerate(shares)]
+    return Plan(mix, tuple(models), seed, num_windows, shard)
+
+
+def die_at_thirteen(number):
+    """Work that kills its process at one number, always."""
+    import os
+
+    return number if number != 13 else os._exit(9)
+
+
+def threads_and_square(number):
+    """Work that says how it is done."""
+    import os
+
+    return number**2, os.getpid(), os.environ["TF_NUM_INTRAOP_THREADS"], "tensorflow" in sys.modules
+
+
+def meet(folder, num_processes, number):
+    """Work that waits until there are so many processes at it."""
+    import os
+
+    (folder / str(os.getpid())).touch()
+    while len(os.listdir(folder)) < num_processes:
+        time.sleep(0.01)
+    return number
+
+
+def threads_of(number):
+    """How many threads a process has: TensorFlow's, and those of linear algebra."""
+    import os
+
+    import threadpoolctl
+
+    return os.environ["TF_NUM_INTRAOP_THREADS"], {library["num_threads"] for library in threadpoolctl.threadpool_info()}
+
+
+def refuse(number):
+    """Work that finds a user's mistake."""
+    from enhsim_tf.common.errors import InputError
+
+    raise InputError(f"Expected another number. Received: {number}.")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("out")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--windows", type=int, default=1_000)
+    parser.add_argument("--limit", type=int, help="bytes that a file may have")
+    parser.add_argument("--user", type=int, help="whose rights to have, once everything is imported")
+    options = parser.parse_args()
+    if options.user:
+        import os
+
+        os.seteuid(options.user)
+    if options.limit:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_FSIZE, (options.limit, options.limit))
+    fleet.ShardMaker = SlowMaker
+
+    def run():
+        fleet.generate_fleet(options.out, plan(options.windows), options.workers)
+        return 0
+
+    return finish(run, "interrupted; what was finished is kept")
+
+
+if __name__ == "__main__":
+    np.seterr(all="raise")
+    sys.exit(main())

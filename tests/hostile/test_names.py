@@ -1,0 +1,192 @@
+"""Names of channels, columns and sources may hold anything: they stay in their folder, and print as one plain line.
+
+With the real writers: models, training data, scores, stores, reports. The page `report.html` has its own test in
+`test_page.py`, with hostile words wherever one can come from a file.
+"""
+
+import html.parser
+import json
+import os
+import re
+import string
+import urllib.parse
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from enhsim_tf.__main__ import main
+from enhsim_tf.common.atomic_files import encoded
+from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of
+from enhsim_tf.reproduce.publish.page import write_page
+from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.sources import read_source
+from tests.fuzzing.of_folders import write_model
+
+NAMES = (
+    "..", ".", "../../up", "/etc/passwd", "..\\..\\up", "C:\\up", "a/b", ".hidden", "CON", "nul", "com1", "LPT9", "Aux ", "trailing.", " lead",
+    "<script>alert(1)</script>", "\"'&<img src=x onerror=alert(1)>", "\x1b[31mred\x1b[0m", "\x1b]0;title\x07", "a\rb", "a\tb", "\u202eevil", "漢字",
+    "-rf", "~", "%2e%2e", "%", "a?b*c|d", "$HOME", "`id`", "a" * 160,
+)  # fmt: skip
+REFUSED = ("", "a" * 181, "é" * 40, "\ud800", "a\udcffb", "." * 61)
+KEPT = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}  # by Windows
+ALLOWED = set(string.ascii_letters + string.digits + "%_-~ ")
+
+
+def check_file_name(name):
+    found = encoded(name)
+    assert set(found) <= ALLOWED and 1 <= len(found) <= 160 and urllib.parse.unquote(found) == name
+    assert found.casefold() not in KEPT and found == found.strip() and os.path.basename(found) == found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_becomes_one_of_a_file(name, tmp_path):
+    check_file_name(name)
+    folder = folder_of(tmp_path, name)
+    folder.mkdir()
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_name_that_no_file_can_have_is_refused(name, refused, tmp_path):
+    for use in (encoded, lambda name: folder_of(tmp_path, name), ParquetStore(tmp_path).read):
+        with refused("name"):
+            use(name)
+    with refused("name"):
+        ParquetStore(tmp_path).write(Telemetry(np.zeros(3, np.float32), name=name))
+    assert not list(tmp_path.iterdir())
+
+
+@settings(derandomize=True, max_examples=500, deadline=None, database=None)
+@given(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=14), st.text(min_size=1, max_size=14))
+def test_any_name_becomes_one_of_a_file_and_no_two_the_same(name, other):
+    check_file_name(name)
+    assert name == other or encoded(name) != encoded(other)
+
+
+def files_below(folder):
+    return {path for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_store_keeps_every_name_in_its_folder(tmp_path):
+    store = ParquetStore(tmp_path / "inner" / "store")
+    for number, name in enumerate(NAMES):
+        store.write(Telemetry(np.arange(number, number + 5, dtype=np.float32), name=name))
+    assert store.names() == sorted(NAMES)
+    assert [store.read(name).values[0] for name in NAMES] == list(range(len(NAMES)))
+    assert {path.parent.parent for path in files_below(tmp_path)} == {store.folder}
+    read = read_source(store.folder)
+    assert set(read) == set(NAMES)
+
+
+def lines_of(capfd):
+    """Everything that was printed, whose lines hold nothing but what prints."""
+    out, error = capfd.readouterr()
+    lines = [*out.split("\n"), *error.split("\n")]
+    assert all(line.isprintable() for line in lines), [line for line in lines if not line.isprintable()]
+    return lines
+
+
+COMMANDED = [name for name in NAMES if name == name.strip()]  # a table's columns lose the spaces around them
+
+
+@pytest.fixture
+def models(tmp_path):
+    for name in COMMANDED:
+        write_model(folder_of(tmp_path / "world" / "models", name))
+    assert set(models_of(tmp_path / "world" / "models")) == set(COMMANDED)
+    return tmp_path / "world" / "models"
+
+
+def test_training_data_of_hostile_channels_stay_in_their_folder(models, tmp_path, capfd):
+    out = tmp_path / "world" / "out"
+    before = files_below(tmp_path)
+    assert main(["generate", str(models), "--windows", "3", "--out", str(out)]) == 0
+    made = files_below(tmp_path) - before
+    assert {path.parent for path in made} == {out} and len(made) == len(COMMANDED)
+    assert sum("3 windows" in line for line in lines_of(capfd)) == len(COMMANDED)
+    found = pd.read_parquet(folder_of(out, "..").with_suffix(".parquet"))
+    assert len(found) == 3
+    for name in ("\x1b[31mnot there", "\ud800", "x" * 2_000):
+        assert main(["generate", str(models), "--windows", "3", "--channel", name, "--out", str(out)]) == 2
+        lines_of(capfd)
+
+
+def table_of(names, num_samples=200):
+    times = pd.date_range("2024-01-01", periods=num_samples, freq="2s")
+    wave = np.sin(np.arange(num_samples) / 3) + 0.1 * np.random.default_rng(0).standard_normal(num_samples)
+    return pd.DataFrame({"time": times} | {name: wave for name in names})
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_scores_and_refusals_of_hostile_channels_stay_in_their_folder(models, tmp_path, capfd):
+    source, out = tmp_path / "world" / "new.parquet", tmp_path / "world" / "scores"
+    names = COMMANDED[:12]
+    table_of(names).to_parquet(source)
+    before = files_below(tmp_path)
+    assert main(["score", str(models), str(source), "--windows", "40", "--detector", "limit-check", "--out", str(out)]) == 0
+    made = files_below(tmp_path) - before
+    assert {path.parent for path in made} == {out} and len(made) == len(names)
+    lines_of(capfd)
+    table_of(["\x1b[31munknown\nname"]).to_parquet(source)
+    assert main(["score", str(models), str(source), "--out", str(out)]) == 2
+    (line,) = [line for line in lines_of(capfd) if line]
+    assert "unknown" in line
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
+    names = ["../../<script>\x1b[31m", "CON"]
+    source, out = tmp_path / "world" / "x.parquet", tmp_path / "world" / "models"
+    source.parent.mkdir()
+    table_of([*names, "short\x1b[31m\n"], 1_500).assign(**{"short\x1b[31m\n": [1.0] * 2 + [np.nan] * 1_498}).to_parquet(source)
+    tiny = ["--num-windows", "40", "--epochs", "1", "--iterations", "2", "--window", "64", "--workers", "1"]
+    assert main(["fit", str(source), "--out", str(out), *tiny]) == 2  # one is too short
+    made = files_below(tmp_path) - {source}
+    assert {path.parent.parent for path in made} == {out} and {path.parent.name for path in made} == set(map(encoded, names))
+    assert set(models_of(out)) == set(names)
+    lines = lines_of(capfd)
+    assert sum("<script>" in line for line in lines) and sum(line.startswith("error: short") for line in lines) == 1
+    report = json.loads((folder_of(out, names[0]) / "report.json").read_text())
+    assert report["cleaning"]["channel"] == names[0]  # in JSON it stays what it is
+    assert "\x1b" not in (folder_of(out, names[0]) / "report.json").read_text()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("name", ["\x1b[31mred", "a\x07b", "\u202eevil", "<b>"])
+def test_findings_about_hostile_columns_are_plain_lines(tmp_path, name, suffix):
+    from enhsim_tf.telemetry.cleaning.clean import clean
+
+    path = tmp_path / f"x{suffix}"
+    table = table_of(["value"]).assign(**{name: "word"}).rename(columns={"time": f"{name} time"})
+    table.to_csv(path, index=False) if suffix == ".csv" else table.to_parquet(path)
+    (series,) = read_source(path).values()
+    lines = clean(series).report.lines()
+    assert all(line.isprintable() for line in lines) and any("columns without numbers" in line for line in lines)
+
+
+class Tags(html.parser.HTMLParser):
+    """The names of all tags."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+
+
+def test_control_characters_and_tags_do_not_reach_the_page(tmp_path):
+    from tests.reproduce.test_page import found_of
+
+    plain = Tags(write_page(tmp_path, found_of(source="plain.npy"), []).read_text()).tags
+    assert "table" in plain and "script" not in plain
+    for name in NAMES:
+        text = write_page(tmp_path, found_of(source=f"{name}.npy"), []).read_text()
+        assert Tags(text).tags == plain
+        assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", text) and "<script" not in text
+    assert write_page(tmp_path, found_of(source="\ud800\udfff.npy"), []).read_text()

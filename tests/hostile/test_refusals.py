@@ -1,0 +1,226 @@
+"""What the command refuses: exit code 2, one line that says what was expected and received, and nothing written."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from enhsim_tf.reproduce import settings
+from enhsim_tf.reproduce.__main__ import main
+
+ROOT = Path(__file__).parents[2]
+
+
+def _wave(num_samples=2_000):
+    return np.sin(np.arange(num_samples) / 15) + 0.1 * np.random.default_rng(0).standard_normal(num_samples)
+
+
+def _table(path, **columns):
+    import pandas as pd
+
+    table = pd.DataFrame(columns)
+    table.to_csv(path, index=False) if path.suffix == ".csv" else table.to_parquet(path)
+
+
+def _array(values, **options):
+    return lambda path: np.save(path, values, **options)
+
+
+BAD_FILES = {
+    "missing": ("x.npy", lambda path: None, []),
+    "a folder": ("x.npy", lambda path: path.mkdir(), []),
+    "a name no file can have": ("x" * 300 + ".npy", lambda path: None, []),
+    "unknown kind": ("x.txt", lambda path: path.write_text("1\n2\n"), []),
+    "empty npy": ("x.npy", lambda path: path.touch(), []),
+    "empty csv": ("x.csv", lambda path: path.touch(), []),
+    "empty parquet": ("x.parquet", lambda path: path.touch(), []),
+    "empty array": ("x.npy", _array(np.zeros(0)), []),
+    "no rows": ("x.csv", lambda path: path.write_text("value\n"), []),
+    "no columns": ("x.npy", _array(np.zeros((2_000, 0))), []),
+    "not numeric": ("x.npy", _array(np.array(["a"] * 2_000)), []),
+    "complex": ("x.npy", _array(_wave() + 1j), []),
+    "not numeric table": ("x.csv", lambda path: _table(path, value=["high", "low"] * 1_000), []),
+    "constant": ("x.npy", _array(np.full(2_000, 3.0)), []),
+    "nan": ("x.npy", _array(np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
+    "infinite": ("x.npy", _array(np.where(np.arange(2_000) == 7, -np.inf, _wave())), []),
+    "infinite as float32": ("x.npy", _array(1e39 * _wave()), []),
+    "true and false": ("x.npy", _array(_wave() > 0), []),
+    "one name for two columns": (
+        "x.csv",
+        lambda path: path.write_text("a,a\n" + "".join(f"{value},{-value}\n" for value in _wave())),
+        ["--column", "a"],
+    ),
+    "gap in a table": ("x.csv", lambda path: _table(path, value=np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
+    "below two windows": ("x.npy", _array(_wave(999)), []),
+    "three axes": ("x.npy", _array(np.zeros((2_000, 2, 2))), []),
+    "no axis": ("x.npy", _array(np.array(1.0)), []),
+    "which column": ("x.npy", _array(np.zeros((2_000, 2))), []),
+    "column number too large": ("x.npy", _array(np.zeros((2_000, 2))), ["--column", "2"]),
+    "column number below 0": ("x.npy", _array(np.zeros((2_000, 2))), ["--column=-1"]),
+    "column name for numbers": ("x.npy", _array(np.zeros((2_000, 2))), ["--column", "volts"]),
+    "which column of a table": ("x.csv", lambda path: _table(path, a=_wave(), b=_wave()), []),
+    "column name": ("x.csv", lambda path: _table(path, a=_wave(), b=_wave()), ["--column", "volts"]),
+    "time column": ("x.csv", lambda path: _table(path, a=_wave()), ["--time", "utc"]),
+    "time of an array": ("x.npy", _array(_wave()), ["--time", "utc"]),
+    "garbage npy": ("x.npy", lambda path: path.write_bytes(bytes(range(256)) * 20), []),
+    "garbage csv": ("x.csv", lambda path: path.write_bytes(bytes(range(256)) * 20), []),
+    "garbage parquet": ("x.parquet", lambda path: path.write_bytes(bytes(range(256)) * 20), []),
+    "cut off": ("x.npy", lambda path: (np.save(path, _wave()), path.write_bytes(path.read_bytes()[:5_000])), []),
+    "damaged header": (
+        "x.npy",
+        lambda path: (np.save(path, _wave()), path.write_bytes(path.read_bytes().replace(b"(2000,)", b"(200#,)"))),
+        [],
+    ),
+    "more than memory": (
+        "x.npy",
+        lambda path: (
+            np.save(path, np.zeros(10**6, np.int8)),
+            path.write_bytes(path.read_bytes().replace(b"'|i1', ", b"'<U99999999',")[:200]),
+        ),
+        [],
+    ),
+    "pickled objects": ("x.npy", _array(np.array([{}, None] * 1_000, object)), []),
+    "pickled table": ("x.npy", lambda path: path.write_bytes(b"\x80\x04K\x01."), []),
+    "irregular times": ("x.csv", lambda path: _table(path, a=_wave(), t=np.arange(2_000) ** 1.1), ["--column", "a", "--time", "t"]),
+    "times that stand still": ("x.csv", lambda path: _table(path, a=_wave(), t=np.zeros(2_000)), ["--column", "a", "--time", "t"]),
+    "falling times": ("x.csv", lambda path: _table(path, a=_wave(), t=-np.arange(2_000)), ["--column", "a", "--time", "t"]),
+    "missing time": (
+        "x.csv",
+        lambda path: _table(path, a=_wave(), t=np.where(np.arange(2_000) == 9, np.nan, np.arange(2_000))),
+        ["--column", "a", "--time", "t"],
+    ),
+    "a word among the times": (
+        "x.csv",
+        lambda path: _table(path, a=_wave(), t=[*range(1_999), "soon"]),
+        ["--column", "a", "--time", "t"],
+    ),
+    "words for times": ("x.csv", lambda path: _table(path, a=_wave(), t=["now"] * 2_000), ["--column", "a", "--time", "t"]),
+}
+
+
+@pytest.fixture
+def told(tmp_path, capfd):
+    """Runs the command in this process and returns its exit code, its output and the lines of its errors."""
+
+    def run(*arguments):
+        code = main(["--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), *map(str, arguments)])
+        out, error = capfd.readouterr()
+        return code, out, error.splitlines()
+
+    return run
+
+
+@pytest.fixture
+def refused_line(told, tmp_path):
+    """Runs the command, which must refuse: exit code 2, one line, and no file written anywhere; returns the line."""
+
+    def files():
+        return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+
+    def run(*arguments):
+        before = files()
+        code, out, lines = told("--budget", "smoke", *arguments)
+        assert (code, out, len(lines)) == (2, "", 1), lines
+        assert lines[0].startswith("error: Expected ") and "Received: " in lines[0]
+        assert files() == before
+        return lines[0]
+
+    return run
+
+
+@pytest.mark.filterwarnings("error")  # a warning would be a second line
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
+    name, write, arguments = BAD_FILES[case]
+    write(tmp_path / name)
+    assert name[:50] in refused_line("--telemetry", tmp_path / name, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--seed", "-1"], "--seed -1"),
+        (["--seed", str(2**32)], str(2**32)),  # the detectors and the classifier take no larger one
+        (["--spread", "-1"], "--spread -1"),
+        (["--only", "fig15"], "fig15"),
+        (["--only", "fig0"], "fig0"),
+        (["--only", ""], "fig01"),
+        (["--column", "0"], "--telemetry"),
+        (["--time", "t"], "--telemetry"),
+        (["--seed", "abc"], "'abc'"),
+        (["--budget", "tiny"], "'tiny'"),
+        (["--seed"], "--seed"),
+        (["--sed", "3"], "--sed 3"),
+        (["--experiment", "fame"], "'fame'"),
+        (["--telemetry"], "--telemetry"),
+    ],
+)
+def test_a_bad_option_is_refused_in_one_line(refused_line, arguments, word):
+    assert word in refused_line(*arguments)
+
+
+@pytest.mark.parametrize("option", ["--out", "--cache"])
+@pytest.mark.parametrize("where", ["file", "file/below"])
+def test_a_folder_that_cannot_be_written_is_refused(refused_line, tmp_path, option, where):
+    (tmp_path / "file").write_text("a file is in the way")
+    assert where in refused_line(option, tmp_path / where)
+    assert (tmp_path / "file").read_text() == "a file is in the way"
+
+
+@pytest.mark.parametrize("spelling", ["figures", "figures/", "./figures", "smoke/../figures", "absolute", "link"])
+def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch, spelling):
+    for folder in ("figures", "smoke"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "link").symlink_to("figures")
+    (tmp_path / "figures" / "fig02_source_target.png").write_text("full budget")
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "figures" if spelling == "absolute" else spelling
+    assert "smoke" in refused_line("--only", "fig02", "--out", out)
+    assert (tmp_path / "figures" / "fig02_source_target.png").read_text() == "full budget"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--telemetry", "no/such/file.npy"],
+        ["--seed", "-1"],
+        ["--seed", "abc"],
+        ["--budget", "tiny"],
+        ["--only", "fig99"],
+        ["--out", "README.md/below"],
+    ],
+)
+def test_a_refusal_as_the_shell_sees_it(tmp_path, arguments):
+    defaults = [] if "--out" in arguments else ["--out", tmp_path / "out"]
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", *defaults, "--cache", tmp_path / "cache", *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("error: Expected ")
+    assert not list(tmp_path.iterdir())
+
+
+STRANGE = {
+    "two windows": _wave(1_000),
+    "a few samples more": _wave(1_100),
+    "a ramp without noise": np.arange(3_000.0),
+    "one step": (np.arange(3_000) > 1_500).astype(np.float64),
+    "still in training": np.concatenate([np.ones(2_200), _wave(800)]),
+    "still in the test": np.concatenate([_wave(2_000), np.ones(1_000)]),
+}
+
+
+@pytest.mark.parametrize("case", STRANGE)
+def test_a_strange_channel_gets_its_figures_or_one_line_before_the_training(told, tmp_path, monkeypatch, case):
+    counts = {"telemetry__num_windows": 12, "enhancer__hidden_units": 4, "enhancer__epochs": 1, "noise__filters": 4}
+    counts |= {"adversarial__batch_size": 8, "adversarial__num_iterations": 2, "adversarial__record_every": 1}
+    make = settings.make_settings
+    monkeypatch.setattr(settings, "make_settings", lambda budget, seed: make("full", seed, **counts, detectors__num_speed_windows=8))
+    np.save(tmp_path / "channel.npy", STRANGE[case])
+    code, _, lines = told("--budget", "smoke", "--telemetry", tmp_path / "channel.npy")
+    if code == 0:
+        assert not lines and (tmp_path / "out" / "results.json").is_file()
+    else:
+        assert code == 2 and len(lines) == 1 and lines[0].startswith("error: Expected ")
+        assert not list((tmp_path / "out").glob("*")) and not list((tmp_path / "cache").glob("enhancer-*"))

@@ -1,0 +1,200 @@
+"""What a moving average leaves, against its closed forms."""
+
+import numpy as np
+import pytest
+
+from enhsim_tf.noise.extraction import extract_noise, noise_unit
+from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+
+
+def gain(width, frequency):
+    """Of a centred moving average, for a sine of `frequency` cycles a sample."""
+    return np.sin(np.pi * width * frequency) / (width * np.sin(np.pi * frequency))
+
+
+def test_moving_average_by_hand():
+    noise, average = extract_noise(np.array([1.0, 2, 6, 4, -4, 3, 0]), width=3)
+    assert average.tolist() == [3, 4, 2, 1, np.float32(-1 / 3)]
+    assert noise == pytest.approx([-1, 2, 2, -5, 10 / 3])
+    noise, average = extract_noise(np.array([1.0, 2, 6, 4, -4, 3, 0]), width=7)
+    assert (average, noise) == (pytest.approx([12 / 7]), pytest.approx([4 - 12 / 7]))
+
+
+@pytest.mark.parametrize("width", [3, 25, 101])
+def test_noise_and_average_add_up_to_the_middle_of_the_series(width):
+    values = np.random.default_rng(0).normal(5, 2, 300).astype(np.float32)
+    noise, average = extract_noise(values, width)
+    assert len(noise) == len(average) == 300 - width + 1
+    assert noise.dtype == average.dtype == np.float32
+    assert noise + average == pytest.approx(values[width // 2 : 300 - width // 2], abs=1e-5)
+
+
+@pytest.mark.parametrize(("width", "seed"), [(3, 0), (5, 1), (25, 2)])
+def test_residual_of_white_noise(width, seed):
+    number, sd = 400_000, 0.3
+    noise, average = extract_noise(np.random.default_rng(seed).normal(0, sd, number), width)
+    error = 5 * np.sqrt(2 / number)
+    assert np.var(noise, dtype=np.float64) == pytest.approx(sd**2 * (1 - 1 / width), rel=error)
+    assert np.var(average, dtype=np.float64) == pytest.approx(sd**2 / width, rel=error * np.sqrt(width))
+
+
+@pytest.mark.parametrize(("width", "period"), [(25, 480), (25, 120), (5, 12.5), (25, 18)])
+def test_leak_of_a_sine(width, period):
+    sine = 0.5 * np.sin(2 * np.pi * np.arange(2_000) / period + 0.3)
+    noise, average = extract_noise(sine, width)
+    middle = sine[width // 2 : 2_000 - width // 2]
+    assert average == pytest.approx(gain(width, 1 / period) * middle, abs=1e-6)
+    assert noise == pytest.approx((1 - gain(width, 1 / period)) * middle, abs=1e-6)
+
+
+def test_large_offset_leaves_no_trace():
+    values = np.random.default_rng(3).integers(-8, 8, 1_000)
+    assert extract_noise(values + 2.0**20, 5)[0] == pytest.approx(extract_noise(values, 5)[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("width", [24, 1, 0, -3, 101])
+def test_widths_that_are_refused(refused, width):
+    with refused(f"width={width}"):
+        extract_noise(np.arange(100.0), width)
+
+
+def test_noise_unit_puts_the_standard_deviation_at_a_tenth():
+    noise = np.random.default_rng(0).normal(0, 7, 1_000)
+    assert np.std(noise / noise_unit(noise)) == pytest.approx(0.1)
+
+
+def test_gaussian_noise_recovers_the_standard_deviation():
+    windows = np.random.default_rng(0).normal(0, 0.3, (400, 500)).astype(np.float32)
+    fitted = GaussianNoise.fit(windows)
+    assert fitted.standard_deviation == pytest.approx(0.3, rel=5 / np.sqrt(2 * windows.size))
+    noise = fitted.generate(300, seed=1)
+    assert noise.shape == (300, 500) and noise.dtype == np.float32
+    assert np.std(noise) == pytest.approx(fitted.standard_deviation, rel=5 / np.sqrt(2 * noise.size))
+    assert np.mean(noise[:, 1:] * noise[:, :-1]) / 0.09 == pytest.approx(0, abs=5 / np.sqrt(noise.size))
+
+
+def test_gaussian_noise_owns_its_draws():
+    noise = GaussianNoise(0.1, 40)
+    np.random.seed(0)  # noqa: NPY002 - the global state must not matter
+    first = noise.generate(3, seed=5)
+    np.random.seed(1)  # noqa: NPY002
+    assert (first == noise.generate(3, seed=5)).all()
+    assert (first != noise.generate(3, seed=6)).all()
+
+
+def autocorrelation_of_second_order(first, second, max_lag):
+    """Closed form of an AR(2): the recursion of Yule and Walker from rho(1) = first / (1 - second)."""
+    rho = [1, first / (1 - second)]
+    while len(rho) <= max_lag:
+        rho.append(first * rho[-1] + second * rho[-2])
+    return np.array(rho)
+
+
+def second_order(first, second, number, samples, seed):
+    """Windows of an AR(2) with innovations of sd 1, sample by sample, after 500 that are thrown away."""
+    draws = np.random.default_rng(seed).standard_normal((number, samples + 500))
+    values = np.zeros_like(draws)
+    for t in range(2, samples + 500):
+        values[:, t] = first * values[:, t - 1] + second * values[:, t - 2] + draws[:, t]
+    return values[:, 500:]
+
+
+def criterion(windows, order):
+    """AIC of an autoregression by ordinary least squares, on the samples that the largest order of 8 can predict."""
+    targets = windows[:, 8:].ravel()
+    if order == 0:
+        return targets.size * np.log(np.mean(targets**2))
+    past = np.stack([windows[:, 8 - lag : windows.shape[1] - lag].ravel() for lag in range(1, order + 1)], axis=1)
+    errors = targets - past @ np.linalg.lstsq(past, targets)[0]
+    return targets.size * np.log(np.mean(errors**2)) + 2 * order
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.2, -0.5), (0.3, 0.4), (1.9, -0.95)])
+def test_autoregression_recovers_its_coefficients(first, second):
+    windows = 0.2 * second_order(first, second, 200, 300, seed=3)
+    fitted = GaussianAutoregression.fit(windows, max_order=2)
+    error = 5 * np.sqrt((1 - second**2) / windows.size)  # of a least-squares AR(2)
+    assert fitted.coefficients == pytest.approx([first, second], abs=error)
+    assert fitted.innovation_sd == pytest.approx(0.2, rel=5 / np.sqrt(2 * windows.size))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_akaike_chooses_the_order_that_least_squares_would(seed):
+    windows = second_order(1.2, -0.5, 100, 200, seed)
+    chosen = len(GaussianAutoregression.fit(windows, max_order=8).coefficients)
+    assert chosen == np.argmin([criterion(windows, order) for order in range(9)]) >= 2
+    assert np.abs(GaussianAutoregression.fit(windows).coefficients[2:]) == pytest.approx(0, abs=5 / np.sqrt(windows.size))
+
+
+def test_white_noise_needs_no_coefficients():
+    windows = np.random.default_rng(2).normal(3, 0.2, (100, 200))
+    fitted = GaussianAutoregression.fit(windows, max_order=4)
+    assert len(fitted.coefficients) == 0 and fitted.innovation_sd == pytest.approx(np.std(windows))
+    assert np.std(fitted.generate(100, seed=0)) == pytest.approx(0.2, rel=0.02)
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.2, -0.5), (0.3, 0.4)])
+def test_generated_autoregression_is_stationary_and_has_the_closed_form(first, second):
+    number, samples = 20_000, 40
+    noise = GaussianAutoregression([first, second], 0.3, samples).generate(number, seed=4)
+    assert noise.shape == (number, samples) and noise.dtype == np.float32
+    expected = autocorrelation_of_second_order(first, second, samples - 1)
+    sd = 0.3 / np.sqrt(1 - first * expected[1] - second * expected[2])
+    # five standard errors, at every sample: the first has the variance of the last
+    assert np.std(noise, axis=0, dtype=np.float64) == pytest.approx(np.full(samples, sd), rel=5 / np.sqrt(2 * number))
+    for begin in (0, 1, 20):
+        products = np.mean(noise[:, begin : begin + 1].astype(np.float64) * noise[:, begin:], axis=0) / sd**2
+        assert products == pytest.approx(expected[: samples - begin], abs=5 * np.sqrt(2 / number))
+
+
+def test_autoregression_of_generated_noise_is_the_one_it_came_from():
+    source = GaussianAutoregression([0.5, 0.2, -0.3, 0.1], 0.1, 300)
+    again = GaussianAutoregression.fit(source.generate(400, seed=0), max_order=4)
+    assert again.coefficients == pytest.approx(source.coefficients, abs=5 / np.sqrt(400 * 300))
+
+
+def test_autoregressions_that_are_refused(refused):
+    with refused("stationary"):
+        GaussianAutoregression([1.2], 0.1, 50)
+    with refused("stationary"):
+        GaussianAutoregression([0.5, 0.5], 0.1, 50)  # a root on the unit circle
+    with refused("max_order=40", "30 samples"):
+        GaussianAutoregression.fit(np.ones((5, 30)))
+
+
+@pytest.mark.parametrize(("samples", "block"), [(100, 10), (103, 25), (40, 40), (30, 1)])
+def test_every_block_is_found_in_the_source(samples, block):
+    source = np.arange(20 * samples, dtype=np.float32).reshape(20, samples)  # a value says its window and its place
+    noise = BlockBootstrap.fit(source, block).generate(50, seed=1)
+    assert noise.shape == (50, samples) and noise.dtype == np.float32
+    for row in noise.astype(int):
+        follows = (np.diff(row) == 1) & (row[1:] // samples == row[:-1] // samples)
+        seams = np.flatnonzero(~follows) + 1
+        assert all(place % block == seams[0] % block for place in seams)
+    if block == 10:
+        firsts = [np.flatnonzero(np.diff(row) != 1)[0] + 1 for row in noise]
+        assert len(set(firsts)) == 10  # seams fall anywhere
+
+
+def test_bootstrap_keeps_the_marginal():
+    source = np.random.default_rng(0).standard_t(3, (300, 200))
+    noise = BlockBootstrap.fit(source).generate(2_000, seed=2)
+    assert np.isin(noise, source.astype(np.float32)).all()
+    shares = [0.25, 0.5, 0.75, 0.95]
+    expected = np.quantile(source[:, 50:-50], shares)  # where each sample is in as many blocks as any other
+    assert np.quantile(noise, shares) == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize("block", [0, 101])
+def test_blocks_that_are_refused(refused, block):
+    with refused(f"block={block}"):
+        BlockBootstrap.fit(np.ones((3, 100)), block)
+
+
+@pytest.mark.parametrize("fit", [GaussianNoise.fit, GaussianAutoregression.fit, BlockBootstrap.fit])
+def test_surrogates_own_their_draws(fit):
+    surrogate = fit(np.random.default_rng(0).normal(0, 1, (40, 60)))
+    first = surrogate.generate(3, seed=5)
+    assert (first == surrogate.generate(3, seed=5)).all() and (first != surrogate.generate(3, seed=6)).any()
+    rng = np.random.default_rng(5)
+    assert (first == surrogate.generate(3, rng)).all() and (first != surrogate.generate(3, rng)).any()

@@ -1,0 +1,54 @@
+"""What may be imported for nothing: the public names, and every module that holds no network.
+
+Which package may import which is declared in `pyproject.toml` and checked by `lint-imports`.
+"""
+
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "enhsim_tf"
+WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_adam keras_tools.blockwise_training keras_tools.convolution_maximum
+    enhancer.network noise.generator noise.discriminator noise.gan noise.latent noise.convolutional_gan
+    enhanced_simulator.simulator enhanced_simulator.fitting""".split()
+NOT_TRIED = ("reproduce", "__main__")  # the reproduction's own modules may be slow to import; its settings may not
+
+
+def modules_without_networks():
+    paths = (path.relative_to(PACKAGE).with_suffix("") for path in sorted(PACKAGE.rglob("*.py")))
+    names = [".".join(path.parts).removesuffix(".__init__") for path in paths]
+    found = [name for name in names if name.split(".")[0] not in NOT_TRIED and name not in (*WITH_NETWORKS, "__init__")]
+    return [*found, "reproduce.settings"]
+
+
+def test_modules_without_networks_import_no_tensorflow():
+    modules = [f"enhsim_tf.{name}" for name in modules_without_networks()]
+    assert len(modules) > 60
+    script = (
+        f"import sys\nfor module in {modules}:\n    __import__(module)\n    assert not {{'tensorflow', 'keras'}} & set(sys.modules), module"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_public_names_lead_where_they_say():
+    import enhsim_tf
+
+    assert {"EnhancedSimulator", "NoiseGAN", "build_enhancer", "InputError"} <= set(enhsim_tf.__all__)
+    for name in enhsim_tf.__all__:
+        value = getattr(enhsim_tf, name)
+        assert value.__name__ == name and value is getattr(importlib.import_module(value.__module__), name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = enhsim_tf.nothing
+
+
+def test_the_papers_recipe_is_found_where_the_readme_says():
+    from enhsim_tf.enhanced_simulator import PAPER, EnhancedSimulator, simulator
+
+    assert PAPER is simulator.PAPER and EnhancedSimulator is simulator.EnhancedSimulator
+    with pytest.raises(ImportError):
+        from enhsim_tf.enhanced_simulator import nothing  # noqa: F401

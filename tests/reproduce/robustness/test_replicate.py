@@ -1,0 +1,112 @@
+"""A replicate gives each arm what its name says: clean windows of one pipeline, its noise, and the same windows for all."""
+
+import numpy as np
+import pytest
+
+from enhsim_tf.noise.gan import NoiseGAN
+from enhsim_tf.reproduce.robustness import replicate as replicates
+from enhsim_tf.reproduce.robustness.replicate import ARMS, MIXED, OURS, PAPER, SCALED, SCALES, SHARES, VARIATIONS, Replicate
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.reproduce.stages import Stages
+
+NOISES = ("GAN", "Gaussian", "AR", "bootstrap")
+
+
+class Constant:
+    """A noise that is one number, and remembers the seeds that it was asked with."""
+
+    def __init__(self, value):
+        self.value, self.seeds = value, []
+
+    def generate(self, number, seed):
+        self.seeds.append(seed)
+        return np.full((number, 10), self.value)
+
+
+class Pipeline:
+    """An enhancer that adds a number."""
+
+    def __init__(self, value):
+        self.value = value
+
+    def enhance(self, coarse):
+        return coarse + self.value
+
+
+class Windows:
+    """Data whose windows are numbered by the purpose that they were drawn for."""
+
+    def __init__(self):
+        self.purposes = []
+
+    def windows(self, part, number, purpose=""):
+        self.purposes.append((part, purpose))
+        coarse = np.full((number, 10), float(len(self.purposes)))
+        return {"coarse": coarse, "truth": coarse + 0.25, "target": coarse + 0.5}
+
+    def draw(self, purpose):
+        return np.random.default_rng(len(purpose))
+
+
+@pytest.fixture
+def replicate(tmp_path):
+    made = Replicate(make_settings("smoke"), Stages(tmp_path))
+    made.experiment = type("Experiment", (), {"data": Windows(), "simulator": Pipeline(1_000.0)})()
+    made.__dict__["second_simulator"] = Pipeline(2_000.0)
+    made.__dict__["surrogates"] = {
+        pipeline: {noise: Constant(first + number) for number, noise in enumerate(NOISES)}
+        for pipeline, first in ((PAPER, 10.0), (OURS, 20.0))
+    }
+    return made
+
+
+def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise(replicate):
+    arms = replicate.arms("arms, training")
+    assert list(arms) == list(ARMS)
+    coarse = arms["coarse"]
+    assert (arms["truth"] - coarse == 0.25).all()
+    for name, value, first in (("enhanced", 1_000.0, 10.0), ("ours", 2_000.0, 20.0)):
+        assert (arms[name] - coarse == value).all()
+        for number, noise in enumerate(NOISES):
+            assert (arms[f"{name} + {noise}"] - arms[name] == first + number).all()
+    assert {len(windows) for windows in arms.values()} == {make_settings("smoke").robustness.num_windows}
+
+
+def test_what_is_learnt_and_what_sets_the_threshold_are_drawn_apart(replicate):
+    replicate.arms("arms, training"), replicate.arms("arms, threshold")
+    purposes = replicate.experiment.data.purposes
+    assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == ["train", "train", "train", "calibration"]
+    for noises in replicate.surrogates.values():
+        for noise in noises.values():
+            assert len(noise.seeds) == 2 and noise.seeds[0] != noise.seeds[1]
+
+
+def test_only_the_noise_is_scaled():
+    arms = {"ours": np.array([1.0, 2.0]), "ours + GAN": np.array([1.5, 1.0]), "real": np.array([7.0, 8.0])}
+    assert replicates._scaled(arms, "ours + GAN", 2.0).tolist() == [2.0, 0.0]
+    for arm in ("ours", "real"):
+        assert replicates._scaled(arms, arm, 2.0).tolist() == arms[arm].tolist()
+
+
+def test_each_variation_is_made_once():
+    assert len(set(VARIATIONS)) == len(VARIATIONS) == len(SCALED) * len(SCALES) + len(MIXED) * (2 * len(SHARES) - 1) - 2 + 1
+    assert {scale for arm, scale, share, _ in VARIATIONS if arm in SCALED and not share} >= {0.5, 1.0, 2.0}
+    assert set(SCALED) & set(MIXED) == {"enhanced + GAN", "ours + GAN"}  # whose scale 1 and share 0 are one
+
+
+@pytest.mark.usefixtures("narrow_enhancer")
+def test_surrogates_are_fitted_to_the_very_windows_that_the_networks_learn(tmp_path, monkeypatch):
+    learnt, fit = [], NoiseGAN.fit
+
+    def spied(self, windows, *args, **kwargs):
+        learnt.append(np.array(windows))
+        return fit(self, windows, *args, **kwargs)
+
+    monkeypatch.setattr(NoiseGAN, "fit", spied)
+    real = Replicate(make_settings("smoke"), Stages(tmp_path))
+    assert real.experiment.noise_folder.is_dir() and real.second_simulator.window == 500
+    paper, ours = learnt
+    assert np.array_equal(real.extracted[PAPER], paper) and np.array_equal(real.extracted[OURS], ours)
+    assert len(ours) == real.settings.second.num_windows
+    for pipeline, noise in real.disjoint_extracted.items():  # in other windows, the same noise
+        assert np.std(noise) == pytest.approx(np.std(learnt[(PAPER, OURS).index(pipeline)]), rel=0.1)

@@ -1,0 +1,167 @@
+"""The study of labelled telemetry, run as a user does on a small data set whose channels are known."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.reproduce.__main__ import main
+from enhsim_tf.reproduce.publish.report import findings_of
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.reproduce.spacecraft.figures import FIGURES
+from enhsim_tf.reproduce.spacecraft.findings import KEPT, summarise
+from enhsim_tf.reproduce.spacecraft.run import table
+from enhsim_tf.reproduce.spacecraft.study import ARMS, DEGRADED_ARM, GENERATED_ARM, ChannelStudy
+from enhsim_tf.reproduce.stages import Stages
+from enhsim_tf.telemetry.telemanom import load_channel
+
+ROOT = Path(__file__).parents[3]
+SEQUENCES = {"W-1": [[900, 1099]], "W-2": [[400, 459], [1200, 1259]]}
+
+
+def wave(number, seed):
+    rng, at = np.random.default_rng(seed), np.arange(number)
+    return np.sin(2 * np.pi * at / 50) + 0.3 * np.sin(6 * np.pi * at / 50) + 0.05 * rng.standard_normal(number)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """Two waves, with what stands still or leaps at the labelled samples, and a constant channel that cannot be used."""
+    folder = tmp_path_factory.mktemp("labelled")
+    for part in ("train", "test"):
+        (folder / part).mkdir()
+    for seed, name in enumerate(SEQUENCES):
+        test = wave(1_800, 10 + seed)
+        for first, last in SEQUENCES[name]:
+            test[first : last + 1] = 4.0
+        np.save(folder / "train" / f"{name}.npy", np.stack([wave(1_500, seed), np.zeros(1_500)], axis=1))
+        np.save(folder / "test" / f"{name}.npy", np.stack([test, np.zeros(1_800)], axis=1))
+    for part in ("train", "test"):
+        np.save(folder / part / "flat.npy", np.ones((1_500, 2)))
+    rows = [f'{name},SMAP,"{sequences}","{["point"] * len(sequences)}",1800' for name, sequences in SEQUENCES.items()]
+    rows.append('flat,SMAP,"[[10, 20]]","[point]",1500')
+    (folder / "labeled_anomalies.csv").write_text("chan_id,spacecraft,anomaly_sequences,class,num_values\n" + "\n".join(rows) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("stages")
+
+
+@pytest.fixture(scope="module")
+def out(data, cache, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("out")
+    command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(folder), "--cache", str(cache)]
+    assert main(command) == 0
+    return folder / "labelled"
+
+
+@pytest.fixture(scope="module")
+def found(out):
+    return json.loads((out / "findings.json").read_text())
+
+
+def test_every_table_has_every_row(out):
+    tables = KEPT.read(out)
+    arms = tables["alarms"].groupby("channel")["arm"].unique()
+    assert all(set(each) == {*ARMS, DEGRADED_ARM} for each in arms)
+    assert set(tables["alarms"]["channel"]) == set(SEQUENCES)
+    counts = tables["sequences"].query("arm == 'real' and detector == 'PCA residual'").groupby("channel").size()
+    assert counts.to_dict() == {name: len(sequences) for name, sequences in SEQUENCES.items()}
+    assert set(tables["enhancement"]["method"]) == {"coarse", "ridge", "ridge, same clock", "enhanced"}
+
+
+def test_no_window_with_a_labelled_sample_counts_as_nominal(out, data):
+    tables = KEPT.read(out)
+    for name, sequences in SEQUENCES.items():
+        about = tables["enhancement"][tables["enhancement"]["channel"] == name].iloc[0]
+        window, stride = int(about["window"]), int(about["window"]) // 8
+        begins = range(0, 1_800 - window + 1, stride)
+        nominal = [begin for begin in begins if all(begin > last or begin + window <= first for first, last in sequences)]
+        alarms = tables["alarms"][tables["alarms"]["channel"] == name]
+        counted = alarms.query("arm == 'real' and detector == 'limit check'")["windows"].sum()
+        assert counted == len(nominal) > 10
+
+
+def test_a_value_far_outside_is_found_by_the_limit_check_at_its_first_window(out):
+    rows = KEPT.read(out)["sequences"].query("arm == 'real' and detector == 'limit check'")
+    assert rows["found"].all()
+    assert (rows["delay"] <= 100 // 8 + 1).all(), "a window is scored every eighth of its length"
+
+
+def test_a_perfect_score_is_perfect_and_a_random_one_alarms_at_its_rate(out, found):
+    assert found["controls"]["oracle"]["auc_pr"] == pytest.approx(1.0) and found["controls"]["oracle"]["vus_pr"] == pytest.approx(1.0)
+    rows = KEPT.read(out)["alarms"].query("detector == 'random score'")
+    # set for 1 % on 200 windows: of some 240 windows more than 14 would be less likely than one in ten thousand
+    assert rows["windows"].sum() > 200 and rows["alarms"].sum() <= 14
+
+
+def test_a_channel_that_cannot_be_used_is_left_out_and_said_so(found):
+    assert list(found["skipped"]) == ["flat"] and "periodic" in found["skipped"]["flat"]
+
+
+def test_findings_are_those_of_the_tables(out, found):
+    again = json.loads(json.dumps(summarise(KEPT.read(out))))
+    assert again == {key: found[key] for key in again}
+    rates = KEPT.read(out)["alarms"].query("channel == 'W-1' and arm == @GENERATED_ARM and detector == 'limit check'")
+    expected = rates["alarms"].sum() / rates["windows"].sum()
+    assert found["channels"]["W-1"]["false_alarms"][GENERATED_ARM]["limit check"] == pytest.approx(expected)
+
+
+def test_the_projects_report_and_readme_are_those_of_its_tables(near):
+    kept = findings_of(ROOT, "labelled")
+    again = json.loads(json.dumps(summarise(KEPT.read(ROOT / "figures" / "labelled"))))
+    assert again == near({key: kept[key] for key in again}) and kept["budget"] == "full"
+    assert table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_figures_are_there(out):
+    assert all((out / f"{name}.{suffix}").is_file() for name in FIGURES for suffix in ("png", "svg"))
+
+
+def test_real_windows_that_train_and_that_set_thresholds_share_no_sample(data, cache):
+    study = ChannelStudy(load_channel(data, "W-1"), make_settings("smoke"), Stages(cache, tell=lambda line: None))
+    training, held_out = study._real(10_000, True), study._real(10_000, False)
+    values = study.channel.train.values
+    assert np.isin(training, values[:1_000]).all() and not np.isin(held_out, values[:1_000]).any()
+
+
+def test_the_second_run_takes_every_channel_from_the_cache(data, cache, out, tmp_path, capsys):
+    command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(tmp_path), "--cache", str(cache)]
+    assert main([*command, "--channels", "W-2"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if line.endswith("...")] == [] and sum("(from the cache)" in line for line in lines) == 2
+    kept = KEPT.read(out)["ranking"].query("channel == 'W-2'").reset_index(drop=True)
+    pd.testing.assert_frame_equal(KEPT.read(tmp_path / "labelled")["ranking"], kept)
+
+
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        (["--experiment", "labelled"], "--data"),
+        (["--data", "x"], "--experiment labelled"),
+        (["--channels", "A"], "--channels"),
+        (["--experiment", "labelled", "--data", "nowhere"], "nowhere"),
+        (["--experiment", "labelled", "--seeds", "3", "--data", "nowhere"], "--seeds"),
+    ],
+)
+def test_wrong_options_are_refused_in_one_line(given, word, tmp_path, capsys):
+    assert main([*given, "--out", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: Expected") and word in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_channel_is_refused(data, cache, tmp_path, capsys):
+    command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(tmp_path), "--cache", str(cache)]
+    assert main([*command, "--channels", "W-1,W-9"]) == 2
+    assert "'W-9'" in capsys.readouterr().err
+
+
+def test_missing_tables_are_refused(tmp_path):
+    with pytest.raises(InputError, match="enhancement.parquet"):
+        KEPT.read(tmp_path)

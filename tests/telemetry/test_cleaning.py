@@ -1,0 +1,604 @@
+"""Dirty telemetry: a known regular series is damaged in a known way, and comes back up to the stated repair, or one line."""
+
+import datetime
+import decimal
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.report import KINDS, Finding, finding_of
+
+ROOT = Path(__file__).parents[2]
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+settings.load_profile("repeatable")
+
+N = 400
+START = pd.Timestamp("2020-03-01T00:00:00Z")
+TIMES = pd.date_range(START, periods=N, freq="s")
+VALUES = np.sin(np.arange(N) / 7.3) + 0.01 * np.random.default_rng(0).standard_normal(N)
+CLEAN = pd.Series(VALUES, index=TIMES, name="volts")
+IS_REGULAR = {"interval_s": 1.0, "start": "2020-03-01T00:00:00+00:00"}
+
+
+def check_balance(cleaned):
+    """Nothing is lost without a line, the parts are regular, finite and in the order of time."""
+    report = cleaned.report
+    assert report.rows_in == report.rows_used + report.rows_left_out
+    assert report.samples == report.rows_used + report.samples_filled == sum(map(len, cleaned.parts))
+    assert report.num_parts == len(cleaned.parts) > 0
+    assert {finding.kind for finding in report.findings} <= set(KINDS)
+    assert all(finding.count > 0 and len(finding.line().splitlines()) == 1 for finding in report.findings)
+    assert all(finding.action == "left out" or "stretches" in finding.kind for finding in report.findings if finding.rows_left_out)
+    assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["rows_in"] == report.rows_in
+    assert [finding_of(content) for content in report.to_dict()["findings"]] == list(report.findings)
+    ends = -np.inf
+    for part in cleaned.parts:
+        assert part.values.dtype == np.float32 and np.isfinite(part.values).all()
+        assert (part.interval_s, part.start) == (cleaned.parts[0].interval_s, cleaned.parts[0].start)
+        assert part.offset_s > ends
+        ends = part.time_s[-1]
+
+
+def cleaned_of(series, **options):
+    cleaned = clean(series, Cleaning(**options))
+    check_balance(cleaned)
+    return cleaned
+
+
+def as_one(cleaned, values=VALUES, off=1e-6, begin_off=0.0):
+    """The one part, which must be `values` from the clean start on."""
+    (part,) = cleaned.parts
+    assert part.interval_s == pytest.approx(1.0, abs=1e-9)
+    assert abs((pd.Timestamp(part.start) - START).total_seconds()) <= begin_off
+    np.testing.assert_allclose(part.values, values, atol=off)
+    return part
+
+
+def with_values(change):
+    values = pd.Series(VALUES.copy(), index=TIMES, name="volts")
+    changed = change(values)
+    return values if changed is None else changed
+
+
+def set_rows(rows, bad, kind=object):
+    def change(values):
+        values = values.astype(kind)
+        values.iloc[rows] = bad
+        return values
+
+    return with_values(change)
+
+
+def with_times(times, values=VALUES):
+    return pd.Series(values, index=times, name="volts")
+
+
+def linear(rows, values=VALUES):
+    """The values with some rows replaced by straight lines between what is left."""
+    kept = np.delete(np.arange(len(values)), rows)
+    return np.interp(np.arange(len(values)), kept, np.asarray(values)[kept])
+
+
+RNG = np.random.default_rng(1)
+JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")  # most are where they belong
+SHUFFLED = RNG.permutation(N)
+NANOSECONDS = TIMES.as_unit("ns").asi8
+WORDS = [f"{value:.9f}" for value in VALUES]
+
+# name: series, options, {kind of finding: count}, expected values where they are not the clean ones
+REPAIRED = {
+    "as it should be": (CLEAN, {}, {}),
+    "float32 already": (CLEAN.astype(np.float32), {}, {}),
+    "a pandas extension type": (CLEAN.astype("Float64"), {}, {}),
+    "times without a zone": (CLEAN.tz_localize(None), {}, {"time zone": N}),
+    "times of another zone": (CLEAN.tz_convert("America/New_York"), {}, {"time zone": N}),
+    "local times with a zone": (CLEAN.tz_convert("Asia/Kolkata").tz_localize(None), {"timezone": "Asia/Kolkata"}, {"time zone": N}),
+    "shuffled": (CLEAN.iloc[SHUFFLED], {}, {"unsorted": np.sum(SHUFFLED < np.maximum.accumulate(SHUFFLED))}),
+    "two rows exchanged": (CLEAN.iloc[[0, 2, 1, *range(3, N)]], {}, {"unsorted": 1}),
+    "from the last to the first": (CLEAN.iloc[::-1], {}, {"descending": N}),
+    "rows twice": (pd.concat([CLEAN, CLEAN.iloc[3:8]]).sort_index(), {}, {"duplicate rows": 5}),
+    "everything three times": (pd.concat([CLEAN] * 3), {}, {"duplicate rows": 2 * N, "unsorted": 2 * (N - 1)}),
+    "the last file once more at the end": (pd.concat([CLEAN, CLEAN.iloc[-9:]]), {}, {"duplicate rows": 9, "unsorted": 8}),
+    "jitter": (with_times(TIMES + JITTER), {}, {"jitter": np.sum(np.abs(JITTER.total_seconds()) > 1e-3)}),
+    "times cut to seconds": (with_times((TIMES + pd.to_timedelta("400ms")).floor("s")), {}, {}),
+    "ISO text": (with_times(TIMES.astype(str)), {}, {}),
+    "ISO text, basic form": (with_times(TIMES.strftime("%Y%m%dT%H%M%SZ")), {}, {}),
+    "ISO text with zones": (with_times(TIMES.tz_convert("Europe/Rome").strftime("%Y-%m-%d %H:%M:%S%z")), {}, {}),
+    "ISO text, some with a zone": (
+        with_times([str(time) if row % 2 else str(time.tz_localize(None)) for row, time in enumerate(TIMES)]),
+        {},
+        {"time zone": N // 2},
+    ),
+    "date-times as objects": (with_times(pd.Index([time.to_pydatetime() for time in TIMES], dtype=object)), {}, {}),
+    "dates of a given format": (with_times(TIMES.strftime("%d.%m.%y %H:%M:%S")), {"time_format": "%d.%m.%y %H:%M:%S"}, {"time zone": N}),
+    "epoch seconds": (with_times(NANOSECONDS // 10**9), {}, {"time unit": N}),
+    "epoch seconds as floats": (with_times(NANOSECONDS / 1e9), {}, {"time unit": N}),
+    "epoch milliseconds": (with_times(NANOSECONDS // 10**6), {}, {"time unit": N}),
+    "epoch microseconds": (with_times(NANOSECONDS // 1_000), {}, {"time unit": N}),
+    "epoch nanoseconds": (with_times(NANOSECONDS), {}, {"time unit": N}),
+    "epoch nanoseconds as text": (with_times(NANOSECONDS.astype(str)), {}, {"time unit": N}),
+    "days since 1970": (with_times(NANOSECONDS / 86_400e9), {"time_unit": "D"}, {"time unit": N}),
+    "periods": (with_times(pd.period_range("2020-03-01", periods=N, freq="s")), {}, {"time zone": N}),
+    "time spans since 1970": (with_times(TIMES - pd.Timestamp(0, tz="UTC")), {}, {"time unit": N}),
+    "categories": (with_times(pd.CategoricalIndex(TIMES.astype(str)), pd.Categorical(WORDS)), {}, {}),
+    "rows without a time": (
+        with_times(
+            pd.DatetimeIndex(np.insert(TIMES.tz_localize(None).to_numpy(), [5, 5, 9], np.datetime64("NaT"))),
+            np.insert(VALUES, [5, 5, 9], 7),
+        ),
+        {},
+        {"missing times": 3, "time zone": N},
+    ),
+    "words among the times, dropped": (
+        with_times(np.insert(TIMES.astype(str).to_numpy(object), 30, "reboot"), np.insert(VALUES, 30, 7)),
+        {"on_bad_times": "drop"},
+        {"bad times": 1},
+    ),
+    "times that nobody lives to see, dropped": (
+        with_times(np.insert(NANOSECONDS / 1e9, 30, 1e18), np.insert(VALUES, 30, 7)),
+        {"on_bad_times": "drop"},
+        {"bad times": 1, "time unit": N},
+    ),
+    "NaN": (set_rows([7, 8, 50], np.nan, float), {}, {"missing values": 3, "gaps filled": 2}, linear([7, 8, 50])),
+    "None": (set_rows([7, 8, 50], None), {}, {"missing values": 3, "gaps filled": 2}, linear([7, 8, 50])),
+    "pandas' NA": (set_rows([7], pd.NA, "Float64"), {}, {"missing values": 1, "gaps filled": 1}, linear([7])),
+    "infinite": (set_rows([7, 50], [np.inf, -np.inf], float), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
+    "empty text": (set_rows([7, 50], ["", " "]), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
+    "words for nothing": (
+        set_rows([7, 50, 90], ["nan", "N/A", "NULL"]),
+        {},
+        {"missing values": 3, "gaps filled": 3},
+        linear([7, 50, 90]),
+    ),
+    "rows missing": (CLEAN.drop(TIMES[[7, 8, 50]]), {}, {"gaps filled": 2}, linear([7, 8, 50])),
+    "every third row missing": (
+        CLEAN.drop(TIMES[1:-1:3]),
+        {},
+        {"gaps filled": len(TIMES[1:-1:3])},
+        linear(np.arange(1, N - 1, 3)),
+    ),
+    "numbers as text": (with_values(lambda values: pd.Series(WORDS, index=TIMES)), {}, {}),
+    "numbers as text with spaces": (with_values(lambda values: pd.Series([f" {word}\t" for word in WORDS], index=TIMES)), {}, {}),
+    "decimal commas": (
+        with_values(lambda values: pd.Series([word.replace(".", ",") for word in WORDS], index=TIMES)),
+        {},
+        {"decimal comma": N},
+    ),
+    "decimals as objects": (with_values(lambda values: pd.Series([decimal.Decimal(word) for word in WORDS], index=TIMES)), {}, {}),
+    "a unit behind one number, dropped": (
+        set_rows([7], "1.5 V"),
+        {"on_bad_values": "drop"},
+        {"bad values": 1, "gaps filled": 1},
+        linear([7]),
+    ),
+    "a dash, dropped": (set_rows([7], "-"), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
+    "beyond float32, dropped": (
+        set_rows([7], 1e39, float),
+        {"on_bad_values": "drop"},
+        {"bad values": 1, "gaps filled": 1},
+        linear([7]),
+    ),
+    "beyond float64, dropped": (set_rows([7], 10**400), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
+    "true among numbers, dropped": (
+        set_rows([7], True),
+        {"on_bad_values": "drop"},
+        {"bad values": 1, "gaps filled": 1},
+        linear([7]),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REPAIRED)
+def test_a_known_damage_is_repaired_and_reported(name):
+    series, options, kinds, *expected = REPAIRED[name]
+    before = series.copy(deep=True)
+    cleaned = cleaned_of(series, **options)
+    as_one(cleaned, *expected, off=1e-6, begin_off=0)
+    found = {finding.kind: finding.count for finding in cleaned.report.findings}
+    assert found == {kind: int(count) for kind, count in kinds.items()}
+    pd.testing.assert_series_equal(series, before)
+
+
+BAD_VALUES = {
+    "a unit behind one number": (set_rows([7], "1.5 V"), "'1.5 V' at row 7"),
+    "a dash": (set_rows([7], "-"), "'-' at row 7"),
+    "commas and points": (set_rows([7, 8], ["1,5", "1.5"]), "'1,5' at row 7"),
+    "thousands or thousandths": (with_times(TIMES, ["1,500", "2,250"] * (N // 2)), "'1,500' at row 0"),
+    "an underscore": (set_rows([7], "1_000"), "'1_000' at row 7"),
+    "beyond float32": (set_rows([7], 1e39, float), "1e+39 at row 7"),
+    "an integer beyond float64": (set_rows([7], 10**400), "at row 7"),
+    "a longer float beyond float64": (with_times(TIMES, np.full(N, np.longdouble(10) ** 400)), "at row 0"),
+    "text beyond float64": (set_rows([7], "1e999"), "'1e999' at row 7"),
+    "true among numbers": (set_rows([7], True), "True at row 7"),
+    "complex among numbers": (set_rows([7], 1j), "1j at row 7"),
+    "a list among numbers": (with_times(TIMES, pd.Series([[1.0]] * N).array), "[1.0] at row 0"),
+    "words": (with_times(TIMES, ["high", "low"] * (N // 2)), "'high' at row 0"),
+    "bytes": (with_times(TIMES, pd.array([b"1.5"] * N, dtype=object)), "at row 0"),
+    "true and false": (CLEAN > 0, "dtype bool"),
+    "complex": (with_times(TIMES, VALUES + 1j), "dtype complex128"),
+    "dates as values": (with_times(TIMES, TIMES), "datetime64"),
+    "all NaN": (CLEAN * np.nan, "only missing"),
+    "all None": (with_times(TIMES, [None] * N), "only missing"),
+    "nothing": (CLEAN.iloc[:0], "none from volts"),
+    "one row": (CLEAN.iloc[:1], "1 usable row"),
+    "one time only": (with_times([START] * N, 7.0), "1 usable row"),
+    "a table": (CLEAN.to_frame(), "shape (400, 1)"),
+    "no axis": (np.array(3.0), "shape ()"),
+    "three axes": (np.zeros((3, 4, 5)), "shape (3, 4, 5)"),
+    "two axes": (np.zeros((3, 4)), "shape (3, 4)"),
+    "an empty array": (np.zeros(0), "none from telemetry"),
+    "a structured array": (np.zeros(3, [("a", float)]), "telemetry"),
+    "None": (None, "shape ()"),
+    "one index of two levels": (with_times(pd.MultiIndex.from_product([["a"], TIMES])), "2 levels"),
+}
+BAD_TIMES = {
+    "words": (with_times(["noon"] * N), "'noon' at row 0"),
+    "one word": (with_times([*TIMES.astype(str)[:-1], "soon"]), "'soon' at row 399"),
+    "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "time_format"),
+    "times of day": (with_times(TIMES.strftime("%H:%M:%S")), "'00:00:00' at row 0"),
+    "dates as numbers": (with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)), "time_format='%Y%m%d'"),
+    "dates as number text": (with_times(TIMES.strftime("%Y%m%d%H%M%S")), "time_format='%Y%m%d%H%M%S'"),
+    "numbers of no unit": (with_times(np.arange(N) + 10**10), "time_unit"),
+    "numbers, text and dates": (with_times(pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)), "1 at row 0"),
+    "intervals": (with_times(pd.interval_range(0, N)), "interval"),
+    "date-times in the year 9000": (with_times(pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]"))), "1678 to 2261"),
+    "infinite": (with_times(np.where(np.arange(N) == 9, np.inf, np.arange(N))), "inf at row 9"),
+    "far away": (with_times(np.where(np.arange(N) == 9, 1e18, np.arange(N))), "1e+18 at row 9"),
+    "true and false": (with_times(np.arange(N) % 2 == 0), "dtype bool"),
+    "complex": (with_times(np.arange(N) + 1j), "complex"),
+    "objects": (with_times(pd.Index([datetime.timedelta] * N, dtype=object)), "at row 0"),
+    "none at all": (with_times(pd.DatetimeIndex([pd.NaT] * N)), "Received: none"),
+    "at random": (with_times(TIMES[0] + pd.to_timedelta(np.cumsum(RNG.exponential(size=N)), unit="s")), "interval_s"),
+    "a local clock set back": (
+        with_times(pd.date_range("2020-10-25T00:30Z", periods=N, freq="min").tz_convert("Europe/Berlin").tz_localize(None)),
+        "timezone (such as 'Europe/Berlin'",
+    ),
+}
+REFUSED = BAD_VALUES | {f"times: {name}": case for name, case in BAD_TIMES.items()}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_understood_is_refused_by_its_place(refused, name):
+    series, words = REFUSED[name]
+    with refused(words):
+        clean(series)
+
+
+def test_enough_kinds_of_dirt_are_tried():
+    assert len(REPAIRED) + len(REFUSED) > 80
+
+
+BAD_OPTIONS = [
+    {"same_time": "median"},
+    {"on_bad_values": "ignore"},
+    {"on_bad_times": "ignore"},
+    {"other_rates": "keep"},
+    {"interval_s": 0.0},
+    {"interval_s": float("nan")},
+    {"max_jitter": 0.6},
+    {"max_fill": -1},
+    {"min_part": 0},
+    {"time_unit": "weeks"},
+    {"decimal": ";"},
+]
+
+
+@pytest.mark.parametrize("options", BAD_OPTIONS, ids=str)
+def test_options_out_of_range_are_refused(refused, options):
+    with refused(*(f"{name}={value!r}" for name, value in options.items())):
+        Cleaning(**options)
+
+
+def test_a_zone_that_nobody_knows_and_an_interval_without_times_are_refused(refused):
+    with refused("'Mars/Gale'"):
+        clean(CLEAN.tz_localize(None), Cleaning(timezone="Mars/Gale"))
+    with refused("interval_s=2"):
+        clean(VALUES, Cleaning(interval_s=2))
+
+
+@pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("first", 4.0), ("last", 6.0)])
+def test_one_of_different_values_of_one_time_is_taken(refused, how, value):
+    values, times = np.insert(VALUES, 11, [4.0, 6.0]), np.insert(np.arange(N), 11, [11, 11])
+    values = np.delete(values, 13)  # row 11 itself: only the two others are left
+    series = pd.Series(values, index=TIMES[np.delete(times, 13)], name="volts")
+    cleaned = cleaned_of(series, same_time=how)
+    as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
+    (finding,) = cleaned.report.findings
+    assert (finding.kind, finding.count, finding.rows_left_out) == ("same time", 1, 1) and "2020-03-01T00:00:11" in finding.places[0]
+    with refused("2020-03-01T00:00:11"):
+        clean(series, Cleaning(same_time="refuse"))
+
+
+def test_a_value_is_taken_before_none_and_the_mean_is_of_values_only():
+    series = pd.concat([CLEAN.iloc[:6], pd.Series([np.nan, 9.0], index=TIMES[[5, 6]]), CLEAN.iloc[7:]])
+    for how in ("mean", "first", "last"):
+        cleaned = cleaned_of(series, same_time=how)
+        as_one(cleaned, np.where(np.arange(N) == 6, 9.0, VALUES))
+        assert cleaned.report.find("same time").count == 1 and cleaned.report.find("missing values") is None
+
+
+def test_a_leap_second_is_the_second_after_it():
+    times = ["2016-12-31T23:59:58Z", "2016-12-31T23:59:59Z", "2016-12-31T23:59:60Z", "2017-01-01T00:00:00Z", "2017-01-01T00:00:01Z"]
+    cleaned = cleaned_of(with_times(times, [1.0, 2.0, 3.0, 5.0, 6.0]))
+    assert cleaned.parts[0].values.tolist() == [1, 2, 4, 6]
+    assert [finding.kind for finding in cleaned.report.findings] == ["leap seconds", "same time"]
+
+
+@pytest.mark.parametrize("length", [5, 6])
+def test_gaps_are_filled_up_to_the_longest_and_part_the_series_beyond(length):
+    missing = np.arange(100, 100 + length)
+    for series in (CLEAN.drop(TIMES[missing]), set_rows(missing, np.nan, float), set_rows(missing, np.inf, float)):
+        cleaned = cleaned_of(series)
+        if length == 5:
+            as_one(cleaned, linear(missing))
+            assert cleaned.report.find("gaps filled").samples_filled == 5
+        else:
+            before, after = cleaned.parts
+            np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
+            np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
+            assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
+            found = cleaned.report.find("gaps")
+            assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
+    assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=6).parts) == 1
+    assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
+
+
+def test_parts_too_short_are_left_out_and_counted(refused):
+    series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])  # five samples stand alone
+    assert [len(part) for part in cleaned_of(series).parts] == [100, 5, 270]
+    cleaned = cleaned_of(series, min_part=6)
+    assert [len(part) for part in cleaned.parts] == [100, 270]
+    assert cleaned.report.find("short parts").rows_left_out == 5
+    with refused("at least 300", "270 at most"):
+        clean(series, Cleaning(min_part=300))
+
+
+def test_a_jump_of_the_clock_parts_the_series_and_keeps_every_row():
+    times = TIMES + pd.to_timedelta(np.where(np.arange(N) < 150, 0, 0.4), unit="s")
+    cleaned = cleaned_of(with_times(times), max_jitter=0.1)
+    before, after = cleaned.parts
+    assert before.values.tolist() == VALUES[:150].astype(np.float32).tolist() and after.offset_s == pytest.approx(150.4)
+    assert after.values.tolist() == VALUES[150:].astype(np.float32).tolist()
+    assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
+
+
+def test_jitter_is_reported_by_its_largest():
+    off = np.zeros(N)
+    off[[20, 30]] = 0.12, -0.2
+    found = cleaned_of(with_times(TIMES + pd.to_timedelta(off, unit="s"))).report.find("jitter")
+    assert found.count == 2 and found.details["largest_s"] == pytest.approx(0.2, abs=1e-6) and found.places[0].startswith("row 30,")
+
+
+@pytest.mark.parametrize("interval", [1 / 3, 0.25, 60.0, 98.5, 1.0003, 1e-4, 3_600.0])
+@pytest.mark.parametrize("unit", ["ns", "us"])
+def test_the_interval_is_that_of_the_rows(interval, unit):
+    nanoseconds = np.round(np.arange(5_000) * interval * 1e9).astype(np.int64)
+    cleaned = cleaned_of(
+        with_times(pd.DatetimeIndex(nanoseconds.view("datetime64[ns]"), tz="UTC").as_unit(unit), np.sin(np.arange(5_000) / 9))
+    )
+    (part,) = cleaned.parts
+    assert len(part) == 5_000 and part.interval_s * 5_000 == pytest.approx(interval * 5_000, abs=0.1 * interval)
+
+
+def test_the_interval_survives_jitter_gaps_and_a_share_of_other_rates():
+    rng = np.random.default_rng(3)
+    times = np.sort(rng.choice(20_000, 9_000, replace=False)) + rng.uniform(-0.2, 0.2, 9_000)
+    cleaned = cleaned_of(with_times(times, np.sin(times)))
+    assert cleaned.report.interval_s == pytest.approx(1, abs=1e-5) and cleaned.report.rows_used > 8_990
+
+
+@pytest.mark.parametrize("where", [0, 150, 340])
+def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
+    """Each sample of the stretch is given as five rows around its time whose mean it is."""
+    offsets, differences = np.array([-0.4, -0.2, 0.0, 0.2, 0.4]), np.array([1.0, -2.0, 0.5, 2.0, -1.5])
+    inside = np.arange(where + 1, where + 51)
+    fine = pd.Series(
+        (VALUES[inside, None] + differences).ravel(),
+        index=START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s"),
+        name="volts",
+    )
+    series = pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index()
+    cleaned = cleaned_of(series, max_jitter=0.25)
+    part = as_one(cleaned, off=1e-5)
+    found = cleaned.report.find("finer stretches")
+    assert part.interval_s == 1 and found.count == 1 and found.rows_left_out == 50 * 4
+    left = cleaned_of(series, other_rates="leave out")
+    assert left.report.find("other rates").rows_left_out == 50 * 5 + (where == 0) and left.report.find("finer stretches") is None
+
+
+def test_a_finer_stretch_at_the_beginning_takes_the_grid_of_what_follows():
+    fine = pd.Series(1.5, index=START - pd.to_timedelta(np.arange(1, 33) * 0.3, unit="s"), name="volts").sort_index()  # from 9.6 s before
+    cleaned = cleaned_of(pd.concat([fine, CLEAN]), max_jitter=0.1)
+    (part,) = cleaned.parts
+    assert part.start == "2020-02-29T23:59:50+00:00" and len(part) == N + 10
+    np.testing.assert_allclose(part.values[11:], VALUES[1:], atol=1e-6)
+    assert set(part.values[:10]) == {np.float32(1.5)}
+
+
+def test_a_wandering_clock_parts_the_series_before_a_sample_is_moved_too_far():
+    wander = 2 * np.sin(np.arange(N) / 40)  # intervals: more than can be snapped
+    cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), np.arange(N)), max_jitter=0.2)
+    assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
+    begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
+    for part in cleaned.parts:
+        rows = part.values.astype(int)  # the values count the rows; one that was filled lies between two
+        real = part.values == rows
+        assert np.abs(begin + part.time_s - rows - wander[rows])[real].max() <= 0.2 + 1e-6
+
+
+def test_a_coarser_stretch_is_interpolated_or_left_out():
+    inside = np.delete(np.arange(120, 241), np.arange(0, 121, 4))  # a row every 4 s from 120 to 240
+    series = CLEAN.drop(TIMES[inside])
+    cleaned = cleaned_of(series)
+    as_one(cleaned, linear(inside))
+    assert cleaned.report.find("coarser stretches").samples_filled == len(inside)
+    left = cleaned_of(series, other_rates="leave out")
+    assert [len(part) for part in left.parts] == [121, 160] and left.report.find("other rates").rows_left_out == 29
+    wide = cleaned_of(series, max_fill=2)  # three missing samples between rows are more than may be filled
+    assert [len(part) for part in wide.parts] == [121, 160]
+
+
+def test_a_rate_of_no_whole_ratio_is_interpolated():
+    line = np.arange(900.0) / 7  # straight: interpolation is exact
+    times = np.concatenate([np.arange(300), 299 + 2.5 * np.arange(1, 81), 499 + np.arange(1, 401)])
+    cleaned = cleaned_of(with_times(times, np.interp(times, np.arange(900), line)))
+    (part,) = cleaned.parts
+    np.testing.assert_allclose(part.values, line, rtol=1e-6)
+    assert cleaned.report.find("coarser stretches").count == 1
+
+
+def test_a_given_interval_averages_what_shares_it():
+    cleaned = cleaned_of(CLEAN, interval_s=4)
+    (part,) = cleaned.parts
+    groups = np.round(np.arange(N) / 4).astype(int)  # the nearest place of the grid, halves to the even one
+    np.testing.assert_allclose(part.values, [VALUES[groups == group].mean() for group in range(groups[-1] + 1)], atol=1e-6)
+    assert (part.interval_s, cleaned.report.find("averaged").rows_left_out) == (4, N - len(part))
+    random = with_times(np.cumsum(np.random.default_rng(5).exponential(size=N)))
+    assert cleaned_of(random, interval_s=5).report.interval_s == 5
+
+
+def test_local_times_of_a_zone_pass_its_clock_changes():
+    times = pd.date_range("2020-10-24T22:00Z", periods=500, freq="min")
+    local = with_times(times.tz_convert("Europe/Berlin").tz_localize(None), np.sin(np.arange(500) / 9))
+    cleaned = cleaned_of(local, timezone="Europe/Berlin")
+    assert len(cleaned.parts) == 1 and len(cleaned.longest) == 500 and cleaned.longest.start == "2020-10-24T22:00:00+00:00"
+    cleaned = cleaned_of(local.sample(frac=1, random_state=0), timezone="Europe/Berlin")
+    found = cleaned.report.find("clock change")
+    assert found.rows_left_out == 120  # without their order, two hours cannot be told apart
+    merged = cleaned_of(local, timezone="UTC")
+    assert merged.report.find("same time").rows_left_out == 60
+    spring = with_times(pd.date_range("2020-03-29T00:00", periods=300, freq="min"), np.sin(np.arange(300) / 9))
+    assert cleaned_of(spring, timezone="Europe/Berlin").report.find("clock change").rows_left_out == 60
+
+
+def test_samples_are_counted_where_there_is_no_time():
+    values = VALUES.copy()
+    values[[7, *range(100, 120)]] = np.nan
+    for series in (values, values.tolist(), pd.Series(values), pd.Series(values.astype(object))):
+        cleaned = cleaned_of(series)
+        before, after = cleaned.parts
+        assert (before.has_time, before.interval_s, before.time_unit) == (False, 1.0, "samples")
+        assert (before.offset_s, after.offset_s, len(after)) == (0, 120, N - 120)
+        np.testing.assert_array_equal(after.values, values[120:].astype(np.float32))
+        assert cleaned.report.find("gaps").places == ("row 99",)
+    piece = cleaned_of(pd.Series(VALUES)[50:90])
+    assert piece.parts[0].offset_s == 50, "a piece of a series keeps its clock"
+    values[:3] = np.nan
+    assert cleaned_of(values).parts[0].offset_s == 3
+
+
+def test_what_a_channel_is_like_is_reported():
+    steps = np.round(VALUES * 16) / 16
+    found = cleaned_of(with_times(TIMES, steps)).report.find("quantised")
+    assert found.details == {"step": 0.0625, "is_even": True} and found.count == len(np.unique(steps))
+    assert cleaned_of(CLEAN).report.findings == ()
+    stuck = cleaned_of(set_rows(np.arange(200, 260), VALUES[200], float)).report.find("stuck")
+    assert (stuck.count, stuck.details["longest"]) == (1, 60) and stuck.places[0].startswith("row 200,")
+    plateaus = np.where(np.arange(N) // 25 % 2, 1.0, -1.0)
+    plateaus[200:300] = 0.5
+    assert cleaned_of(with_times(TIMES, plateaus)).report.find("stuck").count == 1, "plateaus are what this channel does"
+    constant = cleaned_of(with_times(TIMES, 3.5))
+    assert [finding.kind for finding in constant.report.findings] == ["constant"] and set(constant.parts[0].values) == {3.5}
+    drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find("changing level")
+    assert drifting.count == 10 and drifting.details["low"][-1] - drifting.details["low"][0] == pytest.approx(3.6, abs=1)
+    assert cleaned_of(with_times(TIMES, VALUES * np.linspace(1, 5, N))).report.find("changing level") is not None
+    counter = cleaned_of(with_times(TIMES, np.arange(N, dtype=np.uint64) + 2**63)).report.find("resolution")
+    assert counter.count == N, "float64 cannot tell them apart"
+    rounded = cleaned_of(with_times(TIMES, VALUES + 1e6)).report.find("resolution")
+    assert rounded.details["error"] == pytest.approx(0.03, abs=0.01)  # float32 keeps steps of 1/16 at a million
+
+
+def test_the_report_says_everything_in_plain_words():
+    series = pd.concat([CLEAN.drop(TIMES[[7]]), CLEAN.iloc[3:5]])
+    lines = cleaned_of(series).report.lines()
+    assert lines[0] == "volts: 401 rows, 399 used, 2 left out; 400 samples in 1 part, 1 of them filled in"
+    assert "left out: rows that repeat the time and value of another: 2 (first: row 399, 2020-03-01T00:00:03+00:00, " in lines[2]
+    assert lines[3].startswith("repaired: gaps of up to 5 samples, filled by straight lines with 1 samples in all: 1 (first: row 6, ")
+    assert Finding("gaps", 1, "a").action == "accepted"
+
+
+def test_every_kind_is_in_the_documents():
+    text = (ROOT / "docs" / "telemetry.md").read_text(encoding="utf-8")
+    for kind, (action, words) in KINDS.items():
+        assert f"| {kind} | {action} | {words} |" in text
+
+
+DIRTY_CELL = st.one_of(
+    st.floats(-5, 5), st.sampled_from([np.nan, np.inf, -np.inf, None, "", "nan", "1.5", "-", "1.5 V", "1,5", 1e39, True, 10**400, pd.NA])
+)
+DIRTY_STEP = st.one_of(st.just(1.0), st.floats(0, 3), st.sampled_from([0.0, -1.0, -7.5, 0.25, 2.0, 6.0, 40.0, 3_600.0, -3_600.0, None]))
+
+
+@given(
+    cells=st.lists(st.tuples(DIRTY_STEP, DIRTY_CELL), max_size=60),
+    nominal=st.integers(0, 60),
+    options=st.fixed_dictionaries(
+        {
+            "same_time": st.sampled_from(["mean", "first", "last"]),
+            "other_rates": st.sampled_from(["resample", "leave out"]),
+            "on_bad_values": st.sampled_from(["drop", "drop", "refuse"]),
+            "max_fill": st.integers(0, 8),
+            "min_part": st.integers(1, 12),
+            "max_jitter": st.sampled_from([0, 0.1, 0.25, 0.5]),
+            "interval_s": st.sampled_from([None, None, 0.7, 5]),
+        }
+    ),
+    form=st.sampled_from(["stamps", "seconds", "text", "none"]),
+)
+def test_no_row_is_lost_silently(cells, nominal, options, form):
+    steps = [1.0] * nominal + [step for step, _ in cells]
+    values = [float(row % 7) for row in range(nominal)] + [cell for _, cell in cells]
+    seconds = np.cumsum([step or 0.0 for step in steps]) + 1e6
+    times = pd.to_datetime(np.where([step is None for step in steps], np.nan, seconds), unit="s", utc=True)
+    if form == "text":
+        index = times.astype(str)
+    elif form == "seconds":
+        index = pd.Index(np.where([step is None for step in steps], np.nan, seconds))
+    else:
+        index = times if form == "stamps" else pd.RangeIndex(len(values))
+        options = options | ({"interval_s": None} if form == "none" else {})
+    series = pd.Series(pd.Series(values, dtype=object).array, index=index, name="x")
+    try:
+        cleaned = clean(series, Cleaning(**options))
+    except InputError as error:
+        assert str(error).startswith("Expected ") and "Received: " in str(error) and len(str(error).splitlines()) == 1
+    else:
+        check_balance(cleaned)
+        assert cleaned.report.rows_in == len(values)
+
+
+@given(
+    lost=st.lists(st.integers(0, 149), max_size=60),
+    blank=st.lists(st.integers(0, 149), max_size=20),
+    twice=st.lists(st.integers(0, 149), max_size=10),
+    jitter=st.sampled_from([0.0, 0.05, 0.2]),
+    seed=st.integers(0, 10**6),
+    max_fill=st.integers(0, 6),
+)
+def test_what_is_left_comes_back_in_its_place(lost, blank, twice, jitter, seed, max_fill):
+    """Rows are lost, emptied, doubled, jittered and shuffled; the oracle builds the parts from the places that are left."""
+    rng = np.random.default_rng(seed)
+    values = rng.standard_normal(300)
+    off = rng.uniform(-jitter, jitter, 300)
+    kept = np.setdiff1d(np.arange(300), lost)
+    with_value = np.setdiff1d(kept, blank)
+    rows = rng.permutation(np.concatenate([kept, np.intersect1d(twice, kept)])).astype(int)
+    given_values = np.where(np.isin(np.arange(300), blank), np.nan, values)
+    series = pd.Series(given_values[rows], index=START + pd.to_timedelta(rows + off[rows], unit="s"))
+    cleaned = clean(series, Cleaning(max_fill=max_fill, min_part=1, other_rates="resample"))
+    check_balance(cleaned)
+    runs = np.split(with_value, np.flatnonzero(np.diff(with_value) > max_fill + 1) + 1)
+    expected = [np.interp(np.arange(run[0], run[-1] + 1), run, values[run]) for run in runs]
+    assert [len(part) for part in cleaned.parts] == [len(part) for part in expected]
+    begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
+    for part, wanted, run in zip(cleaned.parts, expected, runs, strict=True):
+        np.testing.assert_allclose(part.values, wanted, atol=1e-5)
+        assert begin + part.offset_s == pytest.approx(run[0], abs=max(1e-5, 1.5 * jitter))

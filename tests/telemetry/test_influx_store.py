@@ -1,0 +1,771 @@
+"""What is kept in a real InfluxDB 2 server comes back to the bit, whatever happens to the server meanwhile; every refusal is one line."""
+
+import io
+import json
+import logging
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import traceback
+import uuid
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry import influx_client as influx_server
+from enhsim_tf.telemetry.cleaning.clean import clean
+from enhsim_tf.telemetry.influx_client import VARIABLES, quote
+from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.sources import read_source, to_series
+from tests.telemetry import influxd
+from tests.telemetry.round_trips import BEYOND, ROUND_TRIPS, same, series
+
+ROOT = Path(__file__).parents[2]
+HOSTILE = [
+    'q"',
+    "back\\slash",
+    "end\\",
+    "${1 + 1}",
+    '") |> drop(columns: ["_value"])',
+    "a=b,c d",
+    "Lage °",
+    "100 %",
+    "line\nbreak",
+    "_",
+    " ",
+]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    """A server that is ours, or the running one that the variables name; else the reason why there is none."""
+    pytest.importorskip("influxdb_client")
+    if os.environ.get("ENHSIM_TF_INFLUXDB") == "running":
+        yield influxd.Running()
+        return
+    program = influxd.find_influxd()
+    if program is None:
+        pytest.skip(influxd.WITHOUT)
+    ours = influxd.Server(program, tmp_path_factory.mktemp("influxd"))
+    yield ours
+    ours.kill()
+
+
+@pytest.fixture
+def named(server, monkeypatch):
+    """The variables name the server."""
+    for name, value in zip(VARIABLES, (server.url, server.token, server.org), strict=True):
+        monkeypatch.setenv(name, value)
+    return server
+
+
+@pytest.fixture
+def mortal(named):
+    """A server that may be killed, and lives when the test is over."""
+    if not isinstance(named, influxd.Server):
+        pytest.skip("the running server is not ours to kill")
+    yield named
+    if named.process.poll() is not None:
+        named.start()
+
+
+@pytest.fixture
+def bucket(named):
+    """A bucket of the test's own."""
+    name = f"test {uuid.uuid4().hex[:12]}"
+    with _client() as client:
+        made = client.buckets_api().create_bucket(bucket_name=name)
+        yield name
+        client.buckets_api().delete_bucket(made)
+
+
+def _client():
+    from influxdb_client import InfluxDBClient
+
+    return InfluxDBClient.from_env_properties()
+
+
+def _put(bucket, lines):
+    """Writes points as somebody else would."""
+    from influxdb_client.client.write_api import SYNCHRONOUS
+
+    with _client() as client:
+        client.write_api(SYNCHRONOUS).write(bucket, record=lines, write_precision="ns")
+
+
+def _flux(query):
+    with _client() as client:
+        return [record.values for table in client.query_api().query(query) for record in table.records]
+
+
+def _all(chunks):
+    parts = list(chunks)
+    return np.concatenate([times for times, _ in parts]), np.concatenate([values for _, values in parts])
+
+
+def _location(bucket, rest="wheel/speed"):
+    return f"influxdb://{bucket.replace(' ', '%20')}/{rest}"
+
+
+def _series(number=1_000, seed=0, **about):
+    return series(number, seed, **({"name": "wheel"} | about))
+
+
+def _count(thing, method):
+    """A list that grows with each call of a method."""
+    calls, plain = [], getattr(thing, method)
+
+    def counted(*given):
+        calls.append(given)
+        return plain(*given)
+
+    setattr(thing, method, counted)
+    return calls
+
+
+# -- where ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("influxdb://b/m/f", ("b", "m", "f", ())),
+        ("influxdb://b/m/f?z=1&a=2", ("b", "m", "f", (("a", "2"), ("z", "1")))),
+        ("influxdb://My%20b/m%2Fn/f%3F?t%3D=%26", ("My b", "m/n", "f?", (("t=", "&"),))),
+        ("influxdb://b+c/m#n/f:1@2[3?t=a+b", ("b+c", "m#n", "f:1@2[3", (("t", "a+b"),))),
+        ("influxdb://B/%C2%B0/%25", ("B", "°", "%", ())),
+    ],
+)
+def test_locations_are_read(text, parts):
+    assert parse_location(text) == InfluxLocation(*parts)
+
+
+def test_locations_are_written_as_they_are_read():
+    rng = np.random.default_rng(0)
+    signs = list('abc/?&=%# +"\\${}\n°€')
+    for _ in range(300):
+        words = ["".join(rng.choice(signs, rng.integers(1, 6))) for _ in range(7)]
+        place = InfluxLocation(*words[:3], tuple(sorted({words[3]: words[4], words[5]: words[6]}.items())))
+        assert parse_location(str(place)) == place
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "begin"),
+        ("wheel.csv", "begin"),
+        ("http://b/m/f", "begin"),
+        ("influxdb://", "no bucket"),
+        ("influxdb:///m/f", "no bucket"),
+        ("influxdb://b", "no measurement"),
+        ("influxdb://b//f", "no measurement"),
+        ("influxdb://b/m", "no field"),
+        ("influxdb://b/m/?t=v", "no field"),
+        ("influxdb://b/m/f/g", "three parts"),
+        ("influxdb://b/m/f?t", "tag=value"),
+        ("influxdb://b/m/f?t=", "tag=value"),
+        ("influxdb://b/m/f?=v", "tag=value"),
+        ("influxdb://b/m/f?t=v&", "tag=value"),
+        ("influxdb://b/m/f?t=v=w", "tag=value"),
+        ("influxdb://b/m/f?t=v&t=w", "twice"),
+        ("influxdb://b/m/%FF", "UTF-8"),
+    ],
+)
+def test_what_is_no_location_is_refused(text, word, refused):
+    with refused(word, "influxdb://bucket/measurement/field?tag=value"):
+        parse_location(text)
+
+
+def test_flux_strings_end_where_they_should():
+    assert quote('a"b\\c${d}\n') == '"a\\x22b\\x5cc\\x24{d}\\x0a"'
+
+
+ANSWER = b"#datatype,string,long,dateTime:RFC3339,long\r\n,result,table,_time,_value\r\n"
+
+
+def test_an_answer_is_the_same_in_blocks_of_any_size(monkeypatch):
+    rows = b"".join(b",_result,0,1970-01-01T00:00:00.%09dZ,%d\r\n" % (7 * number, number - 50) for number in range(100))
+    for size in (len(ANSWER), len(ANSWER) + 1, 131, 1_000, 10**6):
+        monkeypatch.setattr(influx_server, "_BLOCK", size)
+        times, values = _all(influx_server._blocks(io.BytesIO(ANSWER + rows + b"\r\n")))
+        assert np.array_equal(times, 7 * np.arange(100)) and np.array_equal(values, np.arange(100) - 50)
+    assert list(influx_server._blocks(io.BytesIO(b"\r\n"))) == []
+
+
+def test_an_answer_that_ends_within_a_line_is_not_taken_for_whole(refused):
+    row = b",_result,0,1970-01-01T00:00:01Z,1234\r\n"
+    for cut in (1, 2, 4, 30):
+        blocks = influx_server._blocks(io.BytesIO(ANSWER + row + row[:-cut]))
+        with pytest.raises(ConnectionError):
+            list(blocks)
+    blocks = influx_server._blocks(io.BytesIO(ANSWER + row + b"\r\n#datatype,string,string\r\n,error,reference\r\n,out of memory,\r\n"))
+    with refused("out of memory"):
+        list(blocks)
+
+
+# -- kept and read back ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("about", ROUND_TRIPS.values(), ids=ROUND_TRIPS)
+def test_round_trip_to_the_bit(bucket, about):
+    kept = _series(**about)
+    InfluxStore(_location(bucket)).write(kept)
+    store = InfluxStore(_location(bucket))
+    assert same(kept, store.read(kept.name)) and store.names() == [kept.name]
+
+
+def test_every_finite_float32_comes_back(bucket):
+    bits = np.random.default_rng(0).integers(0, 2**32, 20_000, dtype=np.uint32)
+    values = bits.view(np.float32)
+    extremes = np.array([0, -0.0, 1e-45, -1e-45, 1.1754944e-38, 3.4028235e38, -3.4028235e38, 0.1, 16777217], np.float32)
+    kept = Telemetry(np.concatenate([values[np.isfinite(values)], extremes]), name="bits")
+    store = InfluxStore(_location(bucket))
+    store.write(kept)
+    assert same(kept, store.read("bits"))
+
+
+def test_times_are_exact_nanoseconds(bucket):
+    first = 1_583_020_800_123_456_789
+    times = first + np.array([0, 1, 999, 1_000, 10**9, 10**9 + 1, 86_400 * 10**9 + 100])
+    _put(bucket, "\n".join(f"m f={number}.5 {at}" for number, at in enumerate(times)))
+    store = InfluxStore(_location(bucket, "m/f"))
+    found, values = _all(store.chunks())
+    assert found.dtype == np.int64 and np.array_equal(found, times) and np.array_equal(values, np.arange(7) + 0.5)
+    found, _ = _all(store.chunks(start_ns=first + 1, stop_ns=first + 1_000))
+    assert found.tolist() == [first + 1, first + 999], "the stop is not part of it"
+    assert list(store.chunks(start_ns=first + 2, stop_ns=first + 2)) == []
+    assert list(store.chunks(start_ns=first + 2, stop_ns=first + 900)) == []
+
+
+def test_times_at_both_ends_of_what_is_kept(bucket):
+    ends = [-9_223_372_036 * 10**9, -1, 0, 1, 2**63 - 3]
+    for number, at in enumerate(ends):
+        _put(bucket, f"m f={number} {at}")
+    times, values = _all(InfluxStore(_location(bucket, "m/f")).chunks())
+    assert times.tolist() == ends and values.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_the_same_written_twice_is_there_once(bucket):
+    store, kept = InfluxStore(_location(bucket), batch_size=300), _series(1_000)
+    store.write(kept)
+    versions = store.versions()
+    store.write(kept)
+    assert same(kept, store.read("wheel")) and store.versions() == versions
+    (row,) = _flux(f'from(bucket: "{bucket}") |> range(start: 1960-01-01T00:00:00Z) |> filter(fn: (r) => r._field == "speed") |> count()')
+    assert row["_value"] == 1_000
+
+
+def test_what_was_written_here_is_a_source_by_its_name(bucket):
+    first, second = _series(50, name="wheel"), _series(60, 1, name="gyro", start="2020-01-01T00:00:00+00:00", interval_s=0.5, unit="V")
+    for each in (first, second):
+        InfluxStore(_location(bucket)).write(each)
+    channels = read_source(_location(bucket))
+    assert sorted(channels) == ["gyro", "wheel"] and (channels["wheel"].to_numpy() == first.values).all()
+    assert (channels["gyro"].index == to_series(second).index).all() and channels["gyro"].attrs["unit"] == "V"
+    assert list(read_source(_location(bucket), columns=["gyro"])) == ["gyro"]
+
+
+def test_a_series_of_somebody_else_is_a_source_and_can_be_cleaned(bucket):
+    places = [place for place in range(100) if place != 40]
+    _put(bucket, [f"bus,craft=a volts={place % 7} {10**18 + place * 10**9}" for place in places])
+    (series,) = read_source(_location(bucket, "bus/volts?craft=a")).values()
+    assert (series.index.as_unit("ns").asi8 == [10**18 + place * 10**9 for place in places]).all()
+    cleaned = clean(series)
+    assert [len(part) for part in cleaned.parts] == [100] and cleaned.report.samples_filled == 1
+    assert cleaned.parts[0].values[40] == (39 % 7 + 41 % 7) / 2 and cleaned.parts[0].interval_s == 1.0
+
+
+def test_writing_again_replaces_all_of_the_old_and_may_go_back(bucket):
+    store = InfluxStore(_location(bucket))
+    long, short = _series(5_000, interval_s=60.0), _series(10, seed=1, interval_s=0.5, unit="V")
+    neighbour = _series(70, seed=2, name="wheel 2")
+    store.write(neighbour)
+    for kept in (long, short, long, short):
+        store.write(kept)
+        assert same(kept, store.read("wheel"))
+        times, values = _all(InfluxStore(_location(bucket, "wheel/speed?channel=wheel")).chunks())
+        assert np.array_equal(values, kept.values) and len(times) == len(kept)
+    assert same(neighbour, store.read("wheel 2")) and store.names() == ["wheel", "wheel 2"]
+
+
+def test_stores_of_one_bucket_do_not_see_each_other(bucket):
+    places = ["a/f", "a/g", "b/f", "a/f?t=1", "a/f?t=2", "a/f?t=1&u=1"]
+    for number, place in enumerate(places):
+        InfluxStore(_location(bucket, place)).write(_series(50, seed=number))
+    for number, place in enumerate(places):
+        store = InfluxStore(_location(bucket, place))
+        assert store.names() == ["wheel"] and same(store.read("wheel"), _series(50, seed=number)), place
+    InfluxStore(_location(bucket, "a/f")).write(_series(20, seed=9))
+    for number, place in enumerate(places[1:], 1):
+        assert same(InfluxStore(_location(bucket, place)).read("wheel"), _series(50, seed=number)), place
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_names_cannot_leave_their_place(bucket, name):
+    store = InfluxStore(_location(bucket))
+    kept, other = _series(30, name=name), _series(40, seed=1, name="other")
+    store.write(other)
+    store.write(kept)
+    store.write(kept)
+    assert same(kept, store.read(name)) and same(other, store.read("other"))
+    assert store.names() == sorted([name, "other"])
+    assert np.array_equal(_all(store.chunks(name))[1], kept.values)
+
+
+def test_places_with_hostile_names(bucket):
+    place = InfluxLocation(bucket, 'it\'s "m" ${1}\\n, a=b', 'f"\\g${h}, i=j', (('t"\\u${v}, w=x', 'y"\\z${0}, 1=2'),))
+    InfluxStore(place).write(_series(30))
+    assert same(InfluxStore(str(place)).read("wheel"), _series(30))
+    assert np.array_equal(_all(InfluxStore(place).chunks())[1], _series(30).values)
+
+
+def test_a_store_travels_to_another_process(bucket):
+    store = InfluxStore(_location(bucket))
+    store.write(_series(30))
+    assert same(pickle.loads(pickle.dumps(store)).read("wheel"), _series(30))
+
+
+# -- series of others ------------------------------------------------------------------------------------------------------
+
+
+def test_a_series_of_somebody_else_is_read_as_it_is(bucket):
+    rng = np.random.default_rng(0)
+    times = np.unique(rng.integers(10**18, 10**18 + 10**15, 3_000))
+    values = rng.normal(size=len(times))
+    order = rng.permutation(len(times))
+    _put(bucket, "\n".join(f"bus,craft=A volts={float(values[i])!r},amperes={i}i {times[i]}" for i in order))
+    _put(bucket, f"bus,craft=B volts=7 {times[0]}")
+    found, read = _all(InfluxStore(_location(bucket, "bus/volts?craft=A")).chunks())
+    assert np.array_equal(found, times) and read.tobytes() == values.tobytes(), "float64 as it is kept"
+    found, read = _all(InfluxStore(_location(bucket, "bus/amperes")).chunks())
+    assert np.array_equal(found, times) and np.array_equal(read, np.arange(len(times))), "whole numbers are numbers"
+    assert InfluxStore(_location(bucket, "bus/volts?craft=A")).names() == []
+
+
+def test_what_is_not_one_series_of_numbers_is_refused(bucket, refused):
+    _put(
+        bucket,
+        'bus,craft=A,side=l volts=1 1\nbus,craft=A,side=r volts=2 1\nbus,craft=B volts=3 1\nbus,craft=A mode="safe" 1\nbus on=true 1',
+    )
+
+    def read(place):
+        return list(InfluxStore(_location(bucket, place)).chunks())
+
+    assert len(read("bus/volts?craft=B")) == 1
+    with refused("several", "craft=A&side=l", "craft=A&side=r"):
+        read("bus/volts?craft=A")
+    with refused("'bis'", "bus"):
+        read("bis/volts")
+    with refused("'vlts'", "mode, on, volts"):
+        read("bus/vlts")
+    with refused("'C'", "A, B"):
+        read("bus/volts?craft=C")
+    with refused("'kraft'", "there is none"):
+        read("bus/volts?kraft=A")
+    with refused("'side'", "there is none"):
+        read("bus/volts?craft=B&side=l")
+    for place in ("bus/mode", "bus/on"):
+        with refused("numbers"):
+            read(place)
+    with refused("it is empty", "'wheel'"):
+        InfluxStore(_location(bucket, "bus/volts")).read("wheel")
+
+
+# -- a million points ------------------------------------------------------------------------------------------------------
+
+MILLION = 10**6
+MEMORY = """
+import sys, tracemalloc
+import pyarrow
+from enhsim_tf.telemetry.influx_store import InfluxStore
+
+store = InfluxStore(sys.argv[1])
+for _ in store.chunks("million", stop_ns=10**9 * 1000):  # what is imported and kept once
+    pass
+found = []
+for stop in (10**5, 10**6):
+    tracemalloc.start()
+    count = sum(len(times) for times, values in store.chunks("million", stop_ns=10**9 * stop))
+    found += [count, tracemalloc.get_traced_memory()[1], pyarrow.default_memory_pool().max_memory()]
+    tracemalloc.stop()
+print(*found)
+"""
+
+
+@pytest.fixture(scope="module")
+def million():
+    """Whole numbers in an order without pattern: their sum is exact in every order, and each is there once."""
+    return Telemetry(np.random.default_rng(0).permutation(MILLION).astype(np.float32), name="million", start="1970-01-01T00:00:00+00:00")
+
+
+def test_restarts_in_the_middle_of_writing_lose_and_double_nothing(mortal, bucket, million):
+    store, sent, restarts = InfluxStore(_location(bucket)), [], []
+    send = store.server.send
+
+    def restart():
+        mortal.kill()  # while the next batches are on their way
+        mortal.start()
+
+    def counted(lines):
+        sent.append(len(lines))
+        if len(sent) in (30, 101, 170):
+            restarts.append(threading.Thread(target=restart))
+            restarts[-1].start()
+        send(lines)
+
+    store.server.send = counted
+    refusals = _count(store.server, "_in_words")
+    store.write(million)
+    for thread in restarts:
+        thread.join()
+    assert len(restarts) == 3 and len(sent) == MILLION // 5_000 + 1
+    assert len(refusals) >= 3, "each time a batch met no server"
+
+    points = f'from(bucket: "{bucket}") |> range(start: 1960-01-01T00:00:00Z) |> filter(fn: (r) => r._field == "speed")'
+    ((count,), (total,)) = ([row["_value"] for row in _flux(f"{points} |> {what}()")] for what in ("count", "sum"))
+    assert (count, total) == (MILLION, MILLION * (MILLION - 1) / 2)
+    times, values = _all(store.chunks("million"))
+    assert np.array_equal(times, 10**9 * np.arange(MILLION)) and values.tobytes() == million.values.astype(np.float64).tobytes()
+    assert np.bitwise_xor.reduce(values.astype(np.int64)) == np.bitwise_xor.reduce(np.arange(MILLION))
+
+    # the same points, read in bounded memory, and read over a restart
+    done = subprocess.run([sys.executable, "-c", MEMORY, _location(bucket)], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    few, few_bytes, few_arrow, many, many_bytes, many_arrow = map(int, done.stdout.split())
+    assert (few, many) == (10**5, MILLION)
+    assert many_bytes < 1.2 * few_bytes and many_arrow < 1.2 * few_arrow and many_bytes + many_arrow < 16 * MILLION
+
+    for stop in (mortal.kill, mortal.end):
+        asked = _count(store.server, "points")
+        chunks = store.chunks("million")
+        parts = [next(chunks)]
+        stop()
+        mortal.start()
+        parts += chunks
+        assert np.array_equal(np.concatenate([times for times, _ in parts]), times)
+        assert np.array_equal(np.concatenate([values for _, values in parts]), million.values)
+        assert len(asked) >= 3, "for the description, for the points, and for those behind the break"
+
+
+def test_the_old_stands_until_the_new_is_whole(mortal, bucket, refused):
+    store, old, new = InfluxStore(_location(bucket), batch_size=100, max_retry_s=0.5), _series(1_000), _series(2_000, seed=1)
+    store.write(old)
+    send, sent = store.server.send, []
+
+    def dies(lines):
+        sent.append(lines)
+        if len(sent) == 7:
+            mortal.kill()
+        send(lines)
+
+    store.server.send = dies
+    with refused("no answer for 0.5 s", mortal.url):
+        store.write(new)
+    mortal.start()
+    again = InfluxStore(_location(bucket))
+    assert len(sent) == 7 and same(old, again.read("wheel"))
+    again.write(new)
+    assert same(new, again.read("wheel"))
+    assert np.array_equal(_all(InfluxStore(_location(bucket, "wheel/speed?channel=wheel")).chunks())[1], new.values), "nothing is left"
+
+
+# -- refusals --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pretended(monkeypatch):
+    """Variables that name a server where none is."""
+    pytest.importorskip("influxdb_client")
+    for name, value in zip(VARIABLES, ("http://127.0.0.1:9", "secret-token", "nobody"), strict=True):
+        monkeypatch.setenv(name, value)
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_a_missing_variable_is_named(pretended, monkeypatch, refused, name):
+    monkeypatch.setenv(name, " ")
+    with refused(f"no {name}"):
+        InfluxStore("influxdb://b/m/f")
+    monkeypatch.delenv(name)
+    with refused(f"no {name}"):
+        InfluxStore("influxdb://b/m/f")
+
+
+def test_a_missing_client_is_named(pretended, monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "influxdb_client", None)
+    with refused("pip install influxdb-client"):
+        InfluxStore("influxdb://b/m/f")
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "localhost:8086",
+        "ftp://localhost",
+        "http://",
+        "http://[",
+        "http://a:b",
+        "http://a:0",
+        "http://a b",
+        "http://a\n",
+        "http://user:secret-token@localhost",
+    ],
+)
+def test_an_address_that_is_none_is_refused(pretended, monkeypatch, refused, url):
+    monkeypatch.setenv("INFLUXDB_V2_URL", url)
+    with refused("INFLUXDB_V2_URL") as caught:
+        InfluxStore("influxdb://b/m/f")
+    assert "secret" not in str(caught)
+
+
+@pytest.mark.parametrize("options", [{"batch_size": 0}, {"max_retry_s": -1.0}, {"max_retry_s": float("nan")}])
+def test_options_out_of_range_are_refused(pretended, refused, options):
+    with refused("max_retry_s"):
+        InfluxStore("influxdb://b/m/f", **options)
+
+
+@pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read("x"), lambda store: store.write(_series()), list])
+def test_a_server_that_is_down_is_said_at_once(pretended, refused, use):
+    store = InfluxStore("influxdb://b/m/f", max_retry_s=3_600)
+    with refused("http://127.0.0.1:9", "no answer"):
+        use(store.chunks() if use is list else store)
+
+
+def test_a_variable_of_the_client_that_is_no_number_is_refused(pretended, monkeypatch, refused):
+    monkeypatch.setenv("INFLUXDB_V2_TIMEOUT", "soon")
+    with refused("INFLUXDB_V2_TIMEOUT"):
+        InfluxStore("influxdb://b/m/f").check()
+
+
+def test_what_influxdb_cannot_keep_is_refused(pretended, refused):
+    store = InfluxStore("influxdb://b/m/f")
+    for wrong, word in (
+        (_series(0), "0 samples"),
+        (_series(name=""), "name=''"),
+        (Telemetry(np.array([1, np.nan, 2], np.float32)), "sample 1"),
+        (Telemetry(np.array([1, np.inf], np.float32)), "inf"),
+        (_series(interval_s=1e-10), "nanosecond"),
+        *((_series(**about), "time") for about in BEYOND),
+        (_series(start="yesterday"), "yesterday"),
+        (_series(name="\ud800"), "Unicode"),
+        (np.zeros(3), "ndarray"),
+    ):
+        with refused(word):
+            store.write(wrong)
+    for place in ("m%0A/f", "%23m/f", "m%5C/f", "m/_f", "m/f?channel=a", "m/f?version=a", "m/f?time=a", "m/f?_t=a", "m/f?t=%5C"):
+        with refused("another location"):
+            InfluxStore(f"influxdb://b/{place}").write(_series())
+
+
+def test_what_the_server_does_not_know_is_named(named, bucket, monkeypatch, refused):
+    def uses(bucket):
+        place = _location(bucket)
+        for use in (
+            lambda store: store.check(),
+            lambda store: store.read("wheel"),
+            lambda store: store.names(),
+            lambda store: store.write(_series()),
+            lambda store: list(store.chunks()),
+        ):
+            yield lambda use=use: use(InfluxStore(place))
+
+    for use in uses("nowhere"):
+        with refused("'nowhere'", "bucket"):
+            use()
+    monkeypatch.setenv("INFLUXDB_V2_TOKEN", "wrong-" + named.token)
+    for use in uses(bucket):
+        with refused("INFLUXDB_V2_TOKEN"):
+            use()
+    monkeypatch.setenv("INFLUXDB_V2_TOKEN", named.token)
+    monkeypatch.setenv("INFLUXDB_V2_ORG", "of nobody")
+    for use in uses(bucket):
+        with refused("INFLUXDB_V2_ORG", "'of nobody'"):
+            use()
+
+
+def test_a_token_that_may_only_read_is_named(named, bucket, monkeypatch, refused):
+    from influxdb_client import Permission, PermissionResource
+
+    InfluxStore(_location(bucket)).write(_series(20))
+    with _client() as client:
+        organisation = client.organizations_api().find_organizations(org=named.org)[0].id
+        which = PermissionResource(type="buckets", org_id=organisation, id=client.buckets_api().find_bucket_by_name(bucket).id)
+        right = client.authorizations_api().create_authorization(organisation, [Permission("read", which)])
+    monkeypatch.setenv("INFLUXDB_V2_TOKEN", right.token)
+    store = InfluxStore(_location(bucket))
+    assert same(store.read("wheel"), _series(20))
+    with refused("may", bucket):
+        store.write(_series(20, seed=1))
+
+
+def test_points_that_the_bucket_does_not_take_are_named(named, bucket, refused):
+    from influxdb_client import BucketRetentionRules
+
+    with _client() as client:
+        found = client.buckets_api().find_bucket_by_name(bucket)
+        found.retention_rules = [BucketRetentionRules(type="expire", every_seconds=3_600, shard_group_duration_seconds=3_600)]
+        client.buckets_api().update_bucket(found)
+    with refused("retains", bucket):
+        InfluxStore(_location(bucket)).write(_series(20, start="2001-01-01"))
+    now = np.datetime64("now") - np.timedelta64(60, "s")
+    kept = _series(20, start=f"{now}+00:00")
+    InfluxStore(_location(bucket)).write(kept)
+    assert same(kept, InfluxStore(_location(bucket)).read("wheel")), "the description outlives what is retained"
+
+
+def test_a_field_of_another_type_is_named(bucket, refused):
+    _put(bucket, "wheel speed=1i 0")
+    with refused("type"):
+        InfluxStore(_location(bucket)).write(_series(20))
+
+
+def test_something_else_at_the_address_is_named(pretended, monkeypatch, refused):
+    import http.server
+
+    answers = []
+
+    class Silent(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *words):
+            pass
+
+        def do_POST(self):  # noqa: N802
+            self.send_response(answers[-1])
+            self.end_headers()
+            self.wfile.write(b"<html><body>Welcome,\nfriend</body></html>")
+
+    with http.server.HTTPServer(("127.0.0.1", 0), Silent) as other:
+        threading.Thread(target=other.serve_forever, daemon=True).start()
+        monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{other.server_port}")
+        for status in (200, 404):
+            answers.append(status)
+            with refused("something else", "INFLUXDB_V2_URL"):
+                InfluxStore("influxdb://b/m/f").check()
+        answers.append(302)
+        with refused("(302)"):
+            InfluxStore("influxdb://b/m/f").check()
+        monkeypatch.setenv("INFLUXDB_V2_URL", f"https://127.0.0.1:{other.server_port}")
+        with refused("SSL"):
+            InfluxStore("influxdb://b/m/f").check()
+        other.shutdown()
+
+
+def test_missing_samples_are_noticed(bucket, refused):
+    store = InfluxStore(_location(bucket))
+    store.write(_series(1_000, start="2020-01-01"))
+    with _client() as client:
+        client.delete_api().delete("2020-01-01T00:08:00Z", "2020-01-01T00:08:00Z", 'channel="wheel"', bucket)
+    with refused("'wheel'", "gap before sample 480"):
+        store.read("wheel")
+
+
+# -- the token -------------------------------------------------------------------------------------------------------------
+
+
+def _told(error):
+    """Everything that anybody could print of an error: its words, its chain and its traceback."""
+    seen = []
+    while error is not None:
+        seen += [str(error), repr(error), "".join(traceback.format_exception(error)), repr(vars(error))]
+        error = error.__cause__ or error.__context__
+    return "\n".join(seen)
+
+
+@pytest.mark.parametrize(
+    "token",
+    ["not-the-right-one-0123456789", "lines-0123456789\ntwo-of-them-0123456789", "not-the-end-0123456789\n", "not-latin-€-0123456789"],
+)
+def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, token):
+    told = io.StringIO()
+    caplog.set_level(logging.DEBUG)
+    for url, place in ((named.url, bucket), (named.url, "nowhere"), ("http://127.0.0.1:9", bucket)):
+        for given in (token, named.token):
+            monkeypatch.setenv("INFLUXDB_V2_URL", url)
+            monkeypatch.setenv("INFLUXDB_V2_TOKEN", given)
+            for use in (lambda store: store.write(_series(20)), lambda store: store.read("wheel"), lambda store: list(store.chunks())):
+                store = None
+                try:
+                    store = InfluxStore(_location(place), max_retry_s=0)
+                    use(store)
+                except InputError as error:
+                    assert error.__context__ is None and error.__cause__ is None
+                    told.write(_told(error))
+                if store is not None:
+                    told.write(f"{store!r} {vars(store)} {store.server!r} {vars(store.server)} {pickle.dumps(store)}")
+    said = told.getvalue() + caplog.text + "".join(capfd.readouterr())
+    assert "Expected" in said and "INFLUXDB_V2_TOKEN" in said
+    for part in (token, named.token, *token.split(), repr(token)):
+        assert part not in said
+
+
+# -- the paper's goal ------------------------------------------------------------------------------------------------------
+
+
+def _reproduce(tmp_path, *options):
+    words = ["--budget", "smoke", "--only", "fig14", "--arrays", "--cache", tmp_path / "cache", *options]
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", *map(str, words)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+
+
+def test_the_reproduction_runs_its_goal_through_influxdb(named, bucket, tmp_path):
+    place = _location(bucket, "paper/value")
+    runs = {}
+    for name, options in {"parquet": (), "influxdb": ("--store", place), "again": ("--store", place), "parquet again": ()}.items():
+        done = _reproduce(tmp_path, *options, "--out", tmp_path / name)
+        assert done.returncode == 0, done.stderr
+        runs[name] = dict(np.load(tmp_path / name / "fig14_telemetry_store.npz", allow_pickle=False))
+        assert ("(from the cache)" in done.stdout) == ("again" in name), "neither store's stage is taken for the other's"
+        drawn = (tmp_path / name / "fig14_telemetry_store.svg").read_text(encoding="utf-8")
+        assert (f"store {place} " in drawn) == bool(options)
+    for found in runs.values():
+        assert found.keys() == runs["parquet"].keys() and all(np.array_equal(found[key], runs["parquet"][key]) for key in found)
+
+    rows = _flux(f'from(bucket: "{bucket}") |> range(start: 2019-01-01T00:00:00Z, stop: 2021-01-01T00:00:00Z) |> count()')
+    assert [row["_value"] for row in rows] == [runs["influxdb"]["num_samples"]], "they are there, and there once"
+    stages = [json.loads((folder / "stage.json").read_text()) for folder in (tmp_path / "cache").iterdir()]
+    assert [stage["stage"] for stage in stages] == ["telemetry", "telemetry"]
+    for file in tmp_path.rglob("*"):
+        assert not file.is_file() or named.token.encode() not in file.read_bytes()
+
+    with _client() as client:  # what the stage says is done is gone from the server
+        for predicate in ('_measurement="paper"', '_measurement="enhsim_tf_series"'):
+            client.delete_api().delete("1970-01-01T00:00:00Z", "2200-01-01T00:00:00Z", predicate, bucket)
+    done = _reproduce(tmp_path, "--store", place, "--out", tmp_path / "anew")
+    assert done.returncode == 0, done.stderr
+    anew = np.load(tmp_path / "anew" / "fig14_telemetry_store.npz", allow_pickle=False)
+    assert np.array_equal(anew["values"], runs["parquet"]["values"])
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--store", "influxdb"], "INFLUXDB_V2_TOKEN"),
+        (["--store", "influxdb://telemetry/m/f"], "no answer"),
+        (["--store", "influxdb://telemetry"], "no measurement"),
+        (["--store", "sqlite"], "parquet, influxdb"),
+        (["--store", "influxdb", "--experiment", "robustness"], "Parquet"),
+    ],
+)
+def test_a_store_that_cannot_be_used_is_said_before_anything_is_done(pretended, monkeypatch, tmp_path, options, word):
+    if word == "INFLUXDB_V2_TOKEN":
+        monkeypatch.delenv(word)
+    words = [*options, "--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
+    program = f"""
+import sys
+from enhsim_tf.reproduce.__main__ import main
+code = main({words!r})
+print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.stdout == "2 []\n", done.stderr
+    assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("error: Expected ") and word in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_names_the_store_and_needs_no_client():
+    program = "import sys\nsys.modules['influxdb_client'] = None\nfrom enhsim_tf.reproduce.__main__ import main\nmain(['--help'])"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and "--store" in done.stdout and "INFLUXDB_V2_URL" in done.stdout

@@ -1,0 +1,154 @@
+"""What is kept comes back to the bit, and nothing else is touched."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.series import Telemetry
+from tests.telemetry.round_trips import BEYOND, ROUND_TRIPS, same, series
+
+
+@pytest.mark.parametrize("about", ROUND_TRIPS.values(), ids=ROUND_TRIPS)
+def test_round_trip_to_the_bit(tmp_path, about):
+    kept = series(**about)
+    ParquetStore(tmp_path / "store").write(kept)
+    read = ParquetStore(tmp_path / "store").read(kept.name)
+    assert same(kept, read) and read.values.dtype == np.float32
+
+
+@pytest.mark.parametrize("about", BEYOND, ids=str)
+def test_times_that_no_file_can_hold_are_refused(tmp_path, about, refused):
+    with refused("time"):
+        ParquetStore(tmp_path).write(series(**about))
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_zone_of_a_start_counts(tmp_path):
+    ParquetStore(tmp_path).write(series(3, start="2020-03-01T00:00:00+02:00", name="wheel"))
+    assert pd.read_parquet(tmp_path / "wheel")["time"].iloc[0] == pd.Timestamp("2020-02-29T22:00:00Z")
+
+
+def test_one_file_a_day_that_pandas_reads(tmp_path):
+    store = ParquetStore(tmp_path)
+    kept = series(60, interval_s=3_600.0, start="2020-02-28T18:00:00+00:00", name="wheel")
+    store.write(kept)
+    files = sorted(path.name for path in (tmp_path / "wheel").iterdir())
+    assert files == ["2020-02-28.parquet", "2020-02-29.parquet", "2020-03-01.parquet", "2020-03-02.parquet"]
+    assert len(pd.read_parquet(tmp_path / "wheel" / "2020-02-29.parquet")) == 24
+    table = pd.read_parquet(tmp_path / "wheel").sort_values("time")
+    assert (table["value"].to_numpy() == kept.values).all()
+    assert (table["time"] == pd.date_range("2020-02-28T18:00:00Z", periods=60, freq="h")).all()
+    assert same(kept, store.read("wheel"))
+
+
+@pytest.mark.parametrize("name", ["a/b", "..", ".", "../up", "/root", "a b", "Lage °", ".hidden", "100 %", "a.b", "[x]*?", "a%2Fb", "\\"])
+def test_no_name_leaves_the_folder(tmp_path, name):
+    folder = tmp_path / "above" / "store"
+    store = ParquetStore(folder)
+    store.write(series(10, name="neighbour"))
+    kept = series(10, seed=1, name=name)
+    store.write(kept)
+    assert same(kept, store.read(name))
+    assert store.names() == sorted(["neighbour", name])
+    assert [path.name for path in tmp_path.iterdir()] == ["above"]
+    assert [path.name for path in (tmp_path / "above").iterdir()] == ["store"]
+    assert len(list(folder.iterdir())) == 2 and len(list(folder.glob("*/*"))) == 2
+
+
+def test_series_without_a_name_does_not_take_the_place_of_the_store(tmp_path, refused):
+    store = ParquetStore(tmp_path / "store")
+    store.write(series(10, name="neighbour"))
+    with refused():
+        store.write(series(10, name=""))
+    assert store.names() == ["neighbour"]
+
+
+def test_a_folder_of_something_else_is_left_as_it_is(tmp_path, refused):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "thesis.tex").write_text("mine")
+    (tmp_path / "notes").write_text("mine")
+    for name, what in (("docs", "thesis.tex"), ("notes", "a file")):
+        with refused(what):
+            ParquetStore(tmp_path).write(Telemetry(np.arange(3.0, dtype=np.float32), name=name))
+    assert (tmp_path / "docs" / "thesis.tex").read_text() == (tmp_path / "notes").read_text() == "mine"
+
+
+def test_series_without_samples_is_refused(tmp_path, refused):
+    with refused():
+        ParquetStore(tmp_path).write(series(0))
+    assert not list(tmp_path.rglob("*.parquet"))
+
+
+def test_missing_day_is_noticed(tmp_path, refused):
+    store = ParquetStore(tmp_path)
+    store.write(series(72, interval_s=3_600.0, start="2020-03-01", name="wheel"))
+    (tmp_path / "wheel" / "2020-03-02.parquet").unlink()
+    with refused("wheel"):
+        store.read("wheel")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"PAR1 and no more", b"PAR1" + bytes(20) + b"\x14\0\0\0PAR1"],
+    ids=["nothing", "a beginning", "a footer that says nothing"],
+)
+def test_damaged_day_is_refused(tmp_path, refused, content):
+    store = ParquetStore(tmp_path)
+    store.write(series(72, interval_s=3_600.0, start="2020-03-01", name="wheel"))
+    (tmp_path / "wheel" / "2020-03-02.parquet").write_bytes(content)
+    with refused("wheel"):
+        store.read("wheel")
+
+
+def test_table_of_another_maker_is_refused(tmp_path, refused):
+    (tmp_path / "wheel").mkdir()
+    pd.DataFrame({"t": [1, 2], "x": [3, 4]}).to_parquet(tmp_path / "wheel" / "part.parquet")
+    with refused("wheel"):
+        ParquetStore(tmp_path).read("wheel")
+
+
+def test_writing_again_replaces_all_of_the_old(tmp_path):
+    store = ParquetStore(tmp_path)
+    store.write(series(72, interval_s=3_600.0, start="2020-03-01", name="wheel"))
+    kept = series(10, seed=1, name="wheel")
+    store.write(kept)
+    assert same(kept, store.read("wheel"))
+    assert len(list(tmp_path.rglob("*.parquet"))) == 1
+
+
+def test_failed_write_keeps_the_old(tmp_path, monkeypatch):
+    import pyarrow.parquet
+
+    store, kept = ParquetStore(tmp_path), series(72, interval_s=3_600.0, start="2020-03-01", name="wheel")
+    store.write(kept)
+    write, written = pyarrow.parquet.write_table, []
+
+    def full_disk(table, file, **options):
+        if written:
+            raise OSError("no space left")
+        written.append(file)
+        write(table, file, **options)
+
+    monkeypatch.setattr(pyarrow.parquet, "write_table", full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        store.write(series(72, seed=1, interval_s=3_600.0, start="2020-03-01", name="wheel"))
+    assert written and same(kept, store.read("wheel"))
+    assert [path.name for path in tmp_path.iterdir()] == ["wheel"]
+
+
+def test_unknown_name_lists_what_is_there(tmp_path, refused):
+    store = ParquetStore(tmp_path / "store")
+    assert store.names() == []
+    with refused("it is empty", "'orbit'"):
+        store.read("orbit")
+    store.write(series(10, name="wheel"))
+    store.write(series(10, name="a/b"))
+    with refused("a/b, wheel", "'orbit'"):
+        store.read("orbit")
+
+
+def test_folder_that_cannot_be_made_is_refused(tmp_path, refused):
+    (tmp_path / "taken").write_text("x")
+    with refused("taken"):
+        ParquetStore(tmp_path / "taken").write(series(10))

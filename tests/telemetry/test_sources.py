@@ -1,0 +1,290 @@
+"""Raw channels from every kind of source, and what a source cannot be."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.sources import from_series, read_source, to_series
+
+N = 50
+TIMES = pd.date_range("2020-03-01T06:00:00Z", periods=N, freq="250ms")
+VALUES = np.sin(np.arange(N) / 5).round(4)
+TABLE = pd.DataFrame({"utc": TIMES, "volts": VALUES, "mode": "nominal", "amps": 2 * VALUES})
+
+
+def lines(*columns, header="utc,volts", separator=","):
+    """CSV text of columns of cells."""
+    rows = [separator.join(str(cell) for cell in row) for row in zip(*columns, strict=True)]
+    return "\n".join([header, *rows]) + "\n"
+
+
+ISO = TIMES.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+COMMAS = [str(value).replace(".", ",") for value in VALUES]
+CSV = {
+    "plain": lines(ISO, VALUES),
+    "semicolons": lines(ISO, VALUES, header="utc;volts", separator=";"),
+    "semicolons and decimal commas": lines(ISO, COMMAS, header="utc;volts", separator=";"),
+    "tabs": lines(ISO, VALUES, header="utc\tvolts", separator="\t"),
+    "bars": lines(ISO, VALUES, header="utc|volts", separator="|"),
+    "quoted decimal commas": lines(ISO, [f'"{value}"' for value in COMMAS]),
+    "a byte order mark": "\ufeff" + lines(ISO, VALUES),
+    "comments above": "# written by a recorder\n#units,V\n\n" + lines(ISO, VALUES),
+    "spaces in the header": lines(ISO, VALUES, header="utc, volts"),
+    "lines of another system": lines(ISO, VALUES).replace("\n", "\r\n"),
+    "no end of the last line": lines(ISO, VALUES).rstrip("\n"),
+    "epoch milliseconds": lines(TIMES.as_unit("ms").asi8, VALUES, header="time,volts"),
+    "row numbers without a name": lines(range(N), ISO, VALUES, header=",utc,volts"),
+    "the time last": lines(VALUES, ISO, header="volts,when"),
+    "words beside": lines(ISO, ["on"] * N, VALUES, header="utc,state,volts"),
+}
+
+
+def check(channel, name="volts", values=VALUES):
+    assert isinstance(channel.index, pd.DatetimeIndex) and (channel.name, len(channel)) == (name, N)
+    cleaned = clean(channel)
+    (part,) = cleaned.parts
+    assert (part.interval_s, part.start) == (0.25, "2020-03-01T06:00:00+00:00")
+    np.testing.assert_allclose(part.values, values, atol=1e-6)
+    return cleaned
+
+
+@pytest.mark.parametrize("name", CSV)
+def test_csv_of_every_dialect(tmp_path, name):
+    path = tmp_path / "a.csv"
+    path.write_text(CSV[name], encoding="utf-8", newline="")
+    channels = read_source(path)
+    assert list(channels) == ["volts"]
+    check(channels["volts"])
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
+def test_csv_of_other_encodings(tmp_path, encoding):
+    path = tmp_path / "a.csv"
+    path.write_bytes(lines(ISO, VALUES, header="utc,°C").encode(encoding))
+    cleaned = check(read_source(path)["°C"], "°C")
+    assert (cleaned.report.find("encoding") is not None) == (encoding == "latin-1")
+
+
+def test_columns_by_name_and_all_of_numbers(tmp_path):
+    TABLE.to_csv(tmp_path / "a.csv", index=False)
+    TABLE.to_parquet(tmp_path / "a.parquet")
+    TABLE.set_index("utc").to_parquet(tmp_path / "b.parquet")
+    for file in ("a.csv", "a.parquet", "b.parquet"):
+        channels = read_source(tmp_path / file)
+        assert list(channels) == ["volts", "amps"]
+        cleaned = check(channels["volts"])
+        check(channels["amps"], "amps", 2 * VALUES)
+        kinds = [finding.kind for finding in cleaned.report.findings]
+        assert kinds == ["time column", "columns left out"] and "mode" in cleaned.report.find("columns left out").text
+        named = read_source(str(tmp_path / file), columns=["amps"], time="utc")
+        assert list(named) == ["amps"] and clean(named["amps"]).report.findings == ()
+        counted = read_source(tmp_path / file, columns="amps", time="none")["amps"]
+        assert isinstance(counted.index, pd.RangeIndex) and clean(counted).parts[0].start is None
+
+
+def test_channels_without_time(tmp_path):
+    array = np.stack([VALUES, 3 * VALUES], axis=1)
+    np.save(tmp_path / "wheel.npy", array)
+    np.save(tmp_path / "one.npy", VALUES)
+    np.save(tmp_path / "column.npy", VALUES[:, None])
+    assert list(read_source(tmp_path / "wheel.npy")) == ["wheel.0", "wheel.1"]
+    (channel,) = read_source(tmp_path / "wheel.npy", columns=[1]).values()
+    assert (channel.name, channel.tolist()) == ("wheel.1", (3 * VALUES).tolist()) and isinstance(channel.index, pd.RangeIndex)
+    for name in ("one", "column"):
+        assert read_source(tmp_path / f"{name}.npy")[name].tolist() == VALUES.tolist()
+    (tmp_path / "a.csv").write_text("a,b\n1,2\n2,5\n\n4,\n")
+    channels = read_source(tmp_path / "a.csv")
+    assert channels["a"].isna().tolist() == [False, False, True, False], "a blank line is a row"
+    assert clean(channels["b"]).report.find("missing values").count == 2
+
+
+def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
+    """Seven rows in; one without a time, one with a word for it, one doubled, one cut short by a killed recorder."""
+    rows = [
+        "2020-03-01T00:00:00,1",
+        ",2",
+        "2020-03-01T00:00:01,3",
+        "boot,4",
+        "2020-03-01T00:00:01,3",
+        "2020-03-01T00:00:02,5",
+        "2020-03-01T00:00:03",
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(["time,volts", *rows]))
+    channel = read_source(tmp_path / "a.csv", options=Cleaning(on_bad_times="drop"))["volts"]
+    report = clean(channel).report
+    assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (7, 3, 4, 3)
+    found = {finding.kind: finding.count for finding in report.findings}
+    assert found == {"time column": 1, "bad times": 1, "missing times": 2, "time zone": 5, "duplicate rows": 1, "missing values": 1}
+
+
+def save(folder, name, content):
+    path = folder / name
+    if isinstance(content, str | bytes):
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    elif isinstance(content, pd.DataFrame):
+        content.to_parquet(path)
+    elif content is not None:
+        np.save(path, content)
+    return path
+
+
+BAD = {
+    "not there": ("absent.csv", None, {}, "does not exist"),
+    "a name no file can have": ("x" * 300 + ".csv", None, {}, "does not exist"),
+    "unknown kind": ("a.xlsx", "x", {}, "a.xlsx"),
+    "empty": ("a.csv", "", {}, "empty"),
+    "blank": ("a.csv", "\n \n", {}, "empty"),
+    "comments only": ("a.csv", "# a\n# b\n", {}, "a.csv"),
+    "bytes": ("a.csv", bytes(range(256)) * 20, {}, "no text"),
+    "no header": ("a.csv", "1,2\n3,4\n5,6\n", {}, "1, 2"),
+    "no header, decimal commas": ("a.csv", "1,5;2\n3,5;4\n", {}, "header"),
+    "lines longer than the header": ("a.csv", "a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
+    "one longer line": ("a.csv", "a,b\n1,2\n1,2,3\n", {}, "a.csv"),
+    "one name for two columns": ("a.csv", "a,a\n1,2\n3,4\n", {}, "'a' more than once"),
+    "one name for two columns, named": ("a.csv", "a,a,b\n1,2,3\n3,4,5\n", {"columns": ["a"]}, "'a' more than once"),
+    "no such column": ("a.csv", "a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
+    "no such time": ("a.csv", "a,b\n1,2\n", {"time": "c"}, "'c'"),
+    "two time columns": ("a.csv", "start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n", {}, "start, end"),
+    "date and time of day": ("a.csv", "date,time,v\n2020-01-01,00:00:01,1\n2020-01-01,00:00:02,2\n", {}, "'date'"),
+    "words for times": ("a.csv", "time,v\nnoon,1\nnight,2\n", {}, "'noon' at row 0"),
+    "a time that is none": ("a.csv", "time,v\n2020-01-01,1\nsoon,2\n2020-01-03,3\n", {}, "'soon' at row 1"),
+    "words only": ("a.csv", "a,b\nx,y\nz,w\n", {}, "none in a.csv"),
+    "columns twice": ("a.csv", "a,b\n1,2\n", {"columns": ["a", "a"]}, "['a', 'a']"),
+    "no columns named": ("a.csv", "a,b\n1,2\n", {"columns": []}, "columns=[]"),
+    "a channel of a file": ("a.csv#a", "a,b\n1,2\n", {}, "a.csv#a"),
+    "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
+    "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "none in a.parquet"),
+    "two levels of names": (
+        "a.parquet",
+        pd.DataFrame([[1.0, 2.0]], columns=pd.MultiIndex.from_tuples([("a", "x"), ("a", "y")])),
+        {},
+        "2 levels",
+    ),
+    "no array": ("a.npy", b"not an array", {}, "a.npy"),
+    "an array of objects": ("a.npy", np.array([{}, None], object), {}, "a.npy"),
+    "three axes": ("a.npy", np.zeros((3, 4, 5)), {}, "(3, 4, 5)"),
+    "no axis": ("a.npy", np.array(3.0), {}, "()"),
+    "fields": ("a.npy", np.zeros(3, [("a", float)]), {}, "fields"),
+    "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),
+    "a time of an array": ("a.npy", np.zeros(3), {"time": "t"}, "'t'"),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("case", BAD)
+def test_bad_sources_are_refused(tmp_path, refused, case):
+    name, content, arguments, words = BAD[case]
+    path = save(tmp_path, name.split("#")[0], content).with_name(name)
+    with refused(words):
+        read_source(path, **arguments)
+
+
+@pytest.mark.parametrize("cell", ["1.5 V", "-", "1_0", "true"])
+def test_text_among_numbers_is_a_channel_and_refused_by_its_place(tmp_path, refused, cell):
+    (tmp_path / "a.csv").write_text(lines(ISO, [*VALUES[:-1], cell]))
+    channel = read_source(tmp_path / "a.csv")["volts"]
+    with refused(f"{cell!r} at row 49"):
+        clean(channel)
+    assert clean(channel, Cleaning(on_bad_values="drop")).report.find("bad values").places == (f"row 49, {TIMES[49].isoformat()}",)
+
+
+def test_the_series_of_a_store(tmp_path, refused):
+    store = ParquetStore(tmp_path / "store")
+    timed = Telemetry(VALUES.astype(np.float32), 0.25, 3.0, "2020-03-01T06:00:00+00:00", "volts", "V")
+    counted = Telemetry(VALUES.astype(np.float32), name="wheel/1")
+    store.write(timed)
+    store.write(counted)
+    channels = read_source(tmp_path / "store")
+    assert list(channels) == ["volts", "wheel/1"]
+    assert channels["volts"].index[0] == TIMES[0] + pd.Timedelta("3s") and isinstance(channels["wheel/1"].index, pd.RangeIndex)
+    cleaned = clean(channels["volts"])
+    assert (cleaned.parts[0].unit, cleaned.parts[0].interval_s, cleaned.report.findings) == ("V", 0.25, ())
+    assert list(read_source(f"{tmp_path}/store#wheel/1")) == ["wheel/1"] == list(read_source(tmp_path / "store", columns=["wheel/1"]))
+    with refused("'amps'"):
+        read_source(f"{tmp_path}/store#amps")
+    with refused("time='utc'"):
+        read_source(tmp_path / "store", time="utc")
+    (tmp_path / "empty").mkdir()
+    with refused("without any"):
+        read_source(tmp_path / "empty")
+    (tmp_path / "empty" / "labeled_anomalies.csv").touch()
+    with refused("load_labelled"):
+        read_source(tmp_path / "empty")
+
+
+def test_influxdb_has_its_time_and_wants_a_location(monkeypatch, refused):
+    for name in ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG"):
+        monkeypatch.delenv(name, raising=False)
+    with refused("time='utc'"):
+        read_source("influxdb://bucket/bus/volts", time="utc")
+    with refused("INFLUXDB_V2_URL"):
+        read_source("influxdb://bucket/bus/volts")
+
+
+def test_telemetry_to_pandas_and_back(refused):
+    timed = Telemetry(VALUES.astype(np.float32), 0.25, 2.5, "2020-03-01T06:00:00+00:00", "volts", "V")
+    series = to_series(timed)
+    assert (series.index == TIMES + pd.Timedelta("2.5s")).all() and (series.name, series.attrs["unit"]) == ("volts", "V")
+    back = from_series(series)
+    assert (back.values == timed.values).all() and (back.interval_s, back.name, back.unit) == (0.25, "volts", "V")
+    assert pd.Timestamp(back.start) + pd.Timedelta(seconds=back.offset_s) == series.index[0]
+    counted = to_series(Telemetry(VALUES.astype(np.float32), offset_s=7.0))
+    assert (counted.index[0], from_series(counted, unit="A").offset_s, from_series(counted, unit="A").unit) == (7, 7.0, "A")
+    for dirty, words in (
+        (series.drop(series.index[[4, 5]]), "gap"),
+        (pd.concat([series, series.iloc[:1]]), "sorted"),
+        (series.where(series.index != series.index[4]), "without a value"),
+        (series[~series.index.isin(series.index[10:30])], "gap"),
+    ):
+        with refused(words, "clean"):
+            from_series(dirty)
+    with refused("ndarray"):
+        to_series(VALUES)
+
+
+CELLS = [
+    "",
+    "1",
+    "2.5",
+    "-3",
+    "1,5",
+    "nan",
+    "x",
+    '"',
+    "2020-01-01",
+    "2020-01-01T00:00:01Z",
+    "01/02/20",
+    "12:00",
+    "1e999",
+    "9" * 30,
+    "inf",
+    "-",
+]
+CELLS += ["#", "\x00", "°", "True", "1.5 V", "1583000000", "1583000001000", "20200101", " ", "\ufeff", "2020-01-01 00:00:00+02:00", "NaT"]
+
+
+@pytest.mark.filterwarnings("error")
+@settings(derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+@given(
+    header=st.lists(st.sampled_from(["time", "a", "b", "", "t", "date", "1", "utc"]), max_size=4),
+    rows=st.lists(st.lists(st.sampled_from(CELLS), max_size=4), max_size=12),
+    form=st.tuples(st.sampled_from(",;\t"), st.sampled_from(["\n", "\r\n"]), st.sampled_from(["utf-8", "utf-16", "latin-1"])),
+    how=st.sampled_from(["refuse", "drop"]),
+)
+def test_any_table_gives_balanced_books_or_one_line(tmp_path, header, rows, form, how):
+    separator, end, encoding = form
+    (tmp_path / "a.csv").write_bytes(end.join(separator.join(row) for row in [header, *rows]).encode(encoding, "replace"))
+    options = Cleaning(on_bad_times=how, on_bad_values=how, min_part=1)
+    try:
+        for channel in read_source(tmp_path / "a.csv", options=options).values():
+            report = clean(channel, options).report
+            assert report.rows_in == len(channel) == report.rows_used + report.rows_left_out
+            assert report.samples == report.rows_used + report.samples_filled
+    except InputError as error:
+        assert str(error).startswith("Expected ") and len(str(error).splitlines()) == 1
