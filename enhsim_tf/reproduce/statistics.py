@@ -201,6 +201,8 @@ def wilcoxon_signed_rank(differences: np.ndarray) -> float:
     if differences.ndim != 1 or not len(differences) or not np.isfinite(differences).all():
         raise InputError(f"Expected finite differences of shape (replicates,). Received: {differences}.")
     differences = differences[differences != 0]
+    # scipy.stats.wilcoxon counts ties out up to 13 differences and takes a normal law beyond: of 20 that all are 1 it has a p-value of
+    # 7.7e-6 for 2 / 2^20 = 1.9e-6, of 40 one that is 140 times too large. Without ties the two agree.
     ranks = np.rint(2 * rankdata(np.abs(differences))).astype(int)  # doubled: those of ties are halves
     chance = np.zeros(ranks.sum() + 1)  # of each sum of the ranks with a plus
     chance[0] = 1

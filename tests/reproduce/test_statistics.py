@@ -224,6 +224,8 @@ def test_signed_ranks_with_ties_by_counting_all_signs():
 def test_the_least_p_values_that_few_replicates_can_reach():
     assert wilcoxon_signed_rank(np.arange(1.0, 11)) == pytest.approx(0.001953125)  # 2 / 2^10
     assert wilcoxon_signed_rank(-np.arange(1.0, 6)) == pytest.approx(0.0625)
+    for number in (5, 10, 20, 40):  # ties leave it what it is, also where SciPy takes a normal law
+        assert wilcoxon_signed_rank(np.ones(number)) == pytest.approx(2 / 2**number, rel=1e-9)
     assert wilcoxon_signed_rank(np.zeros(4)) == 1
     assert wilcoxon_signed_rank([1.0, -1.0]) == 1
 
