@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import filelock
+
 from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import read_json
@@ -37,19 +39,18 @@ def held(folder: Path) -> Iterator[None]:
         OSError: If it cannot be written to.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / _LOCK, "ab") as lock:  # no probe beside it: another run may be looking at what is there
-        try:
-            import fcntl
-        except ModuleNotFoundError:  # no such lock on Windows
-            yield
-            return
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"Expected a folder that no other run writes to. Received: {folder}. Wait for it, or name another.") from None
-        except OSError as error:
-            raise InputError(f"Expected a file system with locks. Received: {folder} ({error.strerror}). Name another --out.") from None
+    open(folder / _LOCK, "ab").close()  # no probe beside it: another run may be looking at what is there
+    lock = filelock.FileLock(folder / _LOCK, blocking=False, preserve_lock_file=True)  # or where there are no locks, a mark that stays
+    try:
+        lock.acquire()
+    except filelock.Timeout:
+        raise InputError(f"Expected a folder that no other run writes to. Received: {folder}. Wait for it, or name another.") from None
+    except OSError as error:
+        raise InputError(f"Expected a file system with locks. Received: {folder} ({error.strerror}). Name another --out.") from None
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def check_folder(folder: Path, plan: Plan) -> None:

@@ -1,5 +1,6 @@
 """Data sets: the same bytes whoever worked and however often it was stopped; what is damaged is found; reading them back."""
 
+import errno
 import importlib.metadata
 import itertools
 import json
@@ -20,6 +21,7 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.cli import generate_many as fleet_command
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.datasets import generate as fleet
+from enhsim_tf.datasets.folder import held
 from enhsim_tf.datasets.generate import generate_fleet, verify
 from enhsim_tf.datasets.plan import plan_of
 from enhsim_tf.datasets.scenario_file import Mix
@@ -246,13 +248,34 @@ def test_shards_of_a_larger_data_set_are_not_left_beside_a_smaller(undisturbed, 
 
 
 def test_what_looks_at_a_folder_writes_nothing_but_the_lock(tmp_path, refused):
-    from enhsim_tf.datasets.folder import held
-
     with held(tmp_path / "above" / "set"):
         assert os.listdir(tmp_path / "above" / "set") == [".lock"]
     (tmp_path / "file").touch()
     with refused("can be written to"):
         generate_fleet(tmp_path / "file" / "set", plan())
+
+
+@pytest.mark.parametrize("reason", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_told(reason, tmp_path, monkeypatch, refused):
+    import fcntl
+
+    def flock(file, operation):
+        raise OSError(reason, os.strerror(reason))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with refused("file system with locks", os.strerror(reason), "--out"), held(tmp_path):
+        pass
+    assert os.listdir(tmp_path) == [".lock"]
+
+
+def test_a_folder_is_held_against_the_same_process_too_and_let_go_of(tmp_path, refused):
+    with held(tmp_path), refused("no other run", "Wait"), held(tmp_path):
+        pass
+    with pytest.raises(KeyError), held(tmp_path):
+        raise KeyError
+    with held(tmp_path):
+        assert os.listdir(tmp_path) == [".lock"]
+    assert os.listdir(tmp_path) == [".lock"]
 
 
 def test_a_line_without_end_in_the_journal_takes_no_memory(undisturbed, tmp_path):
