@@ -1,4 +1,4 @@
-"""Settings in a YAML file: read with limits on size and depth, without aliases, tags or repeated keys, and checked key by key.
+"""Settings in a YAML file: read with limits on size and depth, without aliases, tags or repeated keys, and checked by pydantic.
 
 Every mistake is one line that names its place in the file, such as `scenarios[2].severity`; entries count from 1.
 """
@@ -6,120 +6,100 @@ Every mistake is one line that names its place in the file, such as `scenarios[2
 import collections
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import pydantic
+import yaml
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from enhsim_tf.common.errors import InputError
 
 _MOST_BYTES = 1_000_000
 _MOST_EVENTS = 20_000  # of the parser; a thousand scenarios with everything written out need 15,000
 _MOST_DEPTH = 10
-_TOLERANCE = 1e-6  # of a sum of shares
-_REQUIRED = object()
 
 
-class Place:
-    """A mapping of the file and where in it it stands.
+def refusal(expected: str, **about: Any) -> PydanticCustomError:
+    """What a validator raises.
 
     Args:
-        content: The mapping; anything else is refused.
-        file: Name of the file.
-        place: Where in it the mapping stands.
+        expected: What was expected, in the words of an `InputError`.
+        **about: `at`, the place below the one that is validated; `received`, where that is not what stands there.
+    """
+    if "received" in about:
+        about["received"] = _shown(about["received"])  # pydantic stumbles over text that no file can hold, such as half a character
+    return PydanticCustomError("expected", expected, about)
+
+
+class Expected:
+    """Annotates a field's type with the words for what is expected there, whatever it is that pydantic finds wrong.
+
+    Args:
+        what: The words.
     """
 
-    def __init__(self, content: Any, file: str, place: str = ""):
-        self.content, self.file, self.place = content, file, place
+    def __init__(self, what: str):
+        self.what = what
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: pydantic.GetCoreSchemaHandler) -> CoreSchema:
+        """The type's schema, with an error of its own."""
+        return core_schema.custom_error_schema(handler(source), "expected", custom_error_message=self.what)
+
+
+class Form(pydantic.BaseModel):
+    """Keys and values; nothing is converted, no other key is let pass, and an empty value is as good as none."""
+
+    model_config = pydantic.ConfigDict(strict=True, extra="forbid")
+
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _keys(cls, content: Any) -> dict[str, Any]:
         if not isinstance(content, dict):
-            raise self.refuse("keys and values, such as windows: 1000", content)
+            raise refusal("keys and values, such as windows: 1000")
+        for key in content:
+            if key not in cls.model_fields:
+                raise refusal(f"one of the keys {', '.join(cls.model_fields)}", received=key)
+        return {name: content.get(name) for name, field in cls.model_fields.items() if field.is_required() or content.get(name) is not None}
 
-    def refuse(self, expected: str, received: Any, key: str = "") -> InputError:
-        """The error for what stands at a key.
 
-        Args:
-            expected: What was expected there.
-            received: What stands there instead.
-            key: The key; none is the mapping itself.
-        """
-        where = ".".join(part for part in (self.place, key) if part)
-        return InputError(f"Expected {expected}{f' at {where}' if where else ''} in {self.file!r}. Received: {_shown(received)}.")
+_FormT = TypeVar("_FormT", bound=Form)
 
-    def allow(self, *keys: str) -> None:
-        """Refuses any other key."""
-        for key in self.content:
-            if key not in keys:
-                raise self.refuse(f"one of the keys {', '.join(keys)}{'' if self.place else ' at the top'}", key)
 
-    def get(self, key: str, default: Any = None) -> Any:
-        """What stands at a key; an empty one is as good as none."""
-        found = self.content.get(key)
-        return default if found is None else found
+def load_settings(path: str | os.PathLike, form: type[_FormT]) -> _FormT:
+    """Reads a YAML file of keys and values.
 
-    def number(self, key: str, low: float, high: float, default: Any = _REQUIRED) -> float:
-        """A number from `low` to `high`.
+    Args:
+        path: The file.
+        form: What its keys and values are.
 
-        Args:
-            key: The key.
-            low: The lowest number allowed.
-            high: The highest.
-            default: Taken where there is none; without it, a number has to be there.
-        """
-        return self._check(self.get(key, None if default is _REQUIRED else default), key, low, high)
+    Raises:
+        InputError: If it cannot be read, is no plain YAML, is larger or deeper than settings are, or is not of the form.
+    """
+    path = Path(path)
+    content = _load(path)
+    try:
+        return form.model_validate(content)
+    except pydantic.ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+    about = first.get("ctx", {})
+    place, received = _at(content, (*first["loc"], *about.get("at", ())))
+    expected = first["msg"]
+    if first["type"] == "list_type":
+        expected = "a list, each entry after a dash"
+    if first["type"] == "too_long":
+        expected, received = f"at most {about['max_length']:,} entries", len(received)
+    raise InputError(f"Expected {expected} at {place} in {path.name!r}. Received: {about.get('received') or _shown(received)}.")
 
-    def range(self, key: str, high: float, default: Any = _REQUIRED) -> tuple[float, float]:
-        """A number from 0 to `high`, or two, the lower first.
 
-        Args:
-            key: The key.
-            high: The highest number allowed.
-            default: Taken where there is none; without it, something has to be there.
-        """
-        found = self.get(key, None if default is _REQUIRED else default)
-        if not isinstance(found, list | tuple):
-            return (self._check(found, key, 0, high, " or [low, high]"),) * 2
-        if len(found) != 2:
-            raise self.refuse("a number or [low, high]", found, key)
-        lowest, highest = (self._check(each, f"{key}[{number}]", 0, high) for number, each in enumerate(found))
-        if lowest > highest:
-            raise self.refuse("[low, high], the lower first", found, key)
-        return lowest, highest
-
-    def whole(self, key: str, low: int, high: int) -> int | None:
-        """A whole number from `low` to `high`, or None where there is none.
-
-        Args:
-            key: The key.
-            low: The lowest number allowed.
-            high: The highest.
-        """
-        found = self.get(key)
-        if found is not None and (type(found) is not int or not low <= found <= high):
-            raise self.refuse(f"a whole number from {low:,} to {high:,}", found, key)
-        return found
-
-    def text(self, key: str, default: str | None = None) -> str:
-        """A text of 1 to 200 printable characters."""
-        found = self.get(key, default)
-        if not isinstance(found, str) or not 1 <= len(found) <= 200 or not found.isprintable():
-            raise self.refuse("a text of 1 to 200 printable characters", found, key)
-        return found
-
-    def children(self, key: str, most: int) -> list["Place"]:
-        """The mappings of a list; none where there is none."""
-        found = self.get(key, [])
-        if not isinstance(found, list):
-            raise self.refuse("a list, each entry after a dash", found, key)
-        if len(found) > most:
-            raise self.refuse(f"at most {most:,} entries", len(found), key)
-        return [Place(each, self.file, f"{key}[{number}]") for number, each in enumerate(found, 1)]
-
-    def add_up(self, what: str, total: float) -> None:
-        """Refuses shares that do not add up to one."""
-        if abs(total - 1) > _TOLERANCE:
-            raise self.refuse(f"{what} to add up to 1", round(total, 9))
-
-    def _check(self, found: Any, key: str, low: float, high: float, other: str = "") -> float:
-        if type(found) not in (int, float) or not low <= found <= high:
-            raise self.refuse(f"a number from {low} to {high}{other}", found, key)
-        return float(found)
+def _at(content: Any, place: tuple[str | int, ...]) -> tuple[str, Any]:
+    """The name of a place, and what stands there; a number may stand where there could be a list of them."""
+    names = ""
+    for part in place:
+        if isinstance(content, list):
+            names, content = f"{names}[{part + 1}]", content[part]
+        elif isinstance(content, dict) and isinstance(part, str):
+            names, content = f"{names}.{part}", content.get(part)
+    return names.removeprefix(".") or "the top", content
 
 
 def _shown(received: Any) -> str:
@@ -132,27 +112,19 @@ def _shown(received: Any) -> str:
     return text if len(text) <= 80 else f"{text[:80]}..."
 
 
-def load_settings(path: str | os.PathLike) -> "Place":
-    """Reads a YAML file of keys and values.
+class _Loader(yaml.SafeLoader):
+    """The safe loader, without repeated keys."""
 
-    Raises:
-        InputError: If it cannot be read, is no plain YAML, or is larger or deeper than settings are.
-    """
-    import yaml
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        twice = [key for key, count in collections.Counter(keys).items() if count > 1]
+        if twice:
+            raise yaml.constructor.ConstructorError(problem=f"the key {twice[0][:40]!r} stands there twice", problem_mark=node.start_mark)
+        return super().construct_mapping(node, deep)
 
-    class Loader(yaml.SafeLoader):
-        """The safe loader, without repeated keys."""
 
-        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-            keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-            twice = [key for key, count in collections.Counter(keys).items() if count > 1]
-            if twice:
-                raise yaml.constructor.ConstructorError(
-                    problem=f"the key {twice[0][:40]!r} stands there twice", problem_mark=node.start_mark
-                )
-            return super().construct_mapping(node, deep)
-
-    path = Path(path)
+def _load(path: Path) -> Any:
+    """What a YAML file holds."""
     try:
         with open(path, "rb") as file:
             raw = file.read(_MOST_BYTES + 1)
@@ -164,18 +136,16 @@ def load_settings(path: str | os.PathLike) -> "Place":
     try:
         text = raw.decode("utf-8-sig")
         depth = 0
-        for number, event in enumerate(yaml.parse(text, Loader)):
+        for number, event in enumerate(yaml.parse(text, _Loader)):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             bad = isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) or getattr(event, "tag", None)
             if bad or depth > _MOST_DEPTH or number > _MOST_EVENTS:
                 problem = "an alias, anchor or tag" if bad else "more or deeper than settings are"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
-        content = yaml.load(text, Loader)
+        return yaml.load(text, _Loader)
     except yaml.MarkedYAMLError as error:
         where = "" if error.problem_mark is None else f" in line {error.problem_mark.line + 1}"
         reason = f"{' '.join(str(error.problem or error.context).split())[:120]}{where}"
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # a date or a number that is none, bytes that are no text
         reason = " ".join(str(error).split())[:120]
-    else:
-        return Place(content, path.name)
     raise InputError(f"Expected settings in plain YAML, as in docs/scenarios.md. Received: {path.name!r}, {reason}.")

@@ -1,6 +1,8 @@
 """The scenario file: what it means, every mistake with its place, and nothing that a hostile one could do."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -75,13 +77,19 @@ def changed(*path, to):
 MISTAKES = {
     "an unknown key": (changed("window", to=5), ["at the top", "window"]),
     "an unknown key inside": (changed("scenarios", 1, "weight", to=1), ["scenarios[2]", "weight"]),
+    "a key of half a character": ('windows: 1\n"\\ud800": 1\n', ["at the top", "ud800"]),
+    "such a key inside": (changed("models", 0, "\ud800", to=1), ["models[1]", "ud800"]),
+    "such a folder": (changed("models", 0, "folder", to="\ud800"), ["models[1].folder", "ud800"]),
+    "such a mode": (changed("scenarios", 1, "mode", to="\ud800"), ["scenarios[2].mode", "ud800"]),
+    "a key that is no text": (changed("scenarios", 1, 5, to=1), ["scenarios[2]", "5"]),
+    "a mapping as a number": (changed("scenarios", 1, "severity", to={0: 1}), ["at scenarios[2].severity in", "{0: 1}"]),
     "an unknown mode": (changed("scenarios", 0, "mode", to="stick"), ["scenarios[1].mode", "stuck", "stick"]),
     "no mode": (changed("scenarios", 0, "mode", to=None), ["scenarios[1].mode", "nothing"]),
     "no severity": (changed("scenarios", 1, "severity", to=None), ["scenarios[2].severity"]),
     "a severity too large": (changed("scenarios", 1, "severity", to=1.5), ["scenarios[2].severity", "1.5"]),
     "a range too long": (changed("scenarios", 0, "severity", to=[0, 0.5, 1]), ["scenarios[1].severity"]),
     "a range upside down": (changed("scenarios", 0, "severity", to=[0.9, 0.2]), ["scenarios[1].severity", "lower first"]),
-    "a range of text": (changed("scenarios", 0, "severity", to=[0, "high"]), ["scenarios[1].severity[1]", "high"]),
+    "a range of text": (changed("scenarios", 0, "severity", to=[0, "high"]), ["scenarios[1].severity[2]", "high"]),
     "an onset at the end": (changed("scenarios", 0, "onset", to=1), ["scenarios[1].onset"]),
     "no number": (changed("scenarios", 0, "share", to=float("nan")), ["scenarios[1].share", "nan"]),
     "true as a number": (changed("nominal", to=True), ["nominal", "True"]),
@@ -124,6 +132,12 @@ def test_mistakes_are_named_with_their_place(name, tmp_path, refused):
     content, words = MISTAKES[name]
     with refused(*words):
         read_mix(written(tmp_path / "mix.yaml", content))
+
+
+def test_pydantic_is_loaded_by_who_reads_a_file_and_nobody_else():
+    code = "import sys, enhsim_tf.cli.main, enhsim_tf.cli.generate_many, enhsim_tf.datasets.generate; print({'pydantic', 'yaml'} & set(sys.modules))"
+    ended = subprocess.run([sys.executable, "-c", code], cwd=DOCS.parents[1], capture_output=True, text=True)
+    assert (ended.stdout, ended.stderr) == ("set()\n", "")
 
 
 def test_files_that_cannot_be_read(tmp_path, refused):
