@@ -2,6 +2,8 @@
 
 Plain actors and not Ray Data: what travels are items there and records back, which need no blocks, no plan and no read
 tasks that wait for a CPU which the actors hold; and a lost actor is replaced by the same few lines as a lost process.
+Nor Ray's own restarts, which count all deaths of an actor and not those in a row: measured with 2.60, `max_restarts=5` gives up after six
+deaths with work finished between all of them, and `max_restarts=-1` starts what dies as it begins without end (24 times in 45 s).
 """
 
 import collections
