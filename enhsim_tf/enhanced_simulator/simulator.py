@@ -3,11 +3,7 @@
 It puts the rooms below together and trains none of their networks by hand.
 """
 
-import dataclasses
-import itertools
-import operator
 import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -15,29 +11,25 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, units_of
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
+from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network as enhancer_network
-from enhsim_tf.enhancer.training_pairs import Pairs, at_level, cut_pairs, cut_parts, even_places, random_places, set_by_shape, split_off
+from enhsim_tf.enhancer.training_pairs import Pairs, at_level, cut_pairs, random_places, set_by_shape
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
-from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN, num_overlapping
-from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.telemetry.parquet_store import write_windows
-from enhsim_tf.telemetry.series import Telemetry, check_telemetry, check_values
+from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows
 
-_NUM_PHASES, _ROUNDS = 400, 3  # of a period, at which shapes are compared; trainings between which the clock is set anew
-_NUM_LEVELS = 500  # times at which level and amplitude are remembered, at most
-_CHUNK = 4_096  # windows generated at a time
-_START_RANGE = 1_000_000  # samples; windows begin at a random one of these, so at every phase of the waves
+_NUM_PHASES = 400  # phases of one period at which a window is compared with the enhanced waveform
+_CHUNK = 4_096  # number of windows generated at a time
+_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 
-# what `EnhancedSimulator.fit` is to be given to do what the paper does
+# arguments of `EnhancedSimulator.fit` that reproduce the paper
 PAPER: Mapping[str, Any] = MappingProxyType(
     {"num_windows": 1_500, "epochs": 40, "noise": "paper", "extraction": "moving average", "decay": False}
 )
@@ -90,119 +82,78 @@ class EnhancedSimulator:
         cls,
         telemetry: Telemetry | Sequence[Telemetry],
         coarse: SquareWaveSimulator | None = None,
-        seed: int = 0,
-        num_windows: int = 15_000,
-        epochs: int = 2,
-        num_iterations: int = 1_000,
-        moving_average: int = 25,
-        normalise: bool = True,
-        window: int = 500,
-        noise: str = "convolutional",
-        extraction: str = "enhancer",
-        held_out: float = 0.0,
-        decay: bool = True,
-        follow: bool = False,
+        seed: int = TrainingSettings.seed,
+        num_windows: int = TrainingSettings.num_windows,
+        epochs: int = TrainingSettings.epochs,
+        num_iterations: int = TrainingSettings.num_iterations,
+        moving_average: int = TrainingSettings.moving_average,
+        normalise: bool = TrainingSettings.normalise,
+        window: int = TrainingSettings.window,
+        noise: str = TrainingSettings.noise,
+        extraction: str = TrainingSettings.extraction,
+        held_out: float = TrainingSettings.held_out,
+        decay: bool = TrainingSettings.decay,
+        follow: bool = TrainingSettings.follow,
         verbose: int | str = "auto",
         progress: Progress = SILENT,
     ) -> "EnhancedSimulator":
         """Trains both networks on nominal telemetry.
 
-        The defaults are not the paper's. Its generator repeats one pattern, and its moving average takes slow noise away
-        with the signal: detectors trained on the result take real telemetry for anomalous. Trained on what these defaults
-        make, with as many iterations, they hardly do so more often than detectors trained on real telemetry: docs/REPORT.md
-        has the experiment. What the paper does is `fit(telemetry, **PAPER)`.
+        The defaults differ from the paper's settings, which are `fit(telemetry, **PAPER)`. The paper's generator repeats
+        one pattern, and the paper's moving average removes slow noise together with the signal, so detectors trained on
+        its output flag real telemetry as anomalous. With the defaults, and as many adversarial iterations, detectors
+        flag real telemetry about as rarely as detectors trained on real telemetry do; see docs/REPORT.md.
 
         Args:
-            telemetry: Nominal telemetry, at least eight windows long, or two with the moving average; where it has gaps, its
-                stretches on one clock.
-            coarse: The coarse simulator, configured like the telemetry; None fits square waves to its longest stretch.
-            seed: Seed of everything drawn.
-            num_windows: Training windows, cut at random offsets.
-            epochs: Passes of the enhancer over the windows.
-            num_iterations: Adversarial iterations of the noise networks.
-            moving_average: Width of the moving average that separates noise, in samples.
-            normalise: Whether the networks see the telemetry in units of the coarse simulator's levels, and its noise at
-                the scale of the paper's; False leaves values as they are, as the paper does.
-            window: Samples of a window.
-            noise: The networks that learn the noise: `paper`, or `convolutional`, which fill the space.
-            extraction: What the noise is: what the `moving average` leaves of the telemetry, as in the paper, or what the
-                `enhancer` leaves of it. A moving average takes slow noise away with the signal.
-            held_out: With extraction by the enhancer: share of the telemetry, its end, that the enhancer does not learn
-                from and that the noise comes from. 0 takes both from all of it, which is right where many windows, in few
-                epochs, and coarse windows that repeat leave the enhancer no way to remember the noise of any.
-            decay: Whether the enhancer's learning rate falls to zero along a cosine, instead of staying as in the paper:
-                at a constant rate, the noise of the last batches stays in the weights.
-            follow: Whether the coarse simulator is set to the clock, level and amplitude of each window before the enhancer
-                learns it, for telemetry that drifts away from a fixed simulator. The epochs are done in three rounds; from
-                the second on, clock and levels are set by the enhanced shape. The levels are kept and drawn from again.
+            telemetry: Nominal telemetry, or the parts between its gaps on a common clock. Its length must be at least eight
+                windows, or two windows with `extraction="moving average"`.
+            coarse: The coarse simulator. None fits square waves to the longest part of the telemetry.
+            seed: Random seed of the training.
+            num_windows: Number of training windows, cut at random offsets.
+            epochs: Passes of the enhancer over the training windows.
+            num_iterations: Adversarial iterations of the noise networks; 0 leaves them untrained.
+            moving_average: Width in samples of the moving average that separates the noise from the signal.
+            normalise: Whether both networks are trained on normalised values: the enhancer in units of the coarse
+                simulator's levels, the noise networks at the paper's noise amplitude. False passes the values unchanged,
+                as in the paper.
+            window: Length of a window in samples.
+            noise: Networks that learn the noise: `paper`, or `convolutional`, whose generator has full-rank output.
+            extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
+                telemetry, as in the paper; `enhancer` subtracts the enhanced signal and so keeps slow noise.
+            held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction
+                only and not for training the enhancer. It applies to extraction by the enhancer. 0 uses all telemetry
+                for both, which is safe with many windows, few epochs and periodic coarse windows: the enhancer then
+                cannot memorise the noise of single windows.
+            decay: Whether the enhancer's learning rate falls to zero along a cosine. With a constant rate, as in the paper,
+                the weights keep the noise of the last batches.
+            follow: Whether the coarse simulator is aligned in time, offset and gain with each window before the enhancer
+                learns from that window. This is for telemetry that drifts away from a fixed simulator. The epochs are
+                split into up to three rounds; from the second round on, windows are aligned using the enhanced waveform.
+                Offsets and gains are stored, and generated windows sample from them.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
-            progress: Tells in lines how far both trainings are.
+            progress: Reports the progress of both trainings as lines of text.
 
         Returns:
             The trained simulator.
 
         Raises:
-            InputError: If the telemetry is none, not finite, constant or shorter than two windows, or if a count is too small.
+            InputError: If the telemetry is empty, not finite, constant or too short, or if a setting is out of range.
         """
-        parts = _parts_of(telemetry)
-        _check_counts(window=(window, 2), num_windows=(num_windows, 1), epochs=(epochs, 1), num_iterations=(num_iterations, 0))
-        if noise not in ("paper", "convolutional") or extraction not in ("moving average", "enhancer") or not 0 <= held_out < 1:
-            raise InputError(
-                "Expected noise to be paper or convolutional, extraction to be moving average or enhancer, 0 <= held_out < 1. "
-                f"Received: noise={noise!r}, extraction={extraction!r}, held_out={held_out}."
-            )
-        by_enhancer, values = extraction == "enhancer", np.concatenate([part.values for part in parts])
-        check_values(values, parts[0].name, (8 if by_enhancer else 2) * window)
-        averaged = [] if by_enhancer else _extracted(parts, moving_average, window)
-        coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
-        offset, scale = units_of(coarse) if normalise else (0.0, 1.0)
-        rng = np.random.default_rng(seed)
-        bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
-
-        learnt, rest = split_off(parts, held_out if by_enhancer else 0.0)
-        pairs = cut_pairs(learnt, coarse, random_places(learnt, window, num_windows, rng), window, follow)
-        network = enhancer_network.build_enhancer(window, seed=seed)
-        simulator = cls(coarse, network, None, parts[0].interval_s, offset, scale, levels=[[0.0, 1.0]] if follow else None)
-        rounds, told = min(_ROUNDS, epochs) if follow else 1, progress.loop("enhancer, epoch", epochs)
-        ends = np.linspace(0, epochs, rounds + 1).astype(int).tolist()
-        for number, (begin, end) in enumerate(itertools.pairwise(ends)):
-            epochs_now, callbacks = end - begin, [EpochsDone(told.within(begin))]
-            pairs = simulator._set_by_shape(pairs) if number else pairs
-            pairs = pairs.clear() if follow else pairs
-            rate = keras.optimizers.schedules.CosineDecay(0.001, epochs_now * -(-len(pairs) // 15)) if decay else 0.001
-            source, target = ((windows - offset) / scale for windows in (pairs.coarse, pairs.target_in_unit))
-            fit_windows(network, source, target, epochs_now, 15, seed + number, rate, callbacks=callbacks, verbose=bars)
-        if follow:
-            seen = simulator.pairs(parts, even_places(parts, window, _NUM_LEVELS)).clear()
-            simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
-        simulator.trained = {
-            "telemetry": parts[0].name,
-            "num_samples": len(values),
-            "seed": seed,
-            "num_windows": num_windows,
-            "epochs": epochs,
-            "num_iterations": num_iterations,
-            "moving_average": moving_average,
-            "noise": noise,
-            "extraction": extraction,
-            "held_out": held_out,
-            "decay": decay,
-            "follow": follow,
-        }
-        draw = np.random.default_rng([seed, 1])
-        if by_enhancer:
-            noise_windows = simulator.residual_windows(rest, num_windows, draw)
-        else:
-            noise_windows, _ = cut_parts(averaged, random_places(averaged, window, num_windows, draw), window)
-        if noise == "convolutional":
-            simulator.noise = convolutional_noise_gan(noise_windows, num_iterations, seed)
-        else:
-            noise_scale = noise_unit(noise_windows) if normalise else 1.0
-            pair = build_generator(window, seed=seed), build_discriminator(window, seed=seed)
-            simulator.noise = NoiseGAN(*pair, scale=noise_scale, seed=seed)
-        told = progress.loop("noise GAN, iteration", num_iterations)
-        simulator.noise.fit(noise_windows, num_iterations, verbose=None if verbose == "auto" else bool(verbose), on_iteration=told)
-        return simulator
+        settings = TrainingSettings(
+            seed=seed,
+            num_windows=num_windows,
+            epochs=epochs,
+            num_iterations=num_iterations,
+            moving_average=moving_average,
+            normalise=normalise,
+            window=window,
+            noise=noise,
+            extraction=extraction,
+            held_out=held_out,
+            decay=decay,
+            follow=follow,
+        )
+        return train(cls, telemetry, coarse, settings, verbose, progress)
 
     def residual_windows(self, telemetry: Telemetry | Sequence[Telemetry], num_windows: int, rng: np.random.Generator) -> np.ndarray:
         """What the enhanced signal leaves of telemetry: its noise, and what the simulator does not know.
@@ -216,8 +167,8 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
-        parts = _parts_of(telemetry)
-        _check_counts(num_windows=(num_windows, 0))
+        parts = check_parts(telemetry)
+        check_counts(num_windows=(num_windows, 0))
         pairs = self.pairs(parts, random_places(parts, self.window, num_windows, rng))
         return pairs.target - self.follow(pairs)
 
@@ -228,11 +179,18 @@ class EnhancedSimulator:
             telemetry: Telemetry, or its stretches.
             places: Where each window begins, counted over the stretches as `pairs.num_places` counts.
         """
-        pairs = cut_pairs(_parts_of(telemetry), self.coarse, places, self.window, self.levels is not None)
-        return pairs if self.levels is None else self._set_by_shape(pairs)
+        pairs = cut_pairs(check_parts(telemetry), self.coarse, places, self.window, self.levels is not None)
+        return pairs if self.levels is None else self.align_to_enhanced(pairs)
 
-    def _set_by_shape(self, pairs: Pairs) -> Pairs:
-        """Pairs set by the enhanced shape; sums of several waves do not repeat, so they stay as their edges set them."""
+    def align_to_enhanced(self, pairs: Pairs) -> Pairs:
+        """Realigns the phase, offset and gain of pairs using the enhanced waveform.
+
+        Args:
+            pairs: Pairs of windows that are aligned with the coarse simulator.
+
+        Returns:
+            The realigned pairs; the same pairs if the coarse simulator is a sum of several waves, which is not periodic.
+        """
         if len(self.coarse.waves) > 1:
             return pairs
         phases = self.coarse.waves[0].period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
@@ -256,7 +214,7 @@ class EnhancedSimulator:
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Seed of everything drawn; the same seed gives the same.
         """
-        _check_counts(num_windows=(num_windows, 0))
+        check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
         begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         coarse = self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
@@ -298,7 +256,7 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or no whole number.
         """
-        _check_counts(num_windows=(num_windows, 0))
+        check_counts(num_windows=(num_windows, 0))
         windows, filled = np.empty((num_windows, self.window), np.float32), 0
         for chunk in self.generate_chunks(num_windows, scenario, seed):
             windows[filled : filled + len(chunk)] = chunk
@@ -330,7 +288,7 @@ class EnhancedSimulator:
         return np.concatenate(chunks) if chunks else np.empty((0, self.window), np.float32)
 
     def _clean_chunks(self, num_windows: int, scenario: Degraded | None, seed: int) -> Iterator[np.ndarray]:
-        _check_counts(num_windows=(num_windows, 0))
+        check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
         begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         for first in range(0, num_windows, _CHUNK):
@@ -365,7 +323,7 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_samples,)`, in the telemetry's unit.
         """
-        _check_counts(num_samples=(num_samples, 1))
+        check_counts(num_samples=(num_samples, 1))
         window, hop = self.window, self.window // 2
         num_windows = num_overlapping(num_samples, window)
         length = window + (num_windows - 1) * hop
@@ -426,38 +384,6 @@ class EnhancedSimulator:
         noise = NoiseGAN(networks["generator"], networks["discriminator"], **settings["noise"])
         units = settings["interval_s"], settings["offset"], settings["scale"], settings.get("levels")
         return cls(coarse, networks["enhancer"], noise, *units, settings["trained"])
-
-
-def _parts_of(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
-    """The stretches of a series, each checked; a whole series is one."""
-    parts = [telemetry] if isinstance(telemetry, Telemetry) or not isinstance(telemetry, Sequence) else list(telemetry)
-    for part in parts:
-        check_telemetry(part)
-    if len({part.interval_s for part in parts}) != 1:
-        raise InputError(f"Expected stretches of one sampling interval. Received: {sorted({part.interval_s for part in parts})}.")
-    return parts
-
-
-def _extracted(parts: Sequence[Telemetry], width: int, window: int) -> list[Telemetry]:
-    """The noise that a moving average leaves of each stretch that is long enough for a window of it."""
-    long_enough = [part for part in parts if len(part) >= window + width - 1]
-    if not long_enough:
-        raise InputError(
-            f"Expected a stretch of {window + width - 1} samples: a window of {window} and what a moving average of width {width} cuts off. "
-            f"Received: {max(map(len, parts))}. Give a longer one."
-        )
-    return [dataclasses.replace(part, values=extract_noise(part.values, width)[0]) for part in long_enough]
-
-
-def _check_counts(**counts: tuple[Any, int]) -> None:
-    """Refuses a count that is no whole number or below its least; each is given with it."""
-    for name, (count, least) in counts.items():
-        try:
-            is_enough = operator.index(count) >= least
-        except TypeError:
-            is_enough = False
-        if not is_enough:
-            raise InputError(f"Expected {name} to be a whole number, at least {least}. Received: {name}={count!r}.")
 
 
 def _noise_rng(seed: int) -> np.random.Generator:

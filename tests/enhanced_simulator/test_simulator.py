@@ -14,8 +14,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator import simulator as enhanced_simulator
-from enhsim_tf.enhanced_simulator import simulator as simulator_module
+from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.simulator import PAPER, EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.enhancer.training_pairs import cut_pairs, even_places
@@ -356,7 +355,7 @@ def measured(number=1_500):
 @pytest.fixture
 def small_batches(monkeypatch):
     """A step of the noise networks on 200 rows takes long to trace."""
-    monkeypatch.setattr(enhanced_simulator, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
+    monkeypatch.setattr(training, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
 
 
 def fitted(seed=0, **arguments):
@@ -575,7 +574,7 @@ def test_fit_refuses_less_than_two_windows(refused):
 
 @pytest.mark.parametrize("width", [4, 1, 2_000])
 def test_a_moving_average_of_a_wrong_width_is_refused_before_training(monkeypatch, width):
-    monkeypatch.setattr(simulator_module, "fit_windows", lambda *arguments, **options: pytest.fail("trained first"))
+    monkeypatch.setattr(training, "fit_windows", lambda *arguments, **options: pytest.fail("trained first"))
     values = np.sin(np.arange(1_500) / 5).astype(np.float32)
     with pytest.raises(InputError, match="width|window"):
         EnhancedSimulator.fit(Telemetry(values), window=60, moving_average=width, **PAPER)

@@ -1,0 +1,47 @@
+"""Checks of the arguments that the methods of the enhanced simulator and its training share."""
+
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.series import Telemetry, check_telemetry
+
+
+def check_counts(**counts: tuple[Any, int]) -> None:
+    """Checks that counts are whole numbers and large enough.
+
+    Args:
+        **counts: For each argument, its name with a tuple `(value, minimum)`.
+
+    Raises:
+        InputError: If a value is not a whole number or is below its minimum.
+    """
+    for name, (count, minimum) in counts.items():
+        try:
+            is_large_enough = operator.index(count) >= minimum
+        except TypeError:
+            is_large_enough = False
+        if not is_large_enough:
+            raise InputError(f"Expected {name} to be a whole number, at least {minimum}. Received: {name}={count!r}.")
+
+
+def check_parts(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
+    """Checks a series, or the parts between its gaps, and returns a list of parts.
+
+    Args:
+        telemetry: One series, or the parts of one series on a common clock.
+
+    Returns:
+        The parts; a single series becomes a list of one part.
+
+    Raises:
+        InputError: If a part is not valid telemetry, or if the parts have different sampling intervals.
+    """
+    parts = [telemetry] if isinstance(telemetry, Telemetry) or not isinstance(telemetry, Sequence) else list(telemetry)
+    for part in parts:
+        check_telemetry(part)
+    intervals = {part.interval_s for part in parts}
+    if len(intervals) != 1:
+        raise InputError(f"Expected all parts to have the same sampling interval. Received: {sorted(intervals)}.")
+    return parts

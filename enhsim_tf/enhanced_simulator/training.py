@@ -1,0 +1,206 @@
+"""Training of an enhanced simulator: the enhancer (section 2.2 of the paper), then the noise networks (section 2.3).
+
+`EnhancedSimulator.fit` is the public entry point; this module contains the steps.
+"""
+
+import dataclasses
+import itertools
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, units_of
+from enhsim_tf.common.console import SILENT, Progress
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
+from enhsim_tf.enhancer import network as enhancer_network
+from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, cut_parts, even_places, random_places, split_off
+from enhsim_tf.keras_tools.backend import keras
+from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
+from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+from enhsim_tf.noise.discriminator import build_discriminator
+from enhsim_tf.noise.extraction import extract_noise, noise_unit
+from enhsim_tf.noise.gan import NoiseGAN
+from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.telemetry.series import Telemetry, check_values
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+_ROUNDS = 3  # with `follow`: rounds of enhancer training; the windows are aligned again between two rounds
+_NUM_LEVELS = 500  # with `follow`: maximum number of windows whose shift and gain are stored in the simulator
+_BATCH_SIZE, _LEARNING_RATE = 15, 0.001  # of the enhancer, as in the paper
+_MIN_WINDOWS = {"moving average": 2, "enhancer": 8}  # minimum length of the telemetry in windows, for each extraction
+
+
+@dataclasses.dataclass(frozen=True)
+class TrainingSettings:
+    """Settings of `EnhancedSimulator.fit`.
+
+    Args:
+        seed: Random seed of the training.
+        num_windows: Number of training windows, cut at random offsets.
+        epochs: Passes of the enhancer over the training windows.
+        num_iterations: Adversarial iterations of the noise networks; 0 leaves them untrained.
+        moving_average: Width in samples of the moving average that separates the noise from the signal.
+        normalise: Whether both networks are trained on normalised values: the enhancer in units of the coarse simulator's
+            levels, the noise networks at the paper's noise amplitude. False passes the values unchanged, as in the paper.
+        window: Length of a window in samples.
+        noise: Networks that learn the noise: `paper`, or `convolutional`, whose generator has full-rank output.
+        extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
+            telemetry, as in the paper; `enhancer` subtracts the enhanced signal.
+        held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction only
+            and not for training the enhancer. It applies to extraction by the enhancer. 0 uses all telemetry for both.
+        decay: Whether the enhancer's learning rate falls to zero along a cosine; False keeps it constant, as in the paper.
+        follow: Whether the coarse simulator is aligned in time, offset and gain with each window before the enhancer
+            learns from that window. This is for telemetry that drifts away from a fixed simulator.
+
+    Raises:
+        InputError: If a count is too small, a choice is unknown or `held_out` is out of range.
+    """
+
+    seed: int = 0
+    num_windows: int = 15_000
+    epochs: int = 2
+    num_iterations: int = 1_000
+    moving_average: int = 25
+    normalise: bool = True
+    window: int = 500
+    noise: str = "convolutional"
+    extraction: str = "enhancer"
+    held_out: float = 0.0
+    decay: bool = True
+    follow: bool = False
+
+    def __post_init__(self):
+        check_counts(
+            window=(self.window, 2), num_windows=(self.num_windows, 1), epochs=(self.epochs, 1), num_iterations=(self.num_iterations, 0)
+        )
+        if self.noise not in ("paper", "convolutional") or self.extraction not in _MIN_WINDOWS or not 0 <= self.held_out < 1:
+            raise InputError(
+                "Expected noise to be paper or convolutional, extraction to be moving average or enhancer, 0 <= held_out < 1. "
+                f"Received: noise={self.noise!r}, extraction={self.extraction!r}, held_out={self.held_out}."
+            )
+
+
+def train(
+    create: Callable[..., "EnhancedSimulator"],
+    telemetry: Telemetry | Sequence[Telemetry],
+    coarse: SquareWaveSimulator | None,
+    settings: TrainingSettings,
+    verbose: int | str = "auto",
+    progress: Progress = SILENT,
+) -> "EnhancedSimulator":
+    """Trains an enhanced simulator on nominal telemetry.
+
+    Args:
+        create: The simulator's class, called with the arguments of `EnhancedSimulator`.
+        telemetry: Nominal telemetry, or the parts between its gaps on a common clock.
+        coarse: The coarse simulator. None fits square waves to the longest part.
+        settings: Settings of the training.
+        verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
+        progress: Reports the progress of both trainings.
+
+    Returns:
+        The trained simulator.
+
+    Raises:
+        InputError: If the telemetry is invalid, constant or too short.
+    """
+    parts = check_parts(telemetry)
+    values = np.concatenate([part.values for part in parts])
+    check_values(values, parts[0].name, _MIN_WINDOWS[settings.extraction] * settings.window)
+    by_enhancer = settings.extraction == "enhancer"
+    averaged = [] if by_enhancer else _subtract_moving_average(parts, settings)  # before training, so that a wrong width fails early
+    simulator = _build(create, parts, coarse, settings)
+    learnt, rest = split_off(parts, settings.held_out if by_enhancer else 0.0)
+    _train_enhancer(simulator, learnt, settings, verbose, progress)
+    if settings.follow:
+        seen = simulator.pairs(parts, even_places(parts, settings.window, _NUM_LEVELS)).clear()
+        simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
+    simulator.trained = _training_record(parts[0].name, len(values), settings)
+    rng = np.random.default_rng([settings.seed, 1])
+    if by_enhancer:
+        noise_windows = simulator.residual_windows(rest, settings.num_windows, rng)
+    else:
+        noise_windows, _ = cut_parts(averaged, random_places(averaged, settings.window, settings.num_windows, rng), settings.window)
+    simulator.noise = _train_noise(noise_windows, settings, verbose, progress)
+    return simulator
+
+
+def _build(
+    create: Callable[..., "EnhancedSimulator"], parts: Sequence[Telemetry], coarse: SquareWaveSimulator | None, settings: TrainingSettings
+) -> "EnhancedSimulator":
+    """Builds a simulator whose enhancer is untrained and whose noise networks are missing."""
+    coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
+    network = enhancer_network.build_enhancer(settings.window, seed=settings.seed)
+    offset, scale = units_of(coarse) if settings.normalise else (0.0, 1.0)
+    levels = [[0.0, 1.0]] if settings.follow else None  # replaced once the enhancer is trained
+    return create(coarse, network, None, parts[0].interval_s, offset, scale, levels)
+
+
+def _train_enhancer(
+    simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: TrainingSettings, verbose: int | str, progress: Progress
+) -> None:
+    """Trains the enhancer in one round, or with `follow` in several rounds with the windows aligned again in between."""
+    places = random_places(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
+    pairs = cut_pairs(parts, simulator.coarse, places, settings.window, settings.follow)
+    show_bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
+    rounds = min(_ROUNDS, settings.epochs) if settings.follow else 1
+    ends = np.linspace(0, settings.epochs, rounds + 1).astype(int).tolist()
+    report_epoch = progress.loop("enhancer, epoch", settings.epochs)
+    for number, (begin, end) in enumerate(itertools.pairwise(ends)):
+        pairs = simulator.align_to_enhanced(pairs) if number else pairs
+        pairs = pairs.clear() if settings.follow else pairs
+        callbacks = [EpochsDone(report_epoch.within(begin))]
+        _train_round(simulator, pairs, end - begin, settings.seed + number, settings.decay, callbacks, show_bars)
+
+
+def _train_round(
+    simulator: "EnhancedSimulator",
+    pairs: Pairs,
+    epochs: int,
+    seed: int,
+    decay: bool,
+    callbacks: list[keras.callbacks.Callback],
+    verbose: int,
+) -> None:
+    """Trains the enhancer on pairs of windows for some epochs, in the units of the network."""
+    num_steps = epochs * -(-len(pairs) // _BATCH_SIZE)
+    rate = keras.optimizers.schedules.CosineDecay(_LEARNING_RATE, num_steps) if decay else _LEARNING_RATE
+    source, target = ((windows - simulator.offset) / simulator.scale for windows in (pairs.coarse, pairs.target_in_unit))
+    fit_windows(simulator.enhancer, source, target, epochs, _BATCH_SIZE, seed, rate, callbacks=callbacks, verbose=verbose)
+
+
+def _train_noise(noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseGAN:
+    """Builds the noise networks and trains them on windows of extracted noise, shape `(windows, samples)`."""
+    if settings.noise == "convolutional":
+        gan = convolutional_noise_gan(noise_windows, settings.num_iterations, settings.seed)
+    else:
+        generator, discriminator = (build(settings.window, seed=settings.seed) for build in (build_generator, build_discriminator))
+        scale = noise_unit(noise_windows) if settings.normalise else 1.0
+        gan = NoiseGAN(generator, discriminator, scale=scale, seed=settings.seed)
+    report_iteration = progress.loop("noise GAN, iteration", settings.num_iterations)
+    show_bars = None if verbose == "auto" else bool(verbose)
+    gan.fit(noise_windows, settings.num_iterations, verbose=show_bars, on_iteration=report_iteration)
+    return gan
+
+
+def _subtract_moving_average(parts: Sequence[Telemetry], settings: TrainingSettings) -> list[Telemetry]:
+    """Returns the noise of each part: its difference from a moving average. Parts too short for a window of noise are dropped."""
+    window, width = settings.window, settings.moving_average
+    long_enough = [part for part in parts if len(part) >= window + width - 1]
+    if not long_enough:
+        raise InputError(
+            f"Expected a part of at least {window + width - 1} samples: a window of {window}, and what a moving average of width {width} cuts off. "
+            f"Received: {max(map(len, parts))} samples. Give a longer part."
+        )
+    return [dataclasses.replace(part, values=extract_noise(part.values, width)[0]) for part in long_enough]
+
+
+def _training_record(name: str, num_samples: int, settings: TrainingSettings) -> dict[str, object]:
+    """Returns what is saved with the model about its training. The networks and their units show the window and `normalise`."""
+    chosen = {key: value for key, value in dataclasses.asdict(settings).items() if key not in ("window", "normalise")}
+    return {"telemetry": name, "num_samples": num_samples} | chosen
