@@ -1,7 +1,7 @@
-"""The product, ML-enhanced simulation: fit, generate, score, save, load and report (sections 2 and 3).
+"""The enhanced simulator: fit, generate, score, save, load and report (sections 2 and 3 of the paper).
 
-This package joins the coarse simulator, the enhancer and the noise. It knows nothing of data sets, commands or the paper's
-settings. Its two public names are imported when they are first used.
+This package combines the coarse simulator, the enhancer and the noise networks. It does not depend on the packages for data
+sets, commands and the reproduction. Its two public names are imported lazily, at their first use.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
-"""Many channels at once: a folder of fitted simulators, one folder a channel, fitted by the processes of an engine.
+"""Fits simulators to many channels in parallel worker processes.
 
-MODEL_DIR/volts/        what `EnhancedSimulator.save` writes, and
-MODEL_DIR/volts/report.json, report.png
+Each channel gets a folder of its own, for example `MODEL_DIR/volts/`. It contains the files of `EnhancedSimulator.save`,
+`report.json` and `report.png`.
 """
 
 import contextlib
@@ -25,21 +25,21 @@ from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 if TYPE_CHECKING:
     import pandas as pd
 
-THREADS = 2  # for each channel: how sums are rounded depends on their number, so that must not depend on the workers
+THREADS = 2  # per channel; fixed, because the rounding of sums depends on the number of threads and must not depend on the workers
 
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """One channel to be fitted.
+    """One channel to fit.
 
     Args:
-        channel: Its name.
-        series: Its raw values, as `sources.read_source` reads them.
-        folder: Where its simulator goes; absolute, for another process may stand elsewhere.
-        options: How it is fitted.
-        cleaning: What to do with dirty values.
+        channel: Name of the channel.
+        series: Raw values, as returned by `sources.read_source`.
+        folder: Output folder; an absolute path, because a worker may have another working directory.
+        options: Settings of the fit.
+        cleaning: Settings of the cleaning.
         verbose: Whether to show progress bars.
-        speaks: Whether to print lines on how far it is, each with the channel's name.
+        speaks: Whether to print lines of progress that begin with the channel's name.
     """
 
     channel: str
@@ -62,30 +62,32 @@ def fit_channels(
     engine: str = "local",
     speaks: bool = False,
 ) -> dict[str, str]:
-    """Fits a simulator to each channel, writes it with its report, and tells what was found.
+    """Fits a simulator to each channel, saves it together with its report, and prints the report.
 
     Args:
-        series: Raw channels by name.
-        out: The folder of the models.
-        options: How they are fitted.
-        cleaning: What to do with dirty values.
-        workers: Channels fitted at a time, each in a process of its own; None: one a CPU. Their number changes no bit of the
-            simulators. 0 fits them in this process, with the threads that it has.
-        tell: Called with each line.
-        verbose: Whether to show progress bars, where one channel is fitted at a time.
-        engine: Who runs the processes: `local` or `ray`. It changes no bit either.
-        speaks: Whether each process of this machine prints a line about every fifteen seconds on how far its channel is.
+        series: Raw values of each channel, by the channel's name.
+        out: Output folder for all models.
+        options: Settings of the fit.
+        cleaning: Settings of the cleaning.
+        workers: Number of channels that are fitted at the same time, each in its own process. None uses one worker per CPU. The
+            number of workers does not change the results. 0 fits all channels in this process, with its own number of threads.
+        tell: Function that is called with each line of output.
+        verbose: Whether to show progress bars; they are shown only when channels are fitted one at a time.
+        engine: How worker processes are run: `local` or `ray`. The engine does not change the results.
+        speaks: Whether each local worker prints a line of progress about every fifteen seconds.
 
     Returns:
-        For each channel that could not be fitted, why.
+        A dictionary from the name of each channel that could not be fitted to the reason.
 
     Raises:
-        InputError: If a channel has no usable name, or something else stands where a simulator would go, before any is fitted;
-            if the engine cannot be used, or a simulator not be written.
+        InputError: Before any fit, if a channel's name cannot be used for a folder or an output folder contains something other
+            than a saved simulator. Also if the engine is not available or a simulator cannot be written.
     """
     out = make_folder(out)
     if (out / MANIFEST).is_file():
-        raise InputError(f"Expected a folder for models. Received: {out}, which is a model itself. Name another --out, or the one above.")
+        raise InputError(
+            f"Expected a folder for models. Received: {out}, which is a model itself. Give another --out, or its parent folder."
+        )
     verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
     here = Path(os.path.abspath(out))
     jobs = [
@@ -109,12 +111,12 @@ def fit_channels(
         else:
             _fit_in_processes(jobs, engine, workers, note)
     finally:
-        remove_leftovers(out)  # of processes that were ended
+        remove_leftovers(out)  # temporary files of workers that were killed
     return {name: failed[name] for name in series if name in failed}
 
 
 def _fit_in_processes(jobs: Sequence[Job], engine: str, workers: int | None, note: Callable[["Outcome"], None]) -> None:
-    """Hands the channels to an engine; one whose process dies again and again does not stop the others."""
+    """Fits the channels with an engine. A channel whose worker dies repeatedly is reported and does not stop the others."""
     waiting = {job.channel: job for job in jobs}
 
     def fit(some: Sequence[Job], workers: int | None) -> None:
@@ -130,25 +132,26 @@ def _fit_in_processes(jobs: Sequence[Job], engine: str, workers: int | None, not
             suspects = [job for job in died.items if job.channel in waiting]
             if not suspects:
                 raise
-            for job in suspects:  # one at a time, so that the channel that ends its process is known, and has all the memory
+            for job in suspects:  # one at a time, to find the channel that kills its worker, and to give it all the memory
                 try:
                     fit([job], 1)
                 except ProcessesDiedError:
-                    said = (
-                        "Expected a process that fits it. Received: only ones that were killed, perhaps for memory. Give it less telemetry."
+                    reason = (
+                        "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory. "
+                        "Give less telemetry."
                     )
-                    note(Outcome(job.channel, failure=said))
+                    note(Outcome(job.channel, failure=reason))
                     del waiting[job.channel]
 
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """What became of a channel.
+    """The result of fitting one channel.
 
     Args:
-        channel: Its name.
-        lines: Those of its reports, if it was fitted.
-        failure: Why it was not.
+        channel: Name of the channel.
+        lines: Lines of its reports, if it was fitted.
+        failure: Reason why it could not be fitted, or None.
     """
 
     channel: str
@@ -157,27 +160,39 @@ class Outcome:
 
 
 def fit_or_say(job: Job) -> Outcome:
-    """Fits a channel in a process of an engine; what only this channel is to blame for comes back as its failure.
+    """Fits a channel in a worker process. Errors that concern only this channel are returned, not raised.
+
+    Args:
+        job: The channel.
+
+    Returns:
+        The lines of its reports, or the reason why it could not be fitted.
 
     Raises:
-        InputError: If the machine refuses something, which the other channels would meet too.
+        InputError: If the machine lacks disk space or memory, which affects the other channels too.
     """
     try:
         return Outcome(job.channel, fit_job(job))
     except InputError as error:
         return Outcome(job.channel, failure=str(error))
     except (OSError, MemoryError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "more than there is"
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
         raise InputError(
-            f"Expected files and memory as {printable(job.channel)} needs them. Received: {reason}. What was finished is kept; make room."
+            f"Expected enough memory and disk space for {printable(job.channel)}. Received: {reason}. Finished channels are kept; free some space."
         ) from error
 
 
 def fit_job(job: Job) -> list[str]:
-    """Cleans, fits and writes one channel, whole or not at all; returns the lines of its reports.
+    """Cleans, fits and saves one channel. Nothing is written if a step fails.
+
+    Args:
+        job: The channel.
+
+    Returns:
+        The lines of its reports.
 
     Raises:
-        InputError: If the channel cannot be used.
+        InputError: If no simulator can be fitted to the channel.
     """
     progress = Progress(_tell_if_heard, f"{printable(job.channel)}: ") if job.speaks else SILENT
     cleaned = clean(job.series, job.cleaning)
@@ -186,7 +201,7 @@ def fit_job(job: Job) -> list[str]:
 
     parts = [dataclasses.replace(part, name=job.channel) for part in cleaned.parts]
     simulator, report = fit_channel(parts, job.options, "auto" if job.verbose else 0, progress)
-    refuse_foreign(job.folder)  # it has been minutes
+    refuse_foreign(job.folder)  # checked again, because the fit took minutes
     with replace_folder(job.folder) as temporary:
         simulator.save(temporary)
         write_json(temporary / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
@@ -195,8 +210,8 @@ def fit_job(job: Job) -> list[str]:
 
 
 def _tell_if_heard(line: str) -> None:
-    """Prints a line; whoever has stopped reading stops no fit."""
+    """Prints a line. A reader that closes the pipe does not stop the fit."""
     try:
         tell(line)
     except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it once more at its end
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it at exit

@@ -1,24 +1,28 @@
-"""How a simulator is fitted to a channel: every choice, checked before anything slow is imported."""
+"""Settings for fitting a simulator to a channel. They are validated before any slow import."""
 
 import dataclasses
 
 from enhsim_tf.common.errors import InputError
 
-FEWEST_SAMPLES = 32  # of a window that is asked for: the discriminator's filters are 20 wide
+FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
 
 
 @dataclasses.dataclass(frozen=True)
 class FitOptions:
-    """How a simulator is fitted to a channel.
+    """Settings for fitting a simulator to a channel.
 
     Args:
-        window: Samples of a window. None: two periods, from 64 to 500 samples.
-        num_windows: Training windows, cut at random places.
-        epochs: Passes of the enhancer over them, at a learning rate that falls to zero.
-        num_iterations: Adversarial iterations of the noise.
-        noise: `convolutional`, or the networks of the `paper`.
-        held_out: Share of the telemetry, its end, that is kept for the report; 0 learns from all and reports on the same.
-        seed: Seed of everything drawn.
+        window: Length of a window in samples. None uses two periods, limited to 64 to 500 samples.
+        num_windows: Number of training windows, cut at random offsets.
+        epochs: Passes of the enhancer over the training windows, with a learning rate that falls to zero.
+        num_iterations: Adversarial iterations of the noise networks.
+        noise: Noise networks: `convolutional`, or those of the `paper`.
+        held_out: Share of the telemetry, taken from its end, that is reserved for the report. 0 trains and reports on all
+            telemetry.
+        seed: Random seed of training and report.
+
+    Raises:
+        InputError: If a value is out of range.
     """
 
     window: int | None = None
@@ -36,4 +40,4 @@ class FitOptions:
             raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
         for name, least in (("num_windows", 1), ("epochs", 1), ("num_iterations", 0)):
             if getattr(self, name) < least:
-                raise InputError(f"Expected {name} of at least {least}. Received: {name}={getattr(self, name)}.")
+                raise InputError(f"Expected {name} to be at least {least}. Received: {name}={getattr(self, name)}.")

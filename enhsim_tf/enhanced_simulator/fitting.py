@@ -1,6 +1,7 @@
-"""From telemetry of one's own to a trained simulator and an honest report: every choice that the paper leaves to its reader.
+"""Fits an enhanced simulator to a user's channel and evaluates it on held-out telemetry.
 
-The end of the telemetry is held out: neither network, nor the levels that windows are drawn at, have seen it.
+The last part of the telemetry is held out. It is not used for training the networks, nor for the offsets and gains of
+generated windows.
 """
 
 from collections.abc import Sequence
@@ -16,21 +17,21 @@ from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.training_pairs import num_places, split_off
 from enhsim_tf.telemetry.series import Telemetry
 
-LEAST_WINDOW, MOST_WINDOW = 64, 500  # samples of the window that is chosen; the paper's is 500
-_LEAST_EXPLAINED = 0.05  # of the variance, by one square wave that runs free; of white noise the best explains one per cent
-_LEAST_LEARNT = 8  # windows that the networks learn from, at least
+LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
+_LEAST_EXPLAINED = 0.05  # minimum share of the variance that one square wave explains; for white noise, the best fit explains about 0.01
+_LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 
 
 def fit_channel(
     parts: Sequence[Telemetry], options: FitOptions | None = None, verbose: int | str = "auto", progress: Progress = SILENT
 ) -> tuple[EnhancedSimulator, ChannelReport]:
-    """Fits an enhanced simulator to a channel and reports on what was held out.
+    """Fits an enhanced simulator to a channel and evaluates it on the held-out end of the telemetry.
 
     Args:
-        parts: Regular stretches of nominal telemetry on one clock, as `cleaning.clean` makes them.
-        options: Every choice.
+        parts: Regularly sampled parts of nominal telemetry on a common clock, as returned by `cleaning.clean`.
+        options: Settings of the fit. None uses the defaults.
         verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
-        progress: Tells in lines how far the trainings are.
+        progress: Reports the progress of the trainings as lines of text.
 
     Returns:
         The simulator and the report.
@@ -49,16 +50,19 @@ def fit_channel(
 def fit_simulator(
     parts: Sequence[Telemetry], options: FitOptions, verbose: int | str = "auto", progress: Progress = SILENT
 ) -> EnhancedSimulator:
-    """Fits an enhanced simulator to all that is given.
+    """Fits an enhanced simulator to all of the given telemetry.
 
-    The coarse simulator is one square wave, set to the clock and the levels of each window; the noise is what the
-    enhancer leaves of the telemetry.
+    The coarse simulator is one square wave. It is aligned in time, offset and gain with each window. The noise is the
+    difference between the telemetry and the enhanced signal.
 
     Args:
-        parts: Regular stretches of nominal telemetry on one clock.
-        options: Every choice but `held_out`.
+        parts: Regularly sampled parts of nominal telemetry on a common clock.
+        options: Settings of the fit; `held_out` is not used.
         verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
-        progress: Tells in lines how far the trainings are.
+        progress: Reports the progress of the trainings as lines of text.
+
+    Returns:
+        The trained simulator.
 
     Raises:
         InputError: If the telemetry is too short, constant or not periodic.
@@ -69,7 +73,7 @@ def fit_simulator(
     explained = 1 - np.var(longest.values - coarse(longest.time_s)) / np.var(longest.values, dtype=np.float64)
     if period > samples / 2 or explained < _LEAST_EXPLAINED:
         raise InputError(
-            f"Expected something periodic, at least two periods long. Received: {longest.name}, whose best square wave has a period of {period:.0f} "
+            f"Expected periodic telemetry, at least two periods long. Received: {longest.name}, whose best square wave has a period of {period:.0f} "
             f"of {samples} samples and explains {explained:.1%} of its variance. Give more telemetry or another channel."
         )
     window = options.window or window_of(coarse, parts[0].interval_s)
@@ -78,7 +82,7 @@ def fit_simulator(
     if samples < _LEAST_LEARNT * window:
         raise InputError(
             f"Expected at least {_LEAST_LEARNT} windows of {window} samples to learn from. Received: {samples} samples of {parts[0].name} "
-            "in pieces as long as a window. Give more telemetry or a smaller window."
+            "in parts at least as long as a window. Give more telemetry or a smaller window."
         )
     return EnhancedSimulator.fit(
         usable,
@@ -99,6 +103,11 @@ def fit_simulator(
 
 
 def window_of(coarse: SquareWaveSimulator, interval_s: float) -> int:
-    """Two periods of a coarse simulator in samples, within what the networks are made for."""
+    """Returns the default window length: two periods of the coarse simulator in samples, limited to the networks' range.
+
+    Args:
+        coarse: The coarse simulator.
+        interval_s: Sampling interval in seconds.
+    """
     longest_s = max(wave.period_s for wave in coarse.waves)
     return int(np.clip(round(2 * longest_s / interval_s), LEAST_WINDOW, MOST_WINDOW))

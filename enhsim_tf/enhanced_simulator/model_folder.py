@@ -1,60 +1,68 @@
-"""Folders of fitted models: one for each channel, found and named."""
+"""Finds and names the folders of fitted models; each channel has one folder."""
 
 import os
 import urllib.parse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from enhsim_tf.common.atomic_files import encoded
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.enhanced_simulator.saving import MANIFEST, is_foreign
 
-if TYPE_CHECKING:
-    pass
-
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """The folder of a channel: its name, encoded.
+    """Returns the folder of a channel. Its name is the channel's name, percent-encoded.
+
+    Args:
+        models: Folder of all models.
+        channel: Name of the channel.
 
     Raises:
-        InputError: If no file can have the name.
+        InputError: If the name is empty or too long for a folder.
     """
     return Path(models) / encoded(channel)
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:
-    """The fitted channels of a folder, by name; a saved simulator itself is one.
+    """Returns the fitted channels in a folder.
+
+    Args:
+        models: Folder of all models, or the folder of one saved simulator.
+
+    Returns:
+        A dictionary from the names of the channels to their folders.
 
     Raises:
-        InputError: If there is none.
+        InputError: If the folder contains no saved simulator.
     """
     models = Path(os.path.abspath(models))  # so that "." has a name too
-    if os.path.isfile(models / MANIFEST):  # asked in this way, a name that no file can have is no error
+    if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
     folders = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
     if not folders:
         raise InputError(
-            f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which holds none. Make one with `fit`."
+            f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which contains none. Make one with `fit`."
         )
     found: dict[str, Path] = {}
     for folder in (manifest.parent for manifest in folders):
         name = urllib.parse.unquote(folder.name)
         if name in found:
-            raise InputError(f"Expected a folder a channel. Received: {found[name].name} and {folder.name}, both of {name!r}. Remove one.")
+            raise InputError(
+                f"Expected one folder per channel. Received: {found[name].name} and {folder.name}, both of {name!r}. Remove one."
+            )
         found[name] = folder
     return found
 
 
 def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:
-    """The fitted channels that were named, or all.
+    """Selects fitted channels by name.
 
     Args:
-        models: Those of `models_of`.
-        channels: Names, or None.
+        models: All fitted channels, as returned by `models_of`.
+        channels: Names of the channels to select. None or an empty sequence selects all.
 
     Raises:
-        InputError: If one of them is not there.
+        InputError: If there is no fitted channel of one of the names.
     """
     unknown = [name for name in channels or () if name not in models]
     if unknown:
@@ -63,10 +71,13 @@ def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dic
 
 
 def refuse_foreign(folder: Path) -> None:
-    """Refuses a folder that holds something else than a saved simulator.
+    """Checks that a folder is new, empty or a saved simulator, so that it may be replaced.
+
+    Args:
+        folder: The folder.
 
     Raises:
-        InputError: If it does.
+        InputError: If the folder contains something else.
     """
     if is_foreign(folder):
-        raise InputError(f"Expected a folder for models. Received: {folder}, which holds something else. Name another --out.")
+        raise InputError(f"Expected a folder for models. Received: {folder}, which contains something else. Give another --out.")

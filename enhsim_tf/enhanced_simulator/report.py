@@ -1,4 +1,4 @@
-"""What a simulator fitted to a channel is worth, in numbers and in plain sentences; `channel_report` measures it."""
+"""The report on a simulator fitted to a channel, as numbers and as sentences. `report_measure` computes the numbers."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -8,13 +8,13 @@ import numpy as np
 
 from enhsim_tf.common.errors import printable
 
-RATE = 0.01  # of false alarms, that thresholds are set for
-SEVERITY = 4.0  # standard deviations of the noise, of the anomalies that the verdict speaks of
-NOTICED, MISSED = 0.8, 0.2  # shares of anomalies that count as found and as missed
-_USABLE = 0.1  # share of real nominal windows: a detector that alarms on more finds everything and says nothing
-_FEW = 100  # windows that share no sample: with fewer, the rates are given with what they may be at worst
-_NAMED = 3  # measures of the noise that are named, at most
-_SUSPICIOUS = 2.0  # times its floor: from there on a measure tells generated noise from real
+RATE = 0.01  # false-alarm rate for which thresholds are set
+SEVERITY = 4.0  # size of the injected anomalies, in standard deviations of the noise
+NOTICED, MISSED = 0.8, 0.2  # a kind of anomaly is found if its recall is at least the first, missed if at most the second
+_USABLE = 0.1  # maximum false-alarm rate on real nominal windows; the recall of a detector above it is meaningless
+_FEW = 100  # with fewer disjoint windows, the report adds an upper bound of the false-alarm rate
+_NAMED = 3  # maximum number of noise measures that the verdict names
+_SUSPICIOUS = 2.0  # a measure distinguishes generated from real noise above this multiple of its real-vs-real baseline
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,21 +23,24 @@ class ChannelReport:
 
     Args:
         channel: Name of the channel.
-        window: Samples of a window.
-        period_s: Period of the coarse simulator, in seconds (in samples where the channel has no time).
-        is_held_out: Whether it was measured on telemetry that the simulator has not seen.
-        num_windows: Real windows behind the errors and alarms; they overlap.
-        num_disjoint: How many of them share no sample: the honest size of the sample.
-        nrmse: Median error over windows, in units of each window's standard deviation: `coarse`, `ridge`, `enhanced`.
-        noise: Rows of `realism.Row` as dictionaries, generated against extracted noise; empty where telemetry is too short.
-        noise_window: Samples of the windows that noises were compared in.
-        false_alarms: Share of real windows that each detector alarms on, by what it was trained on: `generated`, `real`.
-        recall: Share of anomalies of `SEVERITY` that each detector trained on generated windows finds, by kind.
+        window: Length of a window in samples.
+        period_s: Period of the coarse simulator in seconds, or in samples if the channel has no time.
+        is_held_out: Whether the telemetry of the evaluation was held out from training.
+        num_windows: Number of real windows used for errors and false alarms. They may overlap.
+        num_disjoint: How many of these windows can be chosen without overlap; this is the effective sample size.
+        nrmse: Normalised root-mean-square error (NRMSE) of `coarse`, `ridge` and `enhanced`: the median over windows of the
+            error divided by the window's standard deviation.
+        noise: Rows of `realism.Row` as dictionaries, which compare generated with extracted noise. Empty if there is too
+            little telemetry.
+        noise_window: Length in samples of the windows in which noise was compared.
+        false_alarms: Share of real windows flagged by each detector, for the training data `generated` and `real`.
+        recall: For each detector trained on generated windows and each kind of anomaly, the share of anomalies of
+            `SEVERITY` that it finds.
         noise_sd: Standard deviation of the extracted noise, in the telemetry's unit.
         examples: Windows for the figure: `coarse`, `enhanced`, `generated` and `real`.
         unit: Unit of the values.
-        time_unit: What the period counts: `s` or `samples`.
-        levels: For quantised telemetry its number of levels and the `step` between them; else empty.
+        time_unit: Unit of the period: `s` or `samples`.
+        levels: For quantised telemetry, the `count` of its levels and the `step` between them; otherwise empty.
     """
 
     channel: str
@@ -58,26 +61,26 @@ class ChannelReport:
     levels: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the examples, in plain JSON types."""
+        """Returns all fields except the examples, and the verdict, in plain JSON types."""
         plain = {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "examples"}
-        nrmse = {name: None if np.isnan(error) else error for name, error in self.nrmse.items()}  # NaN is no JSON
+        nrmse = {name: None if np.isnan(error) else error for name, error in self.nrmse.items()}  # NaN is not valid JSON
         return plain | {"nrmse": nrmse, "noise": [dict(row) for row in self.noise], "verdict": self.verdict}
 
     @property
     def usable(self) -> list[str]:
-        """Detectors trained on generated windows that alarm on few enough real ones to say anything."""
+        """Detectors trained on generated windows whose false-alarm rate on real windows is low enough to be useful."""
         return [name for name, rate in self.false_alarms["generated"].items() if rate <= _USABLE]
 
     @property
     def found(self) -> dict[str, tuple[str, float]]:
-        """For each kind of anomaly the usable detector that finds most of it, and what share; empty where none is usable."""
+        """For each kind of anomaly, the usable detector with the highest recall, and that recall; empty if none is usable."""
         kinds = next(iter(self.recall.values())) if self.usable else ()
         best = {kind: max(self.usable, key=lambda name, kind=kind: self.recall[name][kind]) for kind in kinds}
         return {kind: (name, self.recall[name][kind]) for kind, name in best.items()}
 
     @property
     def verdict(self) -> list[str]:
-        """What the simulator is worth, and what a detector trained on it would and would not notice, in plain sentences."""
+        """Sentences on the accuracy of the simulator, and on which anomalies a detector trained on its output finds."""
         said = [self._of_the_signal(), self._of_the_noise(), self._of_false_alarms(), self._of_anomalies()]
         if self.levels:
             said.append(
@@ -102,12 +105,12 @@ class ChannelReport:
         measured = [row for row in self.noise if row["ratio"] is not None]
         if not measured:
             return "Noise: the telemetry is too short to compare its noise with generated noise."
-        told = sorted((row for row in measured if row["ratio"] > _SUSPICIOUS), key=lambda row: -row["ratio"])
-        if not told:
+        different = sorted((row for row in measured if row["ratio"] > _SUSPICIOUS), key=lambda row: -row["ratio"])
+        if not different:
             return f"Noise: none of {len(measured)} measures tells generated noise from the telemetry's."
-        which = "it is" if len(told) == 1 else "most of all" if len(told) > _NAMED else "they are"
-        named = _listed([row["measure"] for row in told[:_NAMED]])
-        return f"Noise: {len(told)} of {len(measured)} measures {_tell(len(told))} generated noise from the telemetry's; {which} {named}."
+        which = "it is" if len(different) == 1 else "most of all" if len(different) > _NAMED else "they are"
+        named = _listed([row["measure"] for row in different[:_NAMED]])
+        return f"Noise: {len(different)} of {len(measured)} measures {_tell(len(different))} generated noise from the telemetry's; {which} {named}."
 
     def _of_false_alarms(self) -> str:
         real = self.false_alarms["real"]
@@ -120,7 +123,9 @@ class ChannelReport:
             said += f", which overlap: {self.num_disjoint} of them {'shares' if self.num_disjoint == 1 else 'share'} no sample"
         if self.num_disjoint >= _FEW:
             return f"{said}."
-        worst = 1 - 0.05 ** (1 / max(1, self.num_disjoint))  # of this many independent windows none, with a chance of 5 %
+        worst = 1 - 0.05 ** (
+            1 / max(1, self.num_disjoint)
+        )  # at this rate, no false alarm in so many independent windows has a probability of 5 %
         return f"{said}. With so few, even where none alarms the rate may be up to {worst:.0%}."
 
     def _of_anomalies(self) -> str:
@@ -143,9 +148,9 @@ class ChannelReport:
         return "telemetry it has not seen" if self.is_held_out else "the telemetry it learnt from (none was held out)"
 
     def lines(self) -> list[str]:
-        """The report in plain words."""
+        """Returns the report as lines of text: a heading and the verdict."""
         windows = _counted(self.num_windows, "window")
-        where = f"{windows} held out" if self.is_held_out else f"{windows} of what it learnt from"
+        where = f"{windows} held out" if self.is_held_out else f"{windows} of the training telemetry"
         head = f"windows of {self.window} samples, period {self.period_s:.6g} {self.time_unit}; measured on {where}"
         return [f"{printable(self.channel)}: {head}", *self.verdict]
 

@@ -1,4 +1,4 @@
-"""The figure of a channel's report: what the simulator makes of the coarse signal, and what detectors trained on it say."""
+"""The figure of a channel's report: signals and generated windows, false-alarm rates and recall of detectors."""
 
 import matplotlib.figure
 import matplotlib.style
@@ -11,8 +11,8 @@ from enhsim_tf.common.plot_style import COARSE, DOUBLE, EDGE, ENHANCED, FOOT, GE
 from enhsim_tf.enhanced_simulator.report import RATE, SEVERITY, ChannelReport
 
 _HEIGHT = 4.3  # inches
-_LEFT, _MIDDLE = (0.68, 3.36), (4.66, 7.0)  # where the columns of panels begin and end, inches from the left
-_BETWEEN = 0.62  # inches between two rows: an axis label below, a title above
+_LEFT, _MIDDLE = (0.68, 3.36), (4.66, 7.0)  # left and right edges of the two columns of panels, in inches
+_BETWEEN = 0.62  # vertical gap between two panels, in inches; holds an axis label and a title
 
 
 def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
@@ -62,11 +62,11 @@ def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
 
 
 def drawable(text: str, most_letters: int = 60) -> str:
-    """Text of one line that the font has letters for, without mathematics.
+    """Returns text as one line that the font can draw: unknown characters are replaced and `$` is escaped.
 
     Args:
-        text: For example a channel's name, which may hold anything.
-        most_letters: What is longer is cut.
+        text: Any text, for example a channel's name.
+        most_letters: Maximum number of characters; longer text is shortened.
     """
     letters = font_manager.get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
     known = "".join(letter if ord(letter) in letters else "?" for letter in printable(text))
@@ -74,17 +74,17 @@ def drawable(text: str, most_letters: int = 60) -> str:
 
 
 def _message(report: ChannelReport) -> str:
-    ours, coarse = report.nrmse["enhanced"], report.nrmse["coarse"]
-    if np.isnan(ours) or np.isnan(coarse):
+    enhanced, coarse = report.nrmse["enhanced"], report.nrmse["coarse"]
+    if np.isnan(enhanced) or np.isnan(coarse):
         return "no window moves, so nothing can be said of the enhanced signal"
-    if ours >= coarse:
+    if enhanced >= coarse:
         return "the enhanced signal is no nearer to the telemetry than the coarse one"
-    but = "" if ours < report.nrmse["ridge"] else ", but no nearer than ridge regression"
-    return f"the enhanced signal is {1 - ours / coarse:.0%} nearer to the telemetry than the coarse one{but}"
+    but = "" if enhanced < report.nrmse["ridge"] else ", but no nearer than ridge regression"
+    return f"the enhanced signal is {1 - enhanced / coarse:.0%} nearer to the telemetry than the coarse one{but}"
 
 
 def _grid(figure: matplotlib.figure.Figure, down: float) -> list[list[Axes]]:
-    """Two rows of two panels: curves, and rates with the names of their rows beside them."""
+    """Adds two rows of two panels: curves on the left, rates with their labels on the right."""
     bottom = FOOT + 0.36
     height = (_HEIGHT - down - bottom - _BETWEEN) / 2
     return [
@@ -94,19 +94,19 @@ def _grid(figure: matplotlib.figure.Figure, down: float) -> list[list[Axes]]:
 
 
 def _name_values(axes: Axes, unit: str) -> None:
-    """The value axis with its unit, and with the power of ten or the level that its numbers leave out."""
+    """Labels the value axis with the unit and with the factor or offset of its tick labels."""
     axes.locator_params(axis="y", nbins=5)
     axes.ticklabel_format(axis="y", scilimits=(-3, 4))
     axes.figure.draw_without_rendering()
     left_out = axes.yaxis.get_offset_text()
-    left_out.set_visible(False)  # it would stand where the title does
+    left_out.set_visible(False)  # it would overlap the title
     about = ", ".join(word for word in (unit, left_out.get_text()) if word)
     axes.set_ylabel(f"value ({about})" if about else "value")
     axes.yaxis.set_label_coords(-0.5 / (_LEFT[1] - _LEFT[0]), 0.5)
 
 
 def _dots(axes: Axes, shares: dict[str, float], others: dict[str, float] | None = None) -> None:
-    """A dot for each share, a ring for what it is compared with, from the top down."""
+    """Draws a dot for each share, and a ring for the share it is compared with, in rows from top to bottom."""
     heights = -np.arange(len(shares), dtype=float)
     axes.hlines(heights, 0, [100 * share for share in shares.values()], color=ENHANCED, linewidth=0.8)
     axes.plot([100 * share for share in shares.values()], heights, "o", color=ENHANCED, markersize=4, clip_on=False)

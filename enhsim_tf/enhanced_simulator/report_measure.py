@@ -1,6 +1,6 @@
-"""Measures what a simulator fitted to a channel is worth: its error, its noise, what detectors trained on it say of real windows.
+"""Evaluates a simulator fitted to a channel: its error, its noise, and detectors trained on its output.
 
-Everything is measured on telemetry that the simulator has not seen, where there is any.
+The evaluation uses held-out telemetry if there is any.
 """
 
 import dataclasses
@@ -20,28 +20,31 @@ from enhsim_tf.telemetry.windows import disjoint_offsets
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
-QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors that train in a second
-_NUM_WINDOWS = 1_000  # generated windows that a detector learns from; as many set its threshold
-_NUM_COMPARED = 200  # windows that errors and alarms are measured on, at most
-_LEAST_NOISE_WINDOW, _NUM_NOISE_WINDOWS = 16, 40  # of the comparison of noises, which needs windows that share no sample
-_OFTEN = 3  # times that a value occurs, to be a level of quantised telemetry
+QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors whose training takes about a second
+_NUM_WINDOWS = 1_000  # generated windows for training a detector, and as many others for its threshold
+_NUM_COMPARED = 200  # maximum number of real windows for errors and false alarms
+_LEAST_NOISE_WINDOW, _NUM_NOISE_WINDOWS = 16, 40  # comparison of noise: minimum window length, and target number of disjoint windows
+_OFTEN = 3  # a value of quantised telemetry counts as a level if it occurs at least this often
 
 
 def report_on(
     simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], is_held_out: bool, seed: int
 ) -> ChannelReport:
-    """Measures a simulator on real telemetry.
+    """Evaluates a simulator on real telemetry.
 
     Args:
-        simulator: The fitted simulator, which follows the telemetry.
-        learnt: What it learnt from.
-        held_out: What it is measured on.
-        is_held_out: Whether that is something else.
-        seed: Seed of everything drawn.
+        simulator: The fitted simulator, trained with `follow=True`.
+        learnt: Telemetry that the simulator was trained on.
+        held_out: Telemetry for the evaluation.
+        is_held_out: Whether the evaluation telemetry was held out from training.
+        seed: Random seed of the evaluation.
+
+    Returns:
+        The report.
     """
     window = simulator.window
     places = even_places(held_out, window, _NUM_COMPARED)
-    pairs = cut_pairs(held_out, simulator.coarse, places, window, follow=True)  # as the coarse signal alone can be set
+    pairs = cut_pairs(held_out, simulator.coarse, places, window, follow=True)  # aligned without the enhancer
     enhanced = simulator.follow(simulator.pairs(held_out, places))
     typical = _typical(enhanced, pairs.target)
     generated = simulator.generate(2 * _NUM_WINDOWS, seed=seed + 1)
@@ -54,7 +57,7 @@ def report_on(
     trial = robustness.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
     trial = dataclasses.replace(trial, anomalous={key: value for key, value in trial.anomalous.items() if key[1] == SEVERITY})
     quick = {name: DETECTORS[name] for name in QUICK}
-    cut = len(real) * 3 // 5  # of real windows the later ones set the threshold: neighbours overlap
+    cut = len(real) * 3 // 5  # later real windows set the threshold, with a gap in time, because neighbouring windows overlap
     gap = window * len(real) // max(1, sum(map(len, learnt)))
     judged = {
         "generated": robustness.judge_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
@@ -91,10 +94,13 @@ def report_on(
 
 
 def levels_of(values: np.ndarray) -> dict[str, float]:
-    """The `count` of levels of quantised values and the `step` between the nearest two; empty where they are not.
+    """Finds the levels of quantised telemetry.
 
     Args:
-        values: The telemetry; a few values that are none of its levels, such as those that fill gaps, do not count.
+        values: The telemetry. A few values between the levels, such as interpolated ones, are ignored.
+
+    Returns:
+        The `count` of levels and the smallest `step` between two levels; empty if the telemetry is not quantised.
     """
     levels, counts = np.unique(values, return_counts=True)
     often = levels[counts >= _OFTEN].astype(np.float64)
@@ -102,24 +108,24 @@ def levels_of(values: np.ndarray) -> dict[str, float]:
         return {}
     step = float(np.diff(often).min())
     multiples = (often - often[0]) / step
-    is_even = np.abs(multiples - np.round(multiples)).max() < 0.1  # the values of a wave without noise repeat too
+    is_even = np.abs(multiples - np.round(multiples)).max() < 0.1  # values of a noise-free wave repeat too, but are not evenly spaced
     return {"count": len(often), "step": step} if is_even else {}
 
 
 def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
-    """Median of the errors over windows that are not flat, NaN where all are."""
+    """Returns the median error over the windows that are not constant, or NaN if all are constant."""
     errors = window_errors(windows, target)
     return float(np.nanmedian(errors)) if np.isfinite(errors).any() else float("nan")
 
 
 def _typical(windows: np.ndarray, target: np.ndarray) -> int:
-    """The window whose error is nearest to the median."""
+    """Returns the index of the window whose error is nearest to the median."""
     apart = np.abs(window_errors(windows, target) - _nrmse(windows, target))
     return int(np.argmin(np.where(np.isnan(apart), np.inf, apart)))
 
 
 def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], seed: int) -> tuple[int, list[dict[str, Any]]]:
-    """Rows of every fidelity measure, generated against extracted noise, in windows short enough that many share no sample."""
+    """Compares generated with extracted noise in all measures, in windows short enough that there are many disjoint ones."""
     window = simulator.window
     whole = [part for part in parts if len(part) >= window]
     places, before = [], 0
@@ -137,4 +143,4 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     floor = realism.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
     generated = simulator.noise.generate(-(-half // pieces), seed)[:, : short * pieces].reshape(-1, short)[:half]
     rows = [dataclasses.asdict(row) for row in floor.judge(generated).rows]
-    return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is no JSON
+    return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is not valid JSON

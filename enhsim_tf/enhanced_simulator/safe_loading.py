@@ -1,7 +1,7 @@
-"""What may stand in a `.keras` file of ours, looked at before Keras opens it: its members, its layers, its sizes.
+"""Validates a `.keras` file before Keras opens it: its members, its layers and its sizes.
 
-Keras' safe mode refuses code. Beside it, nothing but the kinds of layers that the package's own networks are made of gets
-in, no member is compressed, and no layer declares more weights than the file holds; so a small file cannot take much memory.
+Keras' safe mode rejects code. In addition, this module rejects layers of types that the package's networks do not use,
+compressed members, and layers that declare more weights than the file contains. A small file can thus not allocate much memory.
 """
 
 import io
@@ -16,9 +16,9 @@ from typing import Any
 from enhsim_tf.common.size_limits import DAMAGES
 
 _MEMBERS = ["config.json", "metadata.json", "model.weights.h5"]
-_MOST_DESCRIPTION = 10_000_000  # bytes; that of a discriminator has a hundred thousand
-_MOST_LAYERS = 2_000  # it has 220
-_MOST_UNSAVED = 1_000_000  # values that layers hold without weights: means and variances
+_MOST_DESCRIPTION = 10_000_000  # maximum bytes of a network's description; that of a discriminator has about 100,000
+_MOST_LAYERS = 2_000  # a discriminator has 220
+_MOST_UNSAVED = 1_000_000  # maximum number of values that layers allocate without saved weights: means and variances
 _LAYERS = "Dense Conv1D BatchNormalization Normalization InputLayer Concatenate Cropping1D Flatten Reshape LeakyReLU Activation ReLU"
 _LAYERS += " GlobalAveragePooling1D GlobalMaxPooling1D"
 _OPERATIONS = "Absolute Add Arcsinh Concatenate Diff GetItem Log Max Mean Multiply Power Reshape Sqrt Subtract TrueDivide"
@@ -32,14 +32,17 @@ _KINDS = {
     "keras.src.ops.nn": {"Relu"},
     None: {"__keras_tensor__", "__slice__"},
 }
-_UNUSED = ("lora_rank", "quantization_config")  # settings of a layer that would add weights
+_UNUSED = ("lora_rank", "quantization_config")  # layer settings that would add weights
 
 
 def read_description(path: str | os.PathLike) -> dict[str, Any]:
-    """The description of a network, its layers and sizes, of kinds that the package makes.
+    """Reads and validates the description of a network: its layers and their sizes.
+
+    Args:
+        path: A `.keras` file.
 
     Raises:
-        ValueError: If the archive or the description is none of ours; the message says why.
+        ValueError: If the archive or the description was not written by this package; the message gives the reason.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -49,10 +52,13 @@ def read_description(path: str | os.PathLike) -> dict[str, Any]:
 
 
 def check_network(path: str | os.PathLike) -> None:
-    """Refuses a file that declares more than it holds, or layers that the package does not make.
+    """Checks that a file contains all the weights that it declares, and only layers that the package uses.
+
+    Args:
+        path: A `.keras` file.
 
     Raises:
-        ValueError: If it does; the message says why.
+        ValueError: If it does not; the message gives the reason.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -81,7 +87,7 @@ def _description_of(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
     if sum(member.file_size for member in members) > size:
         raise ValueError("an archive whose files share their bytes")
     description = json.loads(archive.read("config.json"))
-    description.pop("compile_config", None)  # how it was trained: nothing of it is loaded
+    description.pop("compile_config", None)  # settings of the training, which are not loaded
     num_layers = 0
     for part in _parts_of(description):
         module, kind = part.get("module"), part["class_name"]
@@ -101,7 +107,7 @@ def _description_of(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
 
 
 def _parts_of(description: Any) -> Iterator[dict[str, Any]]:
-    """Everything in a description that names a class."""
+    """Yields every object of a description that names a class."""
     waiting = [description]
     while waiting:
         part = waiting.pop()
@@ -114,7 +120,7 @@ def _parts_of(description: Any) -> Iterator[dict[str, Any]]:
 
 
 def _shape_of(part: dict[str, Any]) -> list[int]:
-    """What a layer is built for, without the number of windows; without it Keras would have to work it out."""
+    """Returns the input shape of a layer without the batch axis."""
     shape = [size for size in part["build_config"]["input_shape"][1:] if size is not None]
     if not shape or any(type(size) is not int or size < 1 for size in shape):
         raise ValueError("a layer that is built for no shape")
@@ -122,10 +128,10 @@ def _shape_of(part: dict[str, Any]) -> list[int]:
 
 
 def _num_declared(part: dict[str, Any]) -> int:
-    """Weights that a layer is going to have."""
+    """Returns the number of weights that a layer will allocate."""
     settings, inputs = part["config"], _shape_of(part)[-1]
     if part["class_name"] == "BatchNormalization":
-        return 2 * inputs  # at least; up to twice as many
+        return 2 * inputs  # a lower bound; a layer has up to twice as many
     outputs = settings["units"] if part["class_name"] == "Dense" else settings["filters"]
     width = 1 if part["class_name"] == "Dense" else math.prod(settings["kernel_size"])
     if any(type(number) is not int or number < 1 for number in (outputs, width)) or settings.get("groups", 1) != 1:
@@ -134,7 +140,7 @@ def _num_declared(part: dict[str, Any]) -> int:
 
 
 def _num_weights(content: bytes) -> int:
-    """Values in a file of weights, each of whose arrays stands in it in full."""
+    """Returns the number of values in a file of weights, all of which must be stored in the file itself."""
     import h5py
 
     num_values = 0

@@ -1,7 +1,4 @@
-"""A trained simulator at rest: a folder of three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
-
-It knows files and checksums, and that Keras opens them in safe mode; not what the networks are for.
-"""
+"""Saves and loads a trained simulator: three `.keras` files, `settings.json`, and `manifest.json` with their checksums."""
 
 import os
 import warnings
@@ -18,26 +15,26 @@ if TYPE_CHECKING:
     from enhsim_tf.keras_tools.backend import keras
 
 MANIFEST, SETTINGS = "manifest.json", "settings.json"
-MOST_SETTINGS = 50_000_000  # bytes of a JSON file; ours have some ten thousand
-_OURS = b'"enhsim_tf.EnhancedSimulator/'  # stands at the beginning of the manifest of every version
+MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
+_OURS = b'"enhsim_tf.EnhancedSimulator/'  # near the beginning of every manifest, in all versions of the format
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 _NETWORKS = ("enhancer", "generator", "discriminator")
 
 
 def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"], settings: Mapping[str, Any]) -> None:
-    """Writes the folder, whole or not at all.
+    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged.
 
     Args:
-        folder: Where to; a saved simulator that stands there is replaced.
-        networks: `enhancer`, `generator` and `discriminator`.
-        settings: Everything else, in plain JSON types.
+        folder: The folder. A simulator that was saved there before is replaced.
+        networks: The networks `enhancer`, `generator` and `discriminator`.
+        settings: All other settings, in plain JSON types.
 
     Raises:
-        InputError: If something else than a saved simulator stands there, which is left as it is.
+        InputError: If the folder contains something other than a saved simulator; it is left unchanged.
     """
     folder = Path(folder)
     if is_foreign(folder):
-        raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which holds something else.")
+        raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which contains something else.")
     with replace_folder(folder) as temporary:
         for name in _NETWORKS:
             networks[name].save(temporary / f"{name}.keras", include_optimizer=False)
@@ -47,9 +44,9 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"]
 
 
 def is_foreign(folder: Path) -> bool:
-    """Whether something else than a saved simulator stands there; a damaged one is one, and an empty folder is as good as none."""
+    """Whether a path exists and is neither an empty folder nor a saved simulator. A damaged simulator counts as a saved one."""
     manifest = folder / MANIFEST
-    is_ours = manifest.is_file() and _OURS in _beginning_of(manifest)  # others have manifests too
+    is_ours = manifest.is_file() and _OURS in _beginning_of(manifest)  # other programs write files of this name too
     is_empty = folder.is_dir() and not any(folder.iterdir())
     return os.path.lexists(folder) and not (is_ours or is_empty)
 
@@ -60,13 +57,13 @@ def _beginning_of(path: Path) -> bytes:
 
 
 def check_saved(folder: str | os.PathLike) -> None:
-    """Checks that a saved simulator is whole, by its checksums; loads no network.
+    """Verifies the checksums of a saved simulator without loading its networks.
 
     Args:
         folder: The folder.
 
     Raises:
-        InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
+        InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
     """
     folder = Path(folder)
     manifest = _json_of(folder, MANIFEST)
@@ -84,10 +81,13 @@ def _is_complete(checksums: Any) -> bool:
 
 
 def settings_of(folder: str | os.PathLike) -> dict[str, Any]:
-    """The settings that were saved, as they stand there.
+    """Reads the settings of a saved simulator.
+
+    Args:
+        folder: The folder.
 
     Raises:
-        InputError: If they cannot be read.
+        InputError: If the settings cannot be read.
     """
     return _json_of(Path(folder), SETTINGS)
 
@@ -105,19 +105,19 @@ def _json_of(folder: Path, name: str) -> dict[str, Any]:
 
 
 def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Model"], Mapping[str, Any]], Any]) -> Any:
-    """Reads what `write_saved` wrote, in Keras' safe mode.
+    """Loads a saved simulator, in Keras' safe mode.
 
     Args:
-        folder: The folder.
-        make: Makes the simulator from the networks and the settings.
+        folder: A folder written by `write_saved`.
+        make: Function that creates the simulator from the networks and the settings.
 
     Returns:
-        What `make` made.
+        The simulator, as returned by `make`.
 
     Raises:
-        InputError: If the folder is not one that `write_saved` wrote, or if a file in it was changed.
+        InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
     """
-    from enhsim_tf.keras_tools.backend import keras, tf  # here: what only looks at a folder should not wait for it
+    from enhsim_tf.keras_tools.backend import keras, tf  # imported here, because checking a folder does not need TensorFlow
 
     folder = Path(folder)
     check_saved(folder)
@@ -126,9 +126,9 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
         for name in _NETWORKS:
             check_network(folder / f"{name}.keras")
         with warnings.catch_warnings():
-            warnings.simplefilter("error", UserWarning)  # of a layer that the file has no weights for, Keras only warns
+            warnings.simplefilter("error", UserWarning)  # Keras only warns about layers without weights in the file
             networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
-        if sha256(folder / MANIFEST) != as_checked:  # a new simulator took its place meanwhile, and the networks may be of both
+        if sha256(folder / MANIFEST) != as_checked:  # another process replaced the simulator, so the networks may be mixed
             raise ValueError("it was replaced while it was read; try again")
         return make(networks, settings)
     except (*DAMAGES, UserWarning, tf.errors.OpError) as error:

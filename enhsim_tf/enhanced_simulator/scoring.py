@@ -1,7 +1,7 @@
-"""Scores of real telemetry by a detector that has seen nothing but generated nominal telemetry.
+"""Scores real telemetry with a detector that was trained on generated nominal telemetry only.
 
-The threshold is set on a generated series that the detector has not seen, sample by sample in the way real telemetry is
-scored: if simulation and reality were alike, it would flag real nominal samples at the rate it was set for.
+The threshold is a quantile of the detector's scores on another generated series, which is scored in the same way as real
+telemetry. The chosen false-alarm rate holds for real nominal telemetry as far as the simulation is accurate.
 """
 
 import dataclasses
@@ -24,19 +24,22 @@ if TYPE_CHECKING:
 
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
-_THRESHOLD_WINDOWS = 1_000  # length of the generated series that sets the threshold: neighbouring scores are alike, so few are too few
-_STRIDES = 8  # scored windows a window's length
+_THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; long, because neighbouring scores are correlated
+_STRIDES = 8  # number of scored windows that begin within one window length
 
 
 @dataclasses.dataclass(frozen=True)
 class ScoreOptions:
-    """How telemetry is scored.
+    """Settings for scoring telemetry.
 
     Args:
-        detector: One of `detectors.DETECTORS`.
-        num_windows: Generated nominal windows that it learns from.
-        false_alarm_rate: Share of nominal samples that may be flagged.
-        seed: Seed of everything drawn.
+        detector: Name of a detector in `detectors.DETECTORS`.
+        num_windows: Number of generated nominal windows for training the detector.
+        false_alarm_rate: Share of generated nominal samples that the threshold flags.
+        seed: Random seed.
+
+    Raises:
+        InputError: If the detector is unknown or a number is out of range.
     """
 
     detector: str = "PCA residual"
@@ -55,16 +58,18 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     """Scores every sample of a channel.
 
     Args:
-        simulator: The fitted simulator of that channel.
-        parts: Regular stretches of telemetry, as `cleaning.clean` makes them; one shorter than a window gets no scores.
-        options: How.
+        simulator: The simulator fitted to that channel.
+        parts: Regularly sampled parts of telemetry, as returned by `cleaning.clean`. A part shorter than a window gets no
+            scores.
+        options: Settings of the scoring. None uses the defaults.
 
     Returns:
-        A frame with the index of `sources.to_series` and the columns `value`, `score` (1 is where the flag begins; NaN
-        where a stretch is too short to be scored) and `flag`. `frame.attrs` holds `expected_false_alarm_rate`.
+        A data frame with the index of `sources.to_series` and the columns `value`, `score` (scaled so that the threshold is
+        1; NaN in parts shorter than a window) and `flag` (whether the score is above 1). `frame.attrs` contains
+        `expected_false_alarm_rate`.
 
     Raises:
-        InputError: If the sampling interval is another than the simulator's, or every stretch is shorter than a window.
+        InputError: If the sampling interval differs from the simulator's, or if every part is shorter than a window.
     """
     import pandas as pd
 
@@ -72,12 +77,13 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     window, stride = simulator.window, max(1, simulator.window // _STRIDES)
     if any(abs(part.interval_s - simulator.interval_s) > 1e-3 * simulator.interval_s for part in parts):
         raise InputError(
-            f"Expected a sample every {simulator.interval_s:g} s, as the simulator was fitted. Received: every {parts[0].interval_s:g} s. "
-            "Give telemetry of the same rate, or --interval."
+            f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {parts[0].interval_s:g} s. "
+            "Give telemetry with the same sampling interval, or --interval."
         )
     if all(len(part) < window for part in parts):
         raise InputError(
-            f"Expected a stretch of at least a window of {window} samples. Received: {max(map(len, parts), default=0)}. Give more."
+            f"Expected a part of at least one window of {window} samples. Received: {max(map(len, parts), default=0)} samples. "
+            "Give more telemetry."
         )
     training = simulator.generate(options.num_windows, seed=options.seed)
     detector = DETECTORS[options.detector](options.seed).fit(training)
@@ -96,16 +102,16 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
 
 
 def _relative(scores: np.ndarray, threshold: float) -> np.ndarray:
-    """Scores moved and scaled so that the threshold is 1; a threshold that is not positive is moved only."""
+    """Scales the scores so that the threshold becomes 1. If the threshold is not positive, the scores are shifted instead."""
     return scores / threshold if threshold > 0 else 1 + scores - threshold
 
 
 def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
-    """Writes scores to a `.parquet` or `.csv` file, which appears when it is complete.
+    """Writes scores to a `.parquet` or `.csv` file. The file appears only when it is complete.
 
     Args:
-        path: The file.
-        frame: What `score_channel` returned.
+        path: Path of the file.
+        frame: Scores, as returned by `score_channel`.
     """
     with replace_file(path) as temporary:
         if Path(path).suffix == ".csv":

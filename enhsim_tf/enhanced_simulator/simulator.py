@@ -1,7 +1,4 @@
-"""The product, steps 5 and "Combined" of the paper's pipeline: coarse simulator -> enhanced -> + noise.
-
-It puts the rooms below together and trains none of their networks by hand.
-"""
+"""The enhanced simulator: coarse simulation, enhancement and generated noise (step 5 and "Combined" of the paper's pipeline)."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,18 +33,19 @@ PAPER: Mapping[str, Any] = MappingProxyType(
 
 
 class EnhancedSimulator:
-    """A coarse simulator whose output is enhanced to realistic telemetry.
+    """Generates realistic telemetry from a coarse simulator, an enhancing network and generated noise.
 
     Args:
         coarse: The coarse simulator.
-        enhancer: Network one, from coarse to enhanced windows of shape `(windows, samples)`.
-        noise: Network two, trained.
+        enhancer: Network that maps coarse windows to enhanced windows, both of shape `(windows, samples)`.
+        noise: The trained noise networks.
         interval_s: Sampling interval in seconds.
-        offset: What the enhancer's zero stands for, in the telemetry's unit.
-        scale: What the enhancer's one stands for, in the telemetry's unit.
-        levels: For telemetry whose level and amplitude change: shift and gain against the coarse simulator, in the order
-            of time, shape `(times, 2)`. Each generated window has those of one of these times. None: they never change.
-        trained: How the networks were trained, in plain JSON types: kept with them for the record.
+        offset: Value, in the telemetry's unit, that corresponds to 0 in the enhancer's normalised units.
+        scale: Size, in the telemetry's unit, of 1 in the enhancer's normalised units.
+        levels: For telemetry whose level and amplitude change: offset and gain relative to the coarse simulator at several
+            times, in the order of time, shape `(times, 2)`. Each generated window uses one of these rows. None means that
+            level and amplitude are constant.
+        trained: Record of how the networks were trained, in plain JSON types. It is saved with the networks.
 
     Example:
     >>> simulator = EnhancedSimulator.fit(telemetry, coarse=SquareWaveSimulator.fit(telemetry), seed=0)
@@ -74,7 +72,7 @@ class EnhancedSimulator:
 
     @property
     def window(self) -> int:
-        """Samples of a window."""
+        """Length of a window in samples."""
         return self.enhancer.input_shape[1]
 
     @classmethod
@@ -156,13 +154,13 @@ class EnhancedSimulator:
         return train(cls, telemetry, coarse, settings, verbose, progress)
 
     def residual_windows(self, telemetry: Telemetry | Sequence[Telemetry], num_windows: int, rng: np.random.Generator) -> np.ndarray:
-        """What the enhanced signal leaves of telemetry: its noise, and what the simulator does not know.
+        """Returns the difference between telemetry and the enhanced signal: noise, and effects that are not simulated.
 
         Args:
-            telemetry: Telemetry that the coarse simulator is in step with, or its stretches; a simulator that remembers
-                levels is set to each window first.
+            telemetry: Telemetry on the clock of the coarse simulator, or the parts between its gaps. A simulator with
+                `levels` is aligned with each window first.
             num_windows: Number of windows, cut at random offsets.
-            rng: Owner of the offsets.
+            rng: Random generator that draws the offsets.
 
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
@@ -173,11 +171,16 @@ class EnhancedSimulator:
         return pairs.target - self.follow(pairs)
 
     def pairs(self, telemetry: Telemetry | Sequence[Telemetry], places: np.ndarray) -> Pairs:
-        """Windows of telemetry with the coarse ones of the same times, set to their clock and levels if levels are remembered.
+        """Cuts windows of telemetry together with the coarse windows of the same times.
+
+        A simulator with `levels` is aligned with each window in time, offset and gain.
 
         Args:
-            telemetry: Telemetry, or its stretches.
-            places: Where each window begins, counted over the stretches as `pairs.num_places` counts.
+            telemetry: Telemetry, or the parts between its gaps.
+            places: Start of each window, counted over all parts in the way of `training_pairs.num_places`.
+
+        Returns:
+            The pairs of windows.
         """
         pairs = cut_pairs(check_parts(telemetry), self.coarse, places, self.window, self.levels is not None)
         return pairs if self.levels is None else self.align_to_enhanced(pairs)
@@ -198,21 +201,27 @@ class EnhancedSimulator:
         return set_by_shape(pairs, coarse, self.enhance(coarse))
 
     def follow(self, pairs: Pairs) -> np.ndarray:
-        """The enhanced, still clean counterpart of telemetry, at the level of each window, float32 of shape `(windows, samples)`.
+        """Returns the enhanced signal without noise for pairs of windows, at the level of the telemetry.
 
         Args:
-            pairs: Windows of the coarse simulator and how it was set to the telemetry's.
+            pairs: Pairs of coarse windows and telemetry, with the offset and gain of each.
+
+        Returns:
+            float32 array of shape `(windows, samples)`, in the telemetry's unit.
         """
         enhanced = self.enhance(pairs.coarse)
         return enhanced if self.levels is None else at_level(enhanced, pairs.shift, pairs.gain)
 
     def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
-        """Generates coarse windows (step 2) that begin at random samples, float32 of shape `(num_windows, samples)`.
+        """Generates coarse windows that begin at random times (step 2 of the paper's pipeline).
 
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
-            seed: Seed of everything drawn; the same seed gives the same.
+            seed: Random seed. The same seed gives the same windows.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
         check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
@@ -221,19 +230,22 @@ class EnhancedSimulator:
         return coarse if levels is None else at_level(coarse, *levels.T)
 
     def _draw_levels(self, num_windows: int, seed: int) -> np.ndarray | None:
-        """Shift and gain of each generated window, shape `(num_windows, 2)`: those of a time seen in training."""
+        """Draws the offset and gain of each generated window from those seen in training, shape `(num_windows, 2)`."""
         if self.levels is None:
             return None
         return self.levels[np.random.default_rng([seed, 2]).integers(0, len(self.levels), num_windows)]
 
     def enhance(self, coarse: np.ndarray) -> np.ndarray:
-        """Enhanced, still clean windows (step 5) from coarse ones, float32 of the same shape `(windows, samples)`.
+        """Enhances coarse windows; no noise is added (step 5 of the paper's pipeline).
 
         Args:
-            coarse: Coarse windows, as `generate_coarse` makes them.
+            coarse: Coarse windows of shape `(windows, samples)`, for example from `generate_coarse`.
+
+        Returns:
+            float32 array of the same shape, in the telemetry's unit.
 
         Raises:
-            InputError: If they are not windows of the enhancer's width.
+            InputError: If the windows do not have the length that the enhancer expects.
         """
         if np.ndim(coarse) != 2 or np.shape(coarse)[1] != self.window:
             raise InputError(f"Expected coarse windows of shape (windows, {self.window}). Received: shape {np.shape(coarse)}.")
@@ -248,13 +260,13 @@ class EnhancedSimulator:
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
-            seed: Seed of the windows' first samples, of the scenario and of the noise; the same seed gives the same.
+            seed: Random seed of start times, scenario and noise. The same seed gives the same windows.
 
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
 
         Raises:
-            InputError: If `num_windows` is negative or no whole number.
+            InputError: If `num_windows` is negative or not a whole number.
         """
         check_counts(num_windows=(num_windows, 0))
         windows, filled = np.empty((num_windows, self.window), np.float32), 0
@@ -264,12 +276,15 @@ class EnhancedSimulator:
         return windows
 
     def generate_chunks(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> Iterator[np.ndarray]:
-        """Yields the windows of `generate` in turn, some thousand at a time: any number of them in the same memory.
+        """Yields the windows of `generate` in chunks of some thousand, so that memory does not grow with their number.
 
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
-            seed: Seed of everything drawn; the same seed gives the same.
+            seed: Random seed. The same seed gives the same windows.
+
+        Yields:
+            float32 arrays of shape `(chunk, samples)`, in the telemetry's unit.
         """
         noise_rng = _noise_rng(seed)
         for windows in self._clean_chunks(num_windows, scenario, seed):
@@ -277,12 +292,15 @@ class EnhancedSimulator:
             yield windows
 
     def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
-        """The windows of `generate` before noise is added, of the same shape.
+        """Returns the windows of `generate` before noise is added.
 
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
-            seed: The seed of `generate`.
+            seed: Random seed, with the same meaning as in `generate`.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
         chunks = list(self._clean_chunks(num_windows, scenario, seed))
         return np.concatenate(chunks) if chunks else np.empty((0, self.window), np.float32)
@@ -297,27 +315,27 @@ class EnhancedSimulator:
             yield windows if levels is None else at_level(windows, *levels[first : first + _CHUNK].T)
 
     def generate_to_parquet(self, path: str | os.PathLike, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> None:
-        """Writes the windows of `generate` to a Parquet file as they are made; the memory needed does not grow with their number.
+        """Writes the windows of `generate` to a Parquet file, chunk by chunk, so that memory does not grow with their number.
 
         Args:
-            path: The file.
+            path: Path of the file.
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
-            seed: Seed of everything drawn; the same seed gives the same.
+            seed: Random seed. The same seed gives the same windows.
         """
         write_windows(path, self.generate_chunks(num_windows, scenario, seed), self.window)
 
     def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
-        """Generates one continuous series of any length, without seams.
+        """Generates one continuous series of any length, without visible joins between windows.
 
-        Enhanced windows that overlap by half are faded into each other with weights that add up to one; the noise has a
-        way of its own (`NoiseGAN.generate_series`). That of the paper's networks repeats a pattern every half window (it
-        correlates at about 0.5 with itself there); with `noise="convolutional"` it does not.
+        Enhanced windows that overlap by half are cross-faded with weights that add up to one. The noise is generated
+        separately, by `NoiseGAN.generate_series`. Noise of the paper's networks repeats a pattern every half window, with
+        an autocorrelation of about 0.5 at that lag; noise of `noise="convolutional"` does not.
 
         Args:
-            num_samples: Length of the series.
-            scenario: A degraded mode over the whole series, or None.
-            seed: Seed of the scenario and of the noise.
+            num_samples: Length of the series in samples.
+            scenario: A degraded mode over the whole series, or None for nominal telemetry.
+            seed: Random seed of the scenario and the noise.
             start_s: Time of the first sample on the coarse simulator's clock, in seconds.
 
         Returns:
@@ -330,14 +348,14 @@ class EnhancedSimulator:
         rng = np.random.default_rng(seed)
         times = start_s + self.interval_s * np.arange(length)[None]
         coarse = self.coarse.simulate(times, rng=rng)[0]
-        if scenario is not None:  # the last window may reach beyond the end, which the scenario knows nothing of
+        if scenario is not None:  # the scenario covers only the series, and the last window may extend beyond it
             coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
         if self.levels is not None:
             enhanced = at_level(enhanced, *self._follow_levels(num_windows, seed).T)
 
-        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # of two windows half a window apart they add up to 1
+        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
         signal, total = np.zeros((2, length))
         for begin, clean in zip(begins, enhanced, strict=True):
             signal[begin : begin + window] += fade * clean
@@ -345,16 +363,19 @@ class EnhancedSimulator:
         return (signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed))
 
     def _follow_levels(self, num_windows: int, seed: int) -> np.ndarray:
-        """Shift and gain of windows that follow each other: the levels seen in training, forth and back from a random time."""
-        there_and_back = np.concatenate([self.levels, self.levels[-2:0:-1]])
-        begin = np.random.default_rng([seed, 2]).integers(0, len(there_and_back))
-        return there_and_back[(begin + np.arange(num_windows)) % len(there_and_back)]
+        """Returns offset and gain of consecutive windows: those seen in training, forwards and backwards from a random time."""
+        cycle = np.concatenate([self.levels, self.levels[-2:0:-1]])
+        begin = np.random.default_rng([seed, 2]).integers(0, len(cycle))
+        return cycle[(begin + np.arange(num_windows)) % len(cycle)]
 
     def save(self, folder: str | os.PathLike) -> None:
-        """Saves to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
+        """Saves the simulator to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
+
+        Args:
+            folder: The folder. A simulator that was saved there before is replaced.
 
         Raises:
-            InputError: If something else than a saved simulator stands there, which is left as it is.
+            InputError: If the folder contains something other than a saved simulator; it is left unchanged.
         """
         settings = {
             "coarse": self.coarse.get_config(),
@@ -371,10 +392,16 @@ class EnhancedSimulator:
 
     @classmethod
     def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
-        """Loads what `save` wrote, in Keras' safe mode.
+        """Loads a saved simulator, in Keras' safe mode.
+
+        Args:
+            folder: A folder written by `save`.
+
+        Returns:
+            The simulator.
 
         Raises:
-            InputError: If the folder is not one that `save` wrote, or if a file in it was changed.
+            InputError: If the folder was not written by `save`, or if a file in it has changed since.
         """
         return read_saved(folder, cls._from_saved)
 
@@ -387,5 +414,5 @@ class EnhancedSimulator:
 
 
 def _noise_rng(seed: int) -> np.random.Generator:
-    """Draws for the noise that have nothing to do with those for the coarse windows, which `seed` itself makes."""
+    """Returns a random generator for the noise that is independent of the one for the coarse windows, which uses `seed` alone."""
     return np.random.default_rng([seed, 1])

@@ -1,4 +1,4 @@
-"""Where the windows of an enhanced simulator can be trusted: what its enhancer was taught, and what it makes up."""
+"""Detects coarse windows outside the enhancer's training range, for which enhanced windows are extrapolations."""
 
 from typing import TYPE_CHECKING
 
@@ -11,17 +11,17 @@ if TYPE_CHECKING:
     from enhsim_tf.coarse_simulator.degraded import Degraded
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
-_NUM_NOMINAL = 1_500  # coarse windows of each: those that the range is learnt from, and those that set its limit
-_LEAST_LIMIT = 1e-3  # of coarse windows that repeat exactly; below it nothing is to be seen
-_START_RANGE = 1_000_000  # samples; windows begin at a random one of these, so at every phase of the waves
+_NUM_NOMINAL = 1_500  # coarse windows for fitting the range, and as many others for its limit
+_LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows whose scores are all close to 0
+_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 
 
 class TrustedRange:
-    """The range of a simulator's nominal coarse windows, which are all that its enhancer learnt from.
+    """The range of a simulator's nominal coarse windows, the only ones on which its enhancer was trained.
 
     Args:
-        simulator: The simulator, fitted to nominal telemetry.
-        rate: Share of nominal windows that count as out of range.
+        simulator: A simulator fitted to nominal telemetry.
+        rate: Share of nominal windows that count as outside the range.
 
     Example:
     >>> trusted = TrustedRange(simulator)
@@ -35,29 +35,29 @@ class TrustedRange:
         self._limit = max(detection.threshold(self._range.score(held_out), rate), _LEAST_LIMIT)
 
     def score(self, coarse: np.ndarray) -> np.ndarray:
-        """How far coarse windows are out of range: above 1 lie no more nominal ones than were asked for.
+        """Scores how far coarse windows are outside the training range. A share `rate` of nominal windows scores above 1.
 
-        Over degraded modes it rises with the error of the enhanced window: docs/REPORT.md has the rank correlation. What it
-        cannot know is whether the coarse simulator itself is right.
+        Across degraded modes, the score is correlated with the error of the enhanced window; docs/REPORT.md gives the rank
+        correlation. The score does not measure whether the coarse simulator itself is accurate.
 
         Args:
             coarse: Coarse windows of shape `(windows, samples)`, at the coarse simulator's own level.
 
         Returns:
-            A score for each, float64 of shape `(windows,)`.
+            One score per window, float64 of shape `(windows,)`.
 
         Raises:
-            InputError: If they have another length or are not finite.
+            InputError: If the windows have the wrong length or are not finite.
         """
         return self._range.score(coarse) / self._limit
 
     def share_outside(self, scenario: "Degraded | None", num_windows: int = 200, seed: int = 0) -> float:
-        """Share of a scenario's windows that are out of range.
+        """Returns the share of a scenario's windows that are outside the training range.
 
         Args:
             scenario: A degraded mode, or None for nominal windows.
-            num_windows: How many are drawn.
-            seed: Seed of the draws.
+            num_windows: Number of windows to simulate.
+            seed: Random seed.
         """
         return float(np.mean(self.score(self._coarse(scenario, num_windows, 2 + seed)) > 1))
 

@@ -295,7 +295,7 @@ def test_a_detector_that_alarms_on_everything_notices_nothing():
 def test_where_it_was_measured_is_told():
     assert "volts: windows of 64 samples, period 400 s; measured on 200 windows held out" == made_up().lines()[0]
     seen = made_up(is_held_out=False, num_windows=1, time_unit="samples")
-    assert seen.lines()[0] == "volts: windows of 64 samples, period 400 samples; measured on 1 window of what it learnt from"
+    assert seen.lines()[0] == "volts: windows of 64 samples, period 400 samples; measured on 1 window of the training telemetry"
     assert "none was held out" in sentence(seen, "Signal")
     assert all(len(line.splitlines()) == 1 for line in made_up(channel="a\nb\x1b[31m").lines())
 
