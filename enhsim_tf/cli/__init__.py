@@ -1,4 +1,4 @@
 """The commands of `python -m enhsim_tf`: one module for each command, and their options.
 
-The commands may use every package except `reproduce`. Nothing imports them.
+This package may import every package except `reproduce`. No other package imports it.
 """

@@ -2,19 +2,17 @@
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
-
-from enhsim_tf.common.console import tell
-
-if TYPE_CHECKING:
-    pass
-
 
 from enhsim_tf.cli.options import cleaning_of, tell_failed
+from enhsim_tf.common.console import tell
 
 
 def run_fit(options: argparse.Namespace) -> int:
-    """Fits a simulator to each channel of the source."""
+    """Fits a simulator to each channel of the source and returns the exit code.
+
+    Args:
+        options: Parsed options of `fit`.
+    """
     from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 
     counts = (options.num_windows, options.epochs, options.iterations)
@@ -22,7 +20,7 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.common.parallel.engines import workers_of
 
     workers = workers_of(options.workers)
-    from enhsim_tf.enhanced_simulator.fit_many import fit_channels  # pandas takes a while
+    from enhsim_tf.enhanced_simulator.fit_many import fit_channels  # imported here, because pandas is slow to import
     from enhsim_tf.telemetry.sources import read_source
 
     cleaning = cleaning_of(options, options.window or 64)

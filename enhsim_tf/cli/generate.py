@@ -1,24 +1,26 @@
-"""`python -m enhsim_tf generate`: labelled training data from fitted simulators."""
+"""`python -m enhsim_tf generate`: generates labelled training data with fitted simulators."""
 
 import argparse
-from typing import TYPE_CHECKING
 
+from enhsim_tf.cli.options import counted, for_each, load, outputs_of
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
-if TYPE_CHECKING:
-    pass
-
-
-from enhsim_tf.cli.options import counted, for_each, load, outputs_of
-
 
 def run_generate(options: argparse.Namespace) -> int:
-    """Generates labelled training data from each channel's simulator."""
+    """Generates labelled training data with the simulator of each channel and returns the exit code.
+
+    Args:
+        options: Parsed options of `generate`.
+    """
     if options.nominal_share is not None and not options.scenarios and (options.continuous is not None or not options.scenario):
-        raise InputError("Expected --nominal-share with --windows and --scenario only. Received: it without them. Leave it out.")
+        raise InputError(
+            "Expected --nominal-share only together with --windows and --scenario. Received: --nominal-share without them. Leave it out."
+        )
     if options.start is not None and options.continuous is None:
-        raise InputError(f"Expected --start with --continuous only. Received: --start {options.start} with --windows. Leave it out.")
+        raise InputError(
+            f"Expected --start only together with --continuous. Received: --start {options.start} with --windows. Leave it out."
+        )
     if options.workers or options.engine or options.scenarios:
         from enhsim_tf.cli.generate_many import run_fleet
 
@@ -40,7 +42,7 @@ def run_generate(options: argparse.Namespace) -> int:
     if options.windows is not None and options.windows < 1:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
     if options.continuous is not None and len(scenarios) > 1:
-        raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write a series for each.")
+        raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write one series for each.")
     nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
     shares = shares_of(scenarios, options.windows or 0, nominal_share, options.seed) if options.windows else []
     start = None if options.start is None else start_of(options.start)
@@ -70,7 +72,7 @@ def run_generate(options: argparse.Namespace) -> int:
         for scenario in scenarios:
             share = trusted.share_outside(scenario)
             tell(
-                f"{printable(channel)}: {scenario.mode} at {scenario.severity:g}: {share:.0%} of such windows are beyond what its enhancer learnt from"
+                f"{printable(channel)}: {scenario.mode} at {scenario.severity:g}: {share:.0%} of such windows are outside its enhancer's training range"
             )
 
     return for_each(models, write)

@@ -1,4 +1,4 @@
-"""`python -m enhsim_tf generate` with `--workers`, `--engine` or `--scenarios`: what the options mean for a large data set."""
+"""`python -m enhsim_tf generate` with `--workers`, `--engine` or `--scenarios`: generates large data sets."""
 
 import argparse
 import dataclasses
@@ -15,34 +15,45 @@ from enhsim_tf.enhanced_simulator.model_folder import chosen_of, folder_of, mode
 
 
 def run_fleet(options: argparse.Namespace, tell: Callable[[str], None]) -> int:
-    """Makes the data sets that the options ask for, one a channel or one of a family of models; returns the exit code.
+    """Generates one data set per channel, or one data set from several models, and returns the exit code.
 
     Args:
-        options: Those of `generate`.
-        tell: Called with each line.
+        options: Parsed options of `generate`.
+        tell: Function that is called with each line of output.
     """
     workers = workers_of(options.workers)
-    plans = plans_of(options)  # all of them are checked before the first is made
+    plans = plans_of(options)  # all plans are checked before the first data set is generated
     for out, plan in plans.items():
         generate_fleet(out, plan, workers, options.engine or "local", tell)
     return 0
 
 
 def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
-    """The data sets by their folders."""
+    """Returns the plan of each data set, by its output folder.
+
+    Args:
+        options: Parsed options of `generate`.
+
+    Raises:
+        InputError: If options contradict each other or the scenario file, or if a model cannot be used.
+    """
     if options.continuous is not None:
         raise InputError("Expected --windows with --workers, --engine or --scenarios. Received: --continuous.")
     if options.scenarios is None:
         mix = mix_of([parse_scenario(text) for text in options.scenario], 0.5 if options.nominal_share is None else options.nominal_share)
     elif options.scenario or options.nominal_share is not None:
-        raise InputError("Expected scenarios in one place. Received: --scenarios with --scenario or --nominal-share. Put all in the file.")
+        raise InputError(
+            "Expected scenarios in one place. Received: --scenarios with --scenario or --nominal-share. Put them all in the file."
+        )
     else:
         mix = read_mix(options.scenarios)
     num_windows = _one("windows", mix.num_windows, options.windows)
     seed = _one("seed", mix.seed, options.seed, 0)
     if mix.models:
         if options.channel:
-            raise InputError("Expected models in one place. Received: --channel, and a scenario file that names models.")
+            raise InputError(
+                "Expected models in one place. Received: --channel, and a scenario file that names models. Leave out --channel."
+            )
         return {options.out: plan_of(mix, options.models, seed, num_windows)}
     models = chosen_of(models_of(options.models), options.channel)
     plans = {}
@@ -53,12 +64,12 @@ def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
 
 
 def _one(what: str, in_file: int | None, given: int | None, default: int | None = None) -> int:
-    """A number that the file or the command line gives; not two numbers."""
+    """Returns a number that is given in the scenario file or on the command line, but not as two different numbers."""
     if in_file is not None and given is not None and in_file != given:
         raise InputError(f"Expected {what} in one place. Received: {in_file:,} in the scenario file and --{what} {given:,}.")
     found = given if in_file is None else in_file
     if found is None and default is None:
-        raise InputError(f"Expected how many {what}. Received: neither --{what} nor {what} in a scenario file.")
+        raise InputError(f"Expected a number of {what}. Received: neither --{what} nor {what} in a scenario file. Give one of them.")
     return default if found is None else found
 
 

@@ -1,4 +1,4 @@
-"""What several commands share: options of cleaning, output files, loading, and one line for each channel that failed."""
+"""Functions shared by several commands: cleaning options, output files, loading, and reporting of failed channels."""
 
 import argparse
 import os
@@ -15,7 +15,15 @@ if TYPE_CHECKING:
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
-    """Does the work for each channel; one that cannot be used does not stop the others. Returns the exit code."""
+    """Calls a function for each channel and returns the exit code. A channel that fails does not stop the others.
+
+    Args:
+        channels: Names of the channels.
+        work: Function of a channel's name.
+
+    Raises:
+        InputError: If there is only one channel and it fails.
+    """
     channels, failed = list(channels), {}
     for channel in channels:
         try:
@@ -28,19 +36,28 @@ def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
 
 
 def tell_failed(failed: dict[str, str]) -> int:
-    """A line for each channel that could not be used; returns the exit code."""
+    """Prints one line on stderr for each failed channel and returns the exit code.
+
+    Args:
+        failed: The reason of each failure, by the channel's name.
+    """
     for channel, reason in failed.items():
         print(f"error: {printable(channel)}: {' '.join(reason.splitlines())}", file=sys.stderr)
     return 2 if failed else 0
 
 
 def counted(number: int, noun: str) -> str:
-    """A number with its noun: 1 window, 2,000 windows."""
+    """Formats a number with its noun, for example `1 window` or `2,000 windows`."""
     return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
 
 
 def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
-    """The options of cleaning."""
+    """Returns the cleaning settings given by the options.
+
+    Args:
+        options: Parsed options of `fit` or `score`.
+        min_part: Minimum length of a part in samples.
+    """
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
     bad = "drop" if options.drop_bad else "refuse"
@@ -55,15 +72,15 @@ def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
 
 
 def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
-    """A file for each channel: the one that was named, or one a channel in the folder that was named.
+    """Returns the output file of each channel.
 
     Args:
-        out: What was named.
+        out: The value of `--out`: a file for one channel, or a folder that gets one file per channel.
         channels: Names of the channels.
-        suffixes: Of the files that can be written; the first where a folder was named.
+        suffixes: Allowed file extensions; the first is used for files in a folder.
 
     Raises:
-        InputError: If one file was named for several channels, or it cannot be written.
+        InputError: If one file is given for several channels, or if a file cannot be written.
     """
     from enhsim_tf.common.atomic_files import make_folder
     from enhsim_tf.enhanced_simulator.model_folder import folder_of
@@ -71,7 +88,7 @@ def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) ->
     names, is_folder = list(channels), os.path.isdir(out)
     if out.suffix in suffixes and not is_folder:
         if len(names) > 1:
-            raise InputError(f"Expected a folder for {len(names)} channels. Received: --out {out}. Name a folder, or one channel.")
+            raise InputError(f"Expected a folder for {len(names)} channels. Received: --out {out}. Give a folder, or choose one channel.")
         make_folder(out.parent)
         return {names[0]: out}
     if out.suffix and not is_folder:
@@ -79,13 +96,13 @@ def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) ->
     paths = {name: folder_of(out, name).with_suffix(suffixes[0]) for name in names}
     for path in paths.values():
         if os.path.isdir(path):
-            raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Name another --out.")
+            raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Give another --out.")
     make_folder(out)
     return paths
 
 
 def load(folder: Path) -> "EnhancedSimulator":
-    """The simulator of a folder."""
+    """Loads the simulator saved in a folder; TensorFlow is imported only here."""
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
     return EnhancedSimulator.load(folder)

@@ -2,20 +2,18 @@
 
 import argparse
 import os
-from typing import TYPE_CHECKING
 
+from enhsim_tf.cli.options import cleaning_of, counted, for_each, load, outputs_of
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
-if TYPE_CHECKING:
-    pass
-
-
-from enhsim_tf.cli.options import cleaning_of, counted, for_each, load, outputs_of
-
 
 def run_score(options: argparse.Namespace) -> int:
-    """Scores each channel of the source that has a simulator."""
+    """Scores each channel of the source with its simulator and returns the exit code.
+
+    Args:
+        options: Parsed options of `score`.
+    """
     from enhsim_tf.detection import detectors
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
 
@@ -28,18 +26,18 @@ def run_score(options: argparse.Namespace) -> int:
 
     models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
-    if len(models) == 1 and len(series) == 1:  # one of each belong together, whatever they are called
+    if len(models) == 1 and len(series) == 1:  # a single channel and a single simulator match even if their names differ
         models = dict(zip(series, models.values(), strict=True))
     unknown = [name for name in series if name not in models]
     if unknown:
         known = ", ".join(list(models)[:8])
         raise InputError(
-            f"Expected channels that were fitted: {printable(known)}. Received: {unknown[0]!r}. Name those to be scored with --column."
+            f"Expected fitted channels: {printable(known)}. Received: {unknown[0]!r}. Select the channels to score with --column."
         )
     paths = outputs_of(options.out, series, (".parquet", ".csv"))
     for path in paths.values():
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
-            raise InputError(f"Expected another --out than the source. Received: {path} for both. Name another.")
+            raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
@@ -51,7 +49,7 @@ def run_score(options: argparse.Namespace) -> int:
         tell(
             f"{printable(channel)}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector}, "
             f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal ones"
-            + (f"; {counted(left, 'sample')} not scored, in pieces shorter than a window" if left else "")
+            + (f"; {counted(left, 'sample')} not scored, in parts shorter than a window" if left else "")
             + f"; in {paths[channel]}"
         )
 

@@ -1,8 +1,8 @@
-"""A data set at rest: a folder of shards, `_manifest.json`, and while it is being made `_journal.jsonl` and `.lock`.
+"""Files of a large data set: shards, `_manifest.json`, and during generation `_journal.jsonl` and `.lock`.
 
-The manifest says what the data set is and, once it is finished, what is recorded of each shard. Until then a line is added
-to the journal for each shard; a line that was not written to its end counts for nothing, and its shard is made again.
-Nothing is believed that its checksum does not show: files are read again before a run goes on behind them.
+The manifest contains the settings of the data set and, once it is finished, the record (rows and checksum) of each shard.
+During generation, each finished shard appends its record to the journal. An incomplete last line is ignored, and its shard
+is generated again. Before a run resumes, the checksum of every recorded shard is verified.
 """
 
 import contextlib
@@ -22,21 +22,24 @@ from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan, key_of
 from enhsim_tf.datasets.scenario_file import MOST_WINDOWS
 from enhsim_tf.datasets.shard import Record, file_of, schema_of
 
-MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of a folder of Parquet files pass over such names
+MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
 _SHARD = re.compile(r"shard-(\d{6,})\.parquet")
-_LEFT = re.compile(r"\.(shard-\d{6,}\.parquet|_manifest\.json)\..*")  # a temporary name of `replace_file`
+_LEFT = re.compile(r"\.(shard-\d{6,}\.parquet|_manifest\.json)\..*")  # temporary names of `replace_file`
 _SHA256 = re.compile("[0-9a-f]{64}")
-_MOST_BYTES = 1_000_000_000  # of a manifest
-_LONGEST_LINE = 1_000  # of the journal, in bytes; what is longer comes in pieces without sense
+_MOST_BYTES = 1_000_000_000  # maximum size of a manifest
+_LONGEST_LINE = 1_000  # maximum bytes of a journal line; longer lines are read in pieces, which are invalid records
 
 
 @contextlib.contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Holds a folder against other runs; the system lets go of it when this process ends, however it ends.
+def locked(folder: Path) -> Iterator[None]:
+    """Locks a folder against other runs. The operating system releases the lock when this process ends for any reason.
+
+    Args:
+        folder: The folder, which is created if necessary.
 
     Raises:
-        InputError: If another run holds it.
-        OSError: If it cannot be written to.
+        InputError: If another run has locked the folder.
+        OSError: If the folder is not writable.
     """
     folder.mkdir(parents=True, exist_ok=True)
     open(folder / _LOCK, "ab").close()  # no probe beside it: another run may be looking at what is there
@@ -54,10 +57,14 @@ def held(folder: Path) -> Iterator[None]:
 
 
 def check_folder(folder: Path, plan: Plan) -> None:
-    """Refuses a folder that holds anything but a data set of this plan, finished or not.
+    """Checks that a folder is new, empty, or contains a finished or unfinished data set of the same plan.
+
+    Args:
+        folder: The folder; it is not changed.
+        plan: The plan of the data set.
 
     Raises:
-        InputError: If it holds something else, or a data set of other settings; nothing is written then.
+        InputError: If the folder contains something else, or a data set with other settings.
     """
     if not folder.is_dir():
         return
@@ -67,17 +74,17 @@ def check_folder(folder: Path, plan: Plan) -> None:
         for name in asked:
             if kept.get(name) != asked[name]:
                 was, now = (json.dumps(each.get(name))[:100] for each in (kept, asked))
-                raise InputError(f"Expected {name} as this data set was begun: {was}. Received: {now}. Name another --out than {folder}.")
+                raise InputError(f"Expected {name} as in the data set in {folder}: {was}. Received: {now}. Give another --out.")
         return
     others = sorted(name for name in names if name != JOURNAL and not _SHARD.fullmatch(name) and not _LEFT.fullmatch(name))
     shards = {name: int(found[1]) for name in sorted(names) if (found := _SHARD.fullmatch(name))}
     others += [name for name, number in shards.items() if number >= plan.num_shards or _key_in(folder / name) != plan.key]
     if others:
-        raise InputError(f"Expected a new folder, or one of this data set. Received: {folder}, which holds {others[0]!r}. Name another.")
+        raise InputError(f"Expected a new folder, or one of this data set. Received: {folder}, which contains {others[0]!r}. Give another.")
 
 
 def _key_in(path: Path) -> str | None:
-    """The key that a shard carries; None where it cannot be read."""
+    """Returns the plan's key stored in a shard, or None if it cannot be read."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -88,10 +95,13 @@ def _key_in(path: Path) -> str | None:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a data set, its form checked.
+    """Reads and validates the manifest of a data set.
+
+    Args:
+        folder: Folder of the data set.
 
     Raises:
-        InputError: If there is none, or a damaged one.
+        InputError: If the manifest is missing or damaged.
     """
     path = folder / MANIFEST
     try:
@@ -110,12 +120,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             raise ValueError("settings that no data set has")
         content["shards"] = None if shards is None else [_record_of(number, each) for number, each in enumerate(shards)]
     except FileNotFoundError:
-        raise InputError(f"Expected a data set that `generate` made. Received: {folder}, without a {MANIFEST}.") from None
+        raise InputError(f"Expected a data set written by `generate`. Received: {folder}, without a {MANIFEST}.") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = " ".join(str(error).split())[:80]
         raise InputError(
-            f"Expected {MANIFEST} as it was written. Received: a damaged one in {folder} ({type(error).__name__}: {reason}). "
-            "Remove it and run `generate` again: the shards are made again."
+            f"Expected an undamaged {MANIFEST}. Received: a damaged one in {folder} ({type(error).__name__}: {reason}). "
+            "Remove it and run `generate` again, which generates all shards again."
         ) from None
     return content
 
@@ -132,7 +142,14 @@ def _is_record(record: Record) -> bool:
 
 
 def read_records(folder: Path) -> dict[int, Record]:
-    """What is recorded of the shards, in the manifest and then in the journal; lines without sense are left out."""
+    """Reads the records of all finished shards from the manifest and the journal. Invalid lines are ignored.
+
+    Args:
+        folder: Folder of the data set.
+
+    Returns:
+        The records by the number of the shard.
+    """
     records = {record.shard: record for record in read_manifest(folder)["shards"] or ()}
     if not (folder / JOURNAL).exists():
         return records
@@ -147,23 +164,29 @@ def read_records(folder: Path) -> dict[int, Record]:
     return records
 
 
-def clear(folder: Path) -> None:
-    """Removes what a killed process left half written."""
+def remove_temporary_files(folder: Path) -> None:
+    """Removes incomplete files of a killed process."""
     for path in folder.iterdir():
         if _LEFT.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 
-def begin(folder: Path, plan: Plan) -> None:
-    """Writes the manifest of a data set that is begun, where there is none."""
+def start_manifest(folder: Path, plan: Plan) -> None:
+    """Writes a manifest without records, if there is no manifest yet."""
     if not (folder / MANIFEST).exists():
         (folder / JOURNAL).unlink(missing_ok=True)
         write_json(folder / MANIFEST, {"format": FORMAT, "settings": plan.settings(), "shards": None})
 
 
 @contextlib.contextmanager
-def journal_of(folder: Path) -> Iterator[Callable[[Record], None]]:
-    """Yields what adds a record to the journal, at once and behind a torn line if there is one."""
+def open_journal(folder: Path) -> Iterator[Callable[[Record], None]]:
+    """Opens the journal and yields a function that appends a record and flushes it.
+
+    If the last line is incomplete, the first record begins on a new line.
+
+    Args:
+        folder: Folder of the data set.
+    """
     with open(folder / JOURNAL, "ab") as journal:
         journal.write(b"\n" if journal.tell() else b"")
 
@@ -174,13 +197,13 @@ def journal_of(folder: Path) -> Iterator[Callable[[Record], None]]:
         yield write
 
 
-def finish(folder: Path, plan: Plan, records: Mapping[int, Record]) -> None:
-    """Writes the manifest of a finished data set; the journal is needed no more.
+def finish_manifest(folder: Path, plan: Plan, records: Mapping[int, Record]) -> None:
+    """Writes the manifest of a finished data set and removes the journal.
 
     Args:
-        folder: The data set.
-        plan: What it is.
-        records: What is recorded of each of its shards.
+        folder: Folder of the data set.
+        plan: The plan of the data set.
+        records: The records of all shards, by the number of the shard.
     """
     shards = [
         {"file": file_of(number), "rows": records[number].rows, "sha256": records[number].sha256} for number in range(plan.num_shards)
@@ -189,8 +212,8 @@ def finish(folder: Path, plan: Plan, records: Mapping[int, Record]) -> None:
     (folder / JOURNAL).unlink(missing_ok=True)
 
 
-def is_whole(folder: Path, record: Record) -> bool:
-    """Whether a shard's file is there and as it was recorded."""
+def is_intact(folder: Path, record: Record) -> bool:
+    """Whether the file of a shard exists and has the recorded checksum."""
     try:
         return sha256(folder / file_of(record.shard)) == record.sha256
     except OSError:
@@ -198,10 +221,13 @@ def is_whole(folder: Path, record: Record) -> bool:
 
 
 def problems_of(folder: str | os.PathLike) -> Iterable[str]:
-    """Checks a finished data set against its manifest, and yields a line for each thing that is wrong.
+    """Verifies a data set against its manifest and yields one line for each problem.
+
+    Args:
+        folder: Folder of the data set.
 
     Raises:
-        InputError: If it is no data set, or its manifest is damaged.
+        InputError: If the folder is not a data set, or if its manifest is damaged.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -220,19 +246,19 @@ def problems_of(folder: str | os.PathLike) -> Iterable[str]:
         path = folder / file_of(record.shard)
         if not path.is_file():
             yield f"{path.name}: missing"
-        elif not is_whole(folder, record):
-            yield f"{path.name}: its checksum is not the one that was recorded"
+        elif not is_intact(folder, record):
+            yield f"{path.name}: its checksum differs from the recorded one"
         else:
             try:
                 num_rows, found = pq.read_metadata(path).num_rows, pq.read_schema(path)
             except (OSError, ValueError, pa.ArrowException):
-                yield f"{path.name}: no Parquet file"
+                yield f"{path.name}: not a Parquet file"
                 continue
             if num_rows != record.rows:
                 yield f"{path.name}: {num_rows:,} windows, {record.rows:,} recorded"
             if not found.equals(schema) or found.metadata != schema.metadata:
-                yield f"{path.name}: other columns or settings than the manifest's"
+                yield f"{path.name}: its columns or settings differ from those of the manifest"
     known = {file_of(record.shard) for record in records}
     for path in sorted(folder.iterdir()):
         if path.name not in known and (_SHARD.fullmatch(path.name) or path.name == JOURNAL):
-            yield f"{path.name}: not of this data set"
+            yield f"{path.name}: not a file of this data set"

@@ -1,7 +1,7 @@
-"""Labelled training data: windows, or one continuous series, with what happens in them and from when.
+"""Labelled training data: windows, or one continuous series, with a label for the scenario of each window or sample.
 
-The labels stand in the columns beside the data: `scenario` (`nominal` or a degraded mode), `severity`, and `onset`, the
-first sample that it concerns.
+The labels are columns beside the data: `scenario` (`nominal` or a degraded mode), `severity`, and for windows `onset`, the
+first affected sample.
 """
 
 import dataclasses
@@ -25,18 +25,20 @@ if TYPE_CHECKING:
 
 NOMINAL = "nominal"
 _SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
-_LENGTH = re.compile(r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?")  # samples are whole
-_MOST_SAMPLES = 20_000_000  # of a continuous series, which is made in memory
+_LENGTH = re.compile(
+    r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?"
+)  # decimals need a unit, because a number of samples is a whole number
+_MOST_SAMPLES = 20_000_000  # maximum length of a continuous series, which is held in memory
 
 
 @dataclasses.dataclass(frozen=True)
 class Share:
-    """A part of a training set.
+    """A part of a training set: windows of one scenario.
 
     Args:
-        scenario: A degraded mode, or None for nominal.
-        num_windows: Its windows.
-        seed: Seed of everything drawn for it.
+        scenario: A degraded mode, or None for nominal telemetry.
+        num_windows: Number of windows.
+        seed: Random seed of these windows.
     """
 
     scenario: Degraded | None
@@ -45,10 +47,13 @@ class Share:
 
 
 def parse_scenario(text: str) -> Degraded:
-    """Reads `mode:severity` or `mode:severity:onset`, such as `stuck:0.5`.
+    """Parses a scenario in the form `mode:severity` or `mode:severity:onset`.
+
+    Args:
+        text: The scenario, for example `stuck:0.5`.
 
     Raises:
-        InputError: If the mode is unknown or a number is out of its range.
+        InputError: If the mode is unknown or a number is out of range.
     """
     mode, *numbers = text.split(":")
     if mode not in MODES or not 1 <= len(numbers) <= 2:
@@ -61,10 +66,16 @@ def parse_scenario(text: str) -> Degraded:
 
 
 def parse_length(text: str) -> tuple[float, str]:
-    """Reads a length such as `1d`, `6h`, `90min`, `30s`, or a number of samples: `(86400.0, "s")`, `(5000.0, "samples")`.
+    """Parses a length such as `1d`, `6h`, `90min`, `30s`, or a number of samples.
+
+    Args:
+        text: The length.
+
+    Returns:
+        The number and its unit, for example `(86400.0, "s")` or `(5000.0, "samples")`.
 
     Raises:
-        InputError: If it is no length.
+        InputError: If the text is not a length.
     """
     found = _LENGTH.fullmatch(text.casefold())
     length = float(found["number"]) if found else 0.0
@@ -74,30 +85,33 @@ def parse_length(text: str) -> tuple[float, str]:
 
 
 def num_samples_of(text: str, interval_s: float) -> int:
-    """Samples of a length, as `parse_length` reads it.
+    """Converts a length to a number of samples.
 
     Args:
-        text: The length.
+        text: The length, in the form of `parse_length`.
         interval_s: Sampling interval in seconds.
 
     Raises:
-        InputError: If it is no length, less than a sample or more than is made at once.
+        InputError: If the text is not a length, or if the series would have no sample or too many.
     """
     length, unit = parse_length(text)
     samples = round(length if unit == "samples" else length / interval_s)
     if not 1 <= samples <= _MOST_SAMPLES:
         raise InputError(
             f"Expected a length of 1 to {_MOST_SAMPLES:,} samples, one every {interval_s:g} s. Received: {text[:80]!r}, which is "
-            f"{samples:,}. Write several series, each with its --seed."
+            f"{samples:,} samples. Write several series, each with its own --seed."
         )
     return samples
 
 
 def start_of(start: "str | pd.Timestamp") -> "pd.Timestamp":
-    """A start in UTC, such as that of `2024-01-01`, which names no zone and is taken as UTC.
+    """Converts a start time to UTC. A time without a time zone is taken as UTC.
+
+    Args:
+        start: The time, for example `2024-01-01`.
 
     Raises:
-        InputError: If it is no time, or too early or late for nanoseconds.
+        InputError: If it is not a time, or not within the years 1700 to 2200.
     """
     import pandas as pd
 
@@ -111,16 +125,19 @@ def start_of(start: "str | pd.Timestamp") -> "pd.Timestamp":
 
 
 def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: float, seed: int) -> list[Share]:
-    """Divides windows between nominal ones and scenarios, the rest of the division going to the first.
+    """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder.
 
     Args:
-        scenarios: Degraded modes; none makes every window nominal.
-        num_windows: Windows in all.
-        nominal_share: Share of them that is nominal, where there are scenarios.
-        seed: Seed of the whole set.
+        scenarios: Degraded modes. If there is none, all windows are nominal.
+        num_windows: Total number of windows.
+        nominal_share: Share of nominal windows, if there are scenarios.
+        seed: Random seed of the whole set.
+
+    Returns:
+        The parts that have at least one window, each with a seed of its own.
 
     Raises:
-        InputError: If the share is not from 0 to 1, or a scenario would get no window.
+        InputError: If the share is not between 0 and 1, or if a scenario would get no window.
     """
     if not 0 <= nominal_share <= 1:
         raise InputError(f"Expected a nominal share from 0 to 1. Received: {nominal_share}.")
@@ -131,18 +148,18 @@ def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: fl
     ]
     if scenarios and nominal_share < 1 and counts[-1] == 0:
         raise InputError(
-            f"Expected a window for each of {len(scenarios)} scenarios at least. Received: {num_windows} windows, a share of "
-            f"{nominal_share:g} of them nominal. Ask for more windows."
+            f"Expected at least one window for each of {len(scenarios)} scenarios. Received: {num_windows} windows, of which a share of "
+            f"{nominal_share:g} is nominal. Ask for more windows."
         )
     seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
     return [Share(*each) for each in zip([None, *scenarios], counts, seeds, strict=True) if each[1]]
 
 
 def columns_of(window: int) -> dict[str, "pa.DataType"]:
-    """The columns of labelled windows and their types.
+    """Returns the columns of labelled windows and their types.
 
     Args:
-        window: Samples of a window.
+        window: Length of a window in samples.
     """
     import pyarrow as pa
 
@@ -150,14 +167,15 @@ def columns_of(window: int) -> dict[str, "pa.DataType"]:
 
 
 def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> None:
-    """Writes labelled windows to one Parquet file, as they are made; the file appears when it is complete.
+    """Writes labelled windows to one Parquet file, chunk by chunk. The file appears only when it is complete.
 
-    Columns: `window` (a list of float32), `scenario`, `severity`, `onset` (the first sample concerned, null where nominal).
+    The columns are `window` (a list of float32), `scenario`, `severity` and `onset` (the first affected sample, null for
+    nominal windows).
 
     Args:
-        path: The file.
-        simulator: What makes them.
-        shares: Which and how many.
+        path: Path of the file.
+        simulator: The simulator.
+        shares: The scenarios and their numbers of windows.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -186,21 +204,22 @@ def series_labelled(
     seed: int = 0,
     start: "str | pd.Timestamp | None" = None,
 ) -> "pd.DataFrame":
-    """One continuous series with its labels. Before its onset a scenario's rows are nominal.
+    """Generates one continuous series with labels. Samples before the onset of the scenario are labelled nominal.
 
     Args:
-        simulator: What makes it.
-        num_samples: Its length.
-        scenario: A degraded mode, or None.
-        seed: Seed of everything drawn.
-        start: When its first sample is taken, such as "2024-01-01"; UTC where it names no zone. None: time is counted from 0.
+        simulator: The simulator.
+        num_samples: Length of the series in samples.
+        scenario: A degraded mode, or None for nominal telemetry.
+        seed: Random seed.
+        start: Time of the first sample, for example "2024-01-01". A time without a time zone is taken as UTC. None gives
+            times in seconds from 0.
 
     Returns:
-        A frame with the columns `value`, `scenario` (categorical) and `severity`, a row a sample. Its index is a `DatetimeIndex` in UTC
-        called `time`, or, without a start, seconds called `time_s`.
+        A data frame with one row per sample and the columns `value`, `scenario` (categorical) and `severity`. Its index is a
+        `DatetimeIndex` in UTC named `time`, or, without a start, seconds named `time_s`.
 
     Raises:
-        InputError: If the start is no time.
+        InputError: If the start is not a time.
     """
     import pandas as pd
 
@@ -226,15 +245,15 @@ def write_series_labelled(
     seed: int,
     start: "str | pd.Timestamp | None" = None,
 ) -> None:
-    """Writes the frame of `series_labelled` to a Parquet file, its index as the first column.
+    """Writes the result of `series_labelled` to a Parquet file. Its index becomes the first column.
 
     Args:
-        path: The file.
-        simulator: What makes the series.
-        num_samples: Its length.
-        scenario: A degraded mode, or None.
-        seed: Seed of everything drawn.
-        start: When its first sample is taken, or None.
+        path: Path of the file.
+        simulator: The simulator.
+        num_samples: Length of the series in samples.
+        scenario: A degraded mode, or None for nominal telemetry.
+        seed: Random seed.
+        start: Time of the first sample, or None.
     """
     make_folder(Path(path).parent)
     frame = series_labelled(simulator, num_samples, scenario, seed, start)
@@ -243,7 +262,7 @@ def write_series_labelled(
 
 
 def _labels(scenario: Degraded | None, num_samples: int) -> tuple[str, float, int | None]:
-    """Name, severity and first sample of a scenario; one of severity 0 is nominal."""
+    """Returns the name, severity and first affected sample of a scenario. Severity 0 is labelled nominal."""
     if scenario is None or scenario.severity == 0:
         return NOMINAL, 0.0, None
     onset = scenario.first_sample(num_samples)

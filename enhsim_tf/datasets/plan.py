@@ -1,6 +1,6 @@
-"""What a large data set is, in full: its mix, its models by their checksums, its seed, and how it is cut into shards.
+"""The plan of a large data set: its scenarios, the checksums of its models, its seed, and its division into shards.
 
-A plan is made without loading a network. Two plans with the same `key` make the same shards.
+A plan is made without loading a network. Two plans with the same `key` describe the same shards.
 """
 
 import dataclasses
@@ -20,23 +20,23 @@ from enhsim_tf.enhanced_simulator.safe_loading import read_description
 from enhsim_tf.enhanced_simulator.saving import MANIFEST, check_saved, settings_of
 
 FORMAT = "enhsim_tf.datasets.generate/1"
-_SHARD = 8_192  # windows a shard, where they have up to 512 samples
-_SHARD_VALUES = 2**22  # values a shard, where the windows are longer
-MOST_VALUES = 2**26  # values of a shard: 256 MiB, which a worker holds at once
+_SHARD = 8_192  # default windows per shard, for windows of up to 512 samples
+_SHARD_VALUES = 2**22  # default values per shard, for longer windows
+MOST_VALUES = 2**26  # maximum values per shard: 256 MiB, which a worker holds in memory
 _MOST_SHARDS = 2_000_000
 _VERSIONS = ("tensorflow", "keras", "numpy", "pyarrow")
 
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """A saved simulator as a part of a plan.
+    """A saved simulator that a plan uses.
 
     Args:
-        name: What its windows are labelled with.
-        folder: Where it stands; no part of what the data set is.
-        share: Its share of the windows.
-        sha256: Checksum of its manifest, which holds those of its files.
-        window: Samples of a window.
+        name: Label of its windows in the column `model`.
+        folder: Folder of the simulator. The content of the data set does not depend on it.
+        share: Share of the windows that it generates.
+        sha256: Checksum of its manifest, which contains the checksums of its files.
+        window: Length of a window in samples.
         interval_s: Sampling interval in seconds.
     """
 
@@ -50,17 +50,17 @@ class Model:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """A data set that is to be made.
+    """The plan of a data set.
 
     Args:
         mix: Scenarios and their shares.
-        models: Its simulators, of one window.
-        seed: The master seed.
-        num_windows: Windows in all.
-        shard: Windows a shard; the last may have fewer.
+        models: The simulators; all have the same window length and sampling interval.
+        seed: Master seed of the data set.
+        num_windows: Total number of windows.
+        shard: Windows per shard; the last shard may have fewer.
 
     Raises:
-        InputError: If the models do not fit together, or a number is beyond what a data set can have.
+        InputError: If the models have different windows or intervals, or if a number is out of range.
     """
 
     mix: Mix
@@ -74,11 +74,11 @@ class Plan:
         for model in self.models:
             if model.window != first.window or abs(model.interval_s / first.interval_s - 1) > 1e-3:
                 raise InputError(
-                    f"Expected models of one window and interval: {first.window} samples of {first.interval_s:g} s, as {first.name!r}. "
+                    f"Expected all models to have the same window and interval: {first.window} samples of {first.interval_s:g} s, as {first.name!r}. "
                     f"Received: {model.window} samples of {model.interval_s:g} s in {model.name!r}."
                 )
         if not 1 <= self.num_windows <= MOST_WINDOWS:
-            raise InputError(f"Expected from 1 to {MOST_WINDOWS:,} windows. Received: {self.num_windows:,}.")
+            raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: {self.num_windows:,}.")
         if self.shard * self.window > MOST_VALUES:
             raise InputError(f"Expected shards of at most {MOST_VALUES // self.window:,} such windows. Received: shard: {self.shard:,}.")
         if self.num_shards > _MOST_SHARDS:
@@ -86,7 +86,7 @@ class Plan:
 
     @property
     def window(self) -> int:
-        """Samples of a window."""
+        """Length of a window in samples."""
         return self.models[0].window
 
     @property
@@ -95,11 +95,11 @@ class Plan:
         return -(-self.num_windows // self.shard)
 
     def rows_of(self, shard: int) -> int:
-        """Windows of a shard."""
+        """Returns the number of windows in a shard."""
         return min(self.shard, self.num_windows - shard * self.shard)
 
     def settings(self) -> dict[str, Any]:
-        """Everything that the content depends on, in plain JSON types; no path is among it."""
+        """Returns all settings on which the content depends, in plain JSON types. Paths are not among them."""
         return {
             "windows": self.num_windows,
             "shard": self.shard,
@@ -117,27 +117,31 @@ class Plan:
 
     @property
     def key(self) -> str:
-        """Checksum of the settings but the number of windows: shards of equal key, number and size are equal to the bit."""
+        """Checksum of all settings except the number of windows. Shards with equal key, number and size have identical bytes."""
         return key_of(self.settings())
 
 
 def key_of(settings: Mapping[str, Any]) -> str:
-    """The `Plan.key` of a plan with these settings."""
+    """Returns the `Plan.key` for given settings.
+
+    Args:
+        settings: Settings of a plan, as returned by `Plan.settings`.
+    """
     others = {name: value for name, value in settings.items() if name != "windows"}
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
 
 def plan_of(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) -> Plan:
-    """The plan of a mix.
+    """Makes the plan of a data set.
 
     Args:
-        mix: What is mixed; one that names no models has one, in `folder` itself.
-        folder: The folder of the models.
-        seed: The master seed.
-        num_windows: Windows in all.
+        mix: Scenarios and models with their shares. If it names no models, `folder` itself is the only model.
+        folder: Folder of the models.
+        seed: Master seed of the data set.
+        num_windows: Total number of windows.
 
     Raises:
-        InputError: If a model is missing or damaged, or if they do not fit together.
+        InputError: If a model is missing or damaged, or if the models have different windows or intervals.
     """
     folder = Path(folder).absolute()
     shares = mix.models or (ModelShare(folder.name, ".", 1.0),)
@@ -148,21 +152,21 @@ def plan_of(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) ->
 
 
 def _model_of(share: ModelShare, folder: Path) -> Model:
-    """Looks at a saved simulator without loading it: its checksums, its window, its interval."""
+    """Reads checksum, window length and interval of a saved simulator without loading its networks."""
     check_saved(folder)
     interval_s = settings_of(folder).get("interval_s")
     if type(interval_s) not in (int, float) or not 0 < interval_s <= sys.float_info.max:
-        raise InputError(f"Expected interval_s above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
+        raise InputError(f"Expected interval_s to be a number above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
     return Model(share.name, folder, share.share, sha256(folder / MANIFEST), _window_of(folder), float(interval_s))
 
 
 def _window_of(folder: Path) -> int:
-    """Samples of a window: the width of the enhancer's input, as its file describes it."""
+    """Returns the window length in samples: the input width in the description of the enhancer."""
     try:
         network = read_description(folder / "enhancer.keras")
         window = network["config"]["layers"][0]["config"]["batch_shape"][1]
         if type(window) is not int or not 2 <= window <= MOST_VALUES:
             raise ValueError(f"windows of {window!r} samples")
     except (ValueError, KeyError, IndexError, TypeError) as error:
-        raise InputError(f"Expected an enhancer whose input has one width. Received: {folder} ({' '.join(str(error).split())}).") from None
+        raise InputError(f"Expected an enhancer with a fixed input width. Received: {folder} ({' '.join(str(error).split())}).") from None
     return window

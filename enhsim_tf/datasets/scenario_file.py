@@ -1,4 +1,4 @@
-"""What a large data set is mixed from, and the YAML file that says so: shares of scenarios, severities, models.
+"""The scenario file: a YAML file with the shares of scenarios and models in a large data set.
 
 docs/scenarios.md describes the file, `scenario_form` checks it.
 """
@@ -12,19 +12,19 @@ from enhsim_tf.common.errors import InputError
 
 MOST_WINDOWS = 10**10
 MOST_SCENARIOS = 1_000
-MOST_MODELS = 20  # each worker holds all of them
+MOST_MODELS = 20  # each worker holds all models in memory
 LATEST_ONSET = 0.999
 
 
 @dataclasses.dataclass(frozen=True)
 class ScenarioShare:
-    """A degraded mode with its share of the windows.
+    """A degraded mode and its share of the windows.
 
     Args:
-        mode: One of `simulator.MODES`.
-        share: Its share of all windows.
-        severity: Lowest and highest severity; each window has its own, drawn evenly between them.
-        onset: Lowest and highest onset, as a share of the window; drawn in the same way.
+        mode: One of `degraded.MODES`.
+        share: Share of all windows.
+        severity: Minimum and maximum severity. The severity of each window is drawn uniformly between them.
+        onset: Minimum and maximum onset as a share of the window, drawn in the same way.
     """
 
     mode: str
@@ -35,12 +35,12 @@ class ScenarioShare:
 
 @dataclasses.dataclass(frozen=True)
 class ModelShare:
-    """A model with its share of the windows.
+    """A model and its share of the windows.
 
     Args:
-        name: What its windows are labelled with.
-        folder: Its folder, relative to that of all models.
-        share: Its share of all windows.
+        name: Label of its windows in the column `model`.
+        folder: Folder of the model, relative to the folder of all models.
+        share: Share of all windows.
     """
 
     name: str
@@ -50,15 +50,15 @@ class ModelShare:
 
 @dataclasses.dataclass(frozen=True)
 class Mix:
-    """What a data set is mixed from.
+    """The composition of a data set: scenarios and models with their shares.
 
     Args:
-        nominal: Share of nominal windows; with the scenarios' shares it adds up to one.
+        nominal: Share of nominal windows. This share and those of the scenarios add up to one.
         scenarios: The degraded modes.
-        models: The models; none leaves the choice to the command.
-        num_windows: Windows in all, or None where the file does not say.
-        seed: The master seed, or None.
-        shard: Windows a file, or None for the default.
+        models: The models. If empty, the options of the command select the models.
+        num_windows: Total number of windows, or None if the file does not contain it.
+        seed: Master seed of the data set, or None.
+        shard: Windows per file, or None for the default.
     """
 
     nominal: float = 1.0
@@ -70,7 +70,15 @@ class Mix:
 
 
 def mix_of(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
-    """The mix that the options `--scenario` and `--nominal-share` ask for: the scenarios share evenly what is not nominal."""
+    """Makes the mix given by the options `--scenario` and `--nominal-share`. All scenarios get equal shares.
+
+    Args:
+        scenarios: Degraded modes. If there is none, all windows are nominal.
+        nominal_share: Share of nominal windows.
+
+    Raises:
+        InputError: If the share or an onset is out of range.
+    """
     if not 0 <= nominal_share <= 1:
         raise InputError(f"Expected a nominal share from 0 to 1. Received: {nominal_share}.")
     if not scenarios:
@@ -84,10 +92,13 @@ def mix_of(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
 
 
 def read_mix(path: str | os.PathLike) -> Mix:
-    """Reads and checks a scenario file.
+    """Reads and validates a scenario file.
+
+    Args:
+        path: Path of the file.
 
     Raises:
-        InputError: If it cannot be read or anything in it is not as described; the line names the place.
+        InputError: If the file cannot be read or has invalid content. The message names the place.
     """
     from enhsim_tf.common.yaml_file import load_settings  # here, as the form below: both load pydantic
     from enhsim_tf.datasets.scenario_form import ScenarioFile

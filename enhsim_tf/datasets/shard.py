@@ -1,10 +1,10 @@
-"""One shard of a large data set: a Parquet file that is a pure function of the plan and the shard's number.
+"""Generates one shard of a large data set. The content of a shard depends only on the plan and the number of the shard.
 
-Who makes it, when, and in which order does not matter: its draws have a seed of its own, and the networks see batches of
-one size, so that they are built once and in one way in every worker.
+Each shard has a random seed of its own, and the networks always compute batches of the same size. The bytes of a shard are
+therefore the same in every worker and in every order of generation.
 
-Columns: `window` (a list of float32), `scenario` (`nominal` or a degraded mode), `severity`, `onset` (the first sample
-concerned, null where nominal), and `model` where the plan has several.
+The columns are `window` (a list of float32), `scenario` (`nominal` or a degraded mode), `severity`, `onset` (the first
+affected sample, null for nominal windows), and `model` if the plan has several models.
 """
 
 import functools
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
-_STREAM = 0x666C656574  # sets these seeds apart from all others of the package
-_BEGINS = 1_000_000  # windows begin at a random one of these samples, so at every phase of the waves
-_BATCH, _BATCH_VALUES = 1_024, 2**19  # windows a call of the networks, and values where the windows are long
+_STREAM = 0x666C656574  # distinguishes these seeds from all others in the package
+_BEGINS = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
+_BATCH, _BATCH_VALUES = 1_024, 2**19  # maximum windows and values per call of the networks
 _ROW_GROUP = 4_096
 
 
 class Record(NamedTuple):
-    """What is recorded of a finished shard: its number, its windows, and its file's checksum."""
+    """The record of a finished shard: its number, its number of windows, and the checksum of its file."""
 
     shard: int
     rows: int
@@ -43,7 +43,7 @@ class Record(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What each window of a shard is to be, arrays of one value a window; scenario 0 is nominal."""
+    """Properties of the windows of a shard, as arrays with one value per window. Scenario 0 is nominal."""
 
     model: np.ndarray
     scenario: np.ndarray
@@ -54,19 +54,26 @@ class Rows(NamedTuple):
 
 
 def file_of(shard: int) -> str:
-    """The name of a shard's file."""
+    """Returns the file name of a shard.
+
+    Args:
+        shard: Number of the shard.
+    """
     return f"shard-{shard:06d}.parquet"
 
 
 def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.random.Generator]:
-    """Draws what each window of a shard is to be, and the generators of what happens in a scenario and of the noise.
+    """Draws the properties of the windows of a shard.
 
-    The number of windows of a scenario (or of a model) is its share of the shard's, rounded up or down at random; their
-    order is random.
+    The number of windows of each scenario and of each model is its share of the shard, rounded up or down at random. The
+    order of the windows is random.
 
     Args:
-        plan: The data set.
-        shard: The shard's number.
+        plan: Plan of the data set.
+        shard: Number of the shard.
+
+    Returns:
+        The properties, the random generator of the scenarios, and the random generator of the noise.
     """
     seeds = np.random.SeedSequence([_STREAM, plan.seed, shard]).spawn(4)
     mixing, placing, happening, noise = map(np.random.default_rng, seeds)
@@ -75,20 +82,20 @@ def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.ran
     scenario = systematic([plan.mix.nominal, *(part.share for part in plan.mix.scenarios)], num_rows, mixing)
     ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
     severity, onset = (ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * mixing.random((num_rows, 2))).T
-    severity = severity.astype(np.float32).astype(np.float64)  # as its label says
+    severity = severity.astype(np.float32).astype(np.float64)  # the precision of the label
     return Rows(model, scenario, severity, onset, placing.integers(0, _BEGINS, num_rows), placing.random(num_rows)), happening, noise
 
 
 def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
-    """Draws the part each row belongs to, in random order: each part gets its share of the rows, rounded up or down.
+    """Assigns rows to categories by systematic sampling: each category gets its share of the rows, rounded up or down.
 
     Args:
-        shares: Share of each part; they add up to one.
+        shares: Share of each category; the shares add up to one.
         num_rows: Number of rows.
-        rng: Owner of the draw.
+        rng: Random generator.
 
     Returns:
-        Integers of shape `(num_rows,)`.
+        The category of each row in random order, integers of shape `(num_rows,)`.
     """
     edges = np.cumsum(shares) / np.sum(shares)
     places = (rng.random() + np.arange(num_rows)) / num_rows
@@ -96,12 +103,15 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
 
 
 def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, Rows]:
-    """Makes the windows of a shard, float32 of shape `(rows, samples)`, and what each of them is.
+    """Generates the windows of a shard.
 
     Args:
-        plan: The data set.
-        simulators: The plan's models, loaded.
-        shard: The shard's number.
+        plan: Plan of the data set.
+        simulators: The loaded models of the plan.
+        shard: Number of the shard.
+
+    Returns:
+        The windows, float32 of shape `(rows, samples)`, and their properties.
     """
     rows, happening, noise = draw_rows(plan, shard)
     windows = np.empty((len(rows.begin), plan.window), np.float32)
@@ -130,11 +140,11 @@ def _scenario_of(plan: Plan, rows: Rows, place: int) -> Degraded | None:
 
 
 def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
-    """The columns of a data set's shards, with what they are in their metadata.
+    """Returns the Parquet schema of the shards of a data set, with format, key and sampling interval in its metadata.
 
     Args:
-        settings: `Plan.settings`.
-        key: `Plan.key`.
+        settings: Settings of the plan, as returned by `Plan.settings`.
+        key: Key of the plan.
     """
     import pyarrow as pa
 
@@ -145,47 +155,55 @@ def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
 
 
 class ShardMaker:
-    """Makes shards in one process: loads the models once, then a file a call.
+    """Generates shards in one process. The models are loaded once; each call writes one file.
 
     Args:
-        plan: The data set.
-        folder: Where its files go.
+        plan: Plan of the data set.
+        folder: Output folder.
     """
 
     def __init__(self, plan: Plan, folder: str | os.PathLike):
         self.plan, self.folder = plan, Path(folder).absolute()
-        self.settings, self.key = plan.settings(), plan.key  # of the machine that asks; another that works for it has to agree
+        self.settings, self.key = plan.settings(), plan.key  # computed on the main machine; workers on other machines must agree
 
     @functools.cached_property
     def simulators(self) -> list["EnhancedSimulator"]:
-        """The plan's models.
+        """The loaded models of the plan.
 
         Raises:
-            InputError: If one is damaged, or another than that of the plan.
+            InputError: If a model is damaged or differs from that of the plan, or if this machine has other library versions.
         """
         if self.plan.key != self.key:
             versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
-            raise InputError(f"Expected every machine to have {versions}. Received: others on {os.uname().nodename}.")
+            raise InputError(
+                f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
+            )
         from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
         simulators = []
         for model in self.plan.models:
             simulators.append(EnhancedSimulator.load(model.folder))
             if sha256(model.folder / MANIFEST) != model.sha256 or simulators[-1].window != model.window:
-                raise InputError(f"Expected the model that the data set was begun with. Received: another one in {model.folder}.")
+                raise InputError(f"Expected the same model as at the start of the data set. Received: another model in {model.folder}.")
         return simulators
 
     def __call__(self, shard: int) -> Record:
-        """Makes a shard and writes its file, whole or not at all.
+        """Generates a shard and writes its file atomically.
+
+        Args:
+            shard: Number of the shard.
+
+        Returns:
+            The record of the shard.
 
         Raises:
-            InputError: If a model cannot be used, or the file not be written.
+            InputError: If a model cannot be used, or if the file cannot be written.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         windows, rows = make_windows(self.plan, self.simulators, shard)
-        nominal = rows.severity == 0  # scenario 0 among them
+        nominal = rows.severity == 0  # including scenario 0
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
         scenarios = [_scenario_of(self.plan, rows, place) for place in range(len(nominal))]
         onsets = np.array([0 if each is None else each.first_sample(self.plan.window) for each in scenarios], np.int32)
@@ -199,7 +217,7 @@ class ShardMaker:
             columns.append(pa.array(np.array([model.name for model in self.plan.models], object)[rows.model], pa.string()))
         table = pa.table(columns, schema=schema_of(self.settings, self.key))
         names = [name for name in ("scenario", "model") if name in table.column_names]
-        # the bytes of equal significance side by side: signs and exponents compress, the mantissas' noise does not
+        # stores bytes of equal significance together: signs and exponents compress well, mantissas of noise do not
         options = {"use_dictionary": names, "column_encoding": {"window.list.element": "BYTE_STREAM_SPLIT"}, "write_statistics": names}
         path = self.folder / file_of(shard)
         try:
@@ -209,5 +227,5 @@ class ShardMaker:
         except (OSError, pa.ArrowException) as error:
             reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:120]
             raise InputError(
-                f"Expected {path.name} to be written. Received: {reason}. Finished shards are kept: mend it and run the same command again."
+                f"Expected {path.name} to be written. Received: {reason}. Finished shards are kept: fix the cause and run the same command again."
             ) from None

@@ -1,4 +1,4 @@
-"""The commands, end to end: from a dirty table to a simulator, training data and scores; what they refuse, in one line."""
+"""End-to-end tests of the commands, and their error messages for invalid input."""
 
 import os
 import re
@@ -39,7 +39,7 @@ def table(num_samples=1_500, interval="10s"):
 
 
 def dirty():
-    """The same with a short and a long gap, doubles, missing values, a word and rows out of order."""
+    """The same telemetry with a short and a long gap, duplicate rows, missing values, a word, and unsorted rows."""
     rows = table().astype({"volts": object})
     rows.loc[100:102, "volts"] = np.nan
     rows.loc[200, "volts"] = "offline"
@@ -48,7 +48,7 @@ def dirty():
 
 
 def small(window=60, interval_s=10.0):
-    """A simulator of narrow, untrained networks."""
+    """A simulator with narrow, untrained networks."""
     generator, discriminator = build_generator(window, 4, 8, seed=0), build_discriminator(window, 8, seed=0)
     noise = NoiseGAN(generator, discriminator, scale=0.1, seed=0)
     return EnhancedSimulator(SquareWaveSimulator([SquareWave(400)]), build_enhancer(window, 16, seed=0), noise, interval_s)
@@ -56,7 +56,7 @@ def small(window=60, interval_s=10.0):
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
-    """Telemetry and fitted simulators, which nobody changes."""
+    """A read-only folder with telemetry and fitted simulators."""
     folder = tmp_path_factory.mktemp("world")
     table().to_csv(folder / "two.csv", index=False)
     table()[["utc", "volts"]].to_csv(folder / "one.csv", index=False)
@@ -83,7 +83,7 @@ def files(folder):
 
 @pytest.fixture
 def told(world, tmp_path, monkeypatch, capfd):
-    """Runs the command in this process, in a folder of its own; returns exit code, output and lines of errors."""
+    """Runs the command in this process and in a temporary folder; returns exit code, stdout and the lines of stderr."""
 
     def run(*arguments):
         monkeypatch.chdir(tmp_path)
@@ -95,7 +95,7 @@ def told(world, tmp_path, monkeypatch, capfd):
 
 
 def shell(*arguments, cwd, **options):
-    """Runs the command as a shell does."""
+    """Runs the command in a new process, as a shell does."""
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = os.environ | {"PYTHONPATH": path}
     return subprocess.run([*COMMAND, *map(str, arguments)], cwd=cwd, env=environment, capture_output=True, text=True, **options)
@@ -121,7 +121,7 @@ def test_help_and_wrong_options_import_nothing_slow(arguments):
         assert len(ended.stderr.splitlines()) == 1 and ended.stderr.startswith("error: Expected ")
 
 
-def test_help_names_everything_that_can_be_chosen(capsys):
+def test_help_lists_all_choices(capsys):
     for command, words in (("generate", [*MODES, "stuck:0.5"]), ("score", DETECTORS), ("fit", ["influxdb://", "convolutional", "paper"])):
         with pytest.raises(SystemExit):
             parse([command, "--help"])
@@ -130,24 +130,24 @@ def test_help_names_everything_that_can_be_chosen(capsys):
     assert [name.casefold().replace(" ", "-") for name in detectors.DETECTORS] == list(DETECTORS)
 
 
-# from end to end
+# end to end
 
 
 @pytest.fixture(scope="module")
 def fitted(world, tmp_path_factory):
-    """A simulator fitted by the command to the dirty table, and what the command said."""
+    """A simulator fitted by the command to the dirty table, and the output of the command."""
     folder = tmp_path_factory.mktemp("fitted")
     ended = shell("fit", world / "dirty.csv", "--column", "volts", "--drop-bad", "--out", "models", *TINY, cwd=folder)
     assert (ended.returncode, ended.stderr) == (0, ""), ended.stderr
     return folder / "models", ended.stdout
 
 
-def test_fit_tells_what_it_cleaned_and_what_it_found(fitted):
+def test_fit_prints_the_cleaning_and_the_report(fitted):
     models, said = fitted
     assert {path.name for path in models.iterdir()} == {"volts"}
     assert {"report.json", "report.png", "manifest.json"} <= {path.name for path in (models / "volts").iterdir()}
     for words in (
-        "volts: 1,407 rows",  # 1,500 less 103 dropped, and 10 doubles
+        "volts: 1,407 rows",  # 1,500 rows without the 103 dropped ones, and 10 duplicates
         "rows that repeat the time and value of another: 10",
         "gaps of more than 5 samples",
         "filled by straight lines",
@@ -161,12 +161,12 @@ def test_fit_tells_what_it_cleaned_and_what_it_found(fitted):
         assert words in said
 
 
-def test_generate_makes_training_data_of_what_was_fitted(fitted, told, tmp_path):
+def test_generate_writes_training_data_with_a_fitted_simulator(fitted, told, tmp_path):
     scenarios = ["--scenario", "stuck:0.5", "--scenario", "drift:1:0.5"]
     code, out, errors = told("generate", fitted[0], "--windows", 40, *scenarios, "--out", "deep/training.parquet", "--seed", 3)
     first, second, third = out.splitlines()
     assert (code, errors) == (0, []) and first == "volts: 40 windows of 64 samples in deep/training.parquet"
-    assert re.fullmatch(r"volts: stuck at 0\.5: \d+% of such windows are beyond what its enhancer learnt from", second)
+    assert re.fullmatch(r"volts: stuck at 0\.5: \d+% of such windows are outside its enhancer's training range", second)
     assert third.startswith("volts: drift at 1: 100% of such")
     frame = pd.read_parquet(tmp_path / "deep" / "training.parquet")
     assert frame["scenario"].value_counts().to_dict() == {"nominal": 20, "stuck": 10, "drift": 10}
@@ -174,7 +174,7 @@ def test_generate_makes_training_data_of_what_was_fitted(fitted, told, tmp_path)
     assert 10 < np.stack(frame["window"]).mean() < 30  # in the telemetry's unit
 
 
-def test_generate_makes_a_series_with_times(fitted, told, tmp_path):
+def test_generate_writes_a_series_with_times(fitted, told, tmp_path):
     arguments = ["generate", fitted[0], "--continuous", "6h", "--start", "2025-01-01", "--scenario", "stuck:1:0.75", "--out", "day.parquet"]
     code, out, errors = told(*arguments)
     assert (code, errors) == (0, []) and "2,160 samples, one every 10 s" in out
@@ -206,34 +206,34 @@ def test_several_channels_have_a_file_each(told, tmp_path):
     )
     assert (code, errors) == (0, [])
     assert {path.name for path in (tmp_path / "scores.v2" / "new").iterdir()} == {"volts.parquet", "amps.parquet"}
-    assert told("generate", "WORLD/single", "--windows", 1, "--out", "scores.v2")[0] == 0  # a folder that is there may have a dot
+    assert told("generate", "WORLD/single", "--windows", 1, "--out", "scores.v2")[0] == 0  # an existing folder may have a dot in its name
 
 
-def test_one_channel_and_one_simulator_belong_together_whatever_they_are_called(told, tmp_path):
+def test_a_single_channel_and_a_single_simulator_match_whatever_their_names(told, tmp_path):
     code, _, errors = told("score", "WORLD/single", "WORLD/two.csv", "--column", "amps", "--windows", 30, "--out", "scores.parquet")
     assert (code, errors) == (0, []) and len(pd.read_parquet(tmp_path / "scores.parquet")) == 1_500
 
 
-def test_a_channel_that_cannot_be_used_does_not_stop_the_others(told, world, tmp_path):
+def test_a_channel_that_fails_does_not_stop_the_others(told, world, tmp_path):
     rows = table()
     rows["volts"] = rows["volts"].where(rows.index < 30)  # shorter than a window
     rows.to_csv(tmp_path / "new.csv", index=False)
     code, out, errors = told("score", "WORLD/models", tmp_path / "new.csv", "--windows", 30, "--out", "scores")
-    assert code == 2 and len(errors) == 1 and errors[0].startswith("error: volts: Expected a stretch of at least a window")
+    assert code == 2 and len(errors) == 1 and errors[0].startswith("error: volts: Expected a part of at least one window")
     assert [path.name for path in (tmp_path / "scores").iterdir()] == ["amps.parquet"] and "amps: " in out
 
 
-def test_every_channel_that_cannot_be_fitted_has_its_line(told, tmp_path):
+def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_path):
     code, out, errors = told("fit", "WORLD/still.csv", "--out", "models", "--workers", 1, *TINY)
     assert code == 2 and [line.split(": ")[1] for line in errors] == ["volts", "amps"] and out == ""
-    assert all("Expected something periodic" in line for line in errors)
+    assert all(": Expected " in line and "periodic" in line for line in errors)
     assert not list((tmp_path / "models").iterdir())
 
 
-# what the README says
+# examples of the README
 
 
-def test_the_commands_of_the_readme_can_be_asked():
+def test_the_commands_of_the_readme_can_be_parsed():
     texts = [(ROOT / "README.md").read_text(encoding="utf-8"), commands.EXAMPLES]
     lines = [line.strip() for text in texts for line in text.splitlines()]
     asked = [line.split()[3:] for line in lines if line.startswith("python -m enhsim_tf ") and "--help" not in line]
@@ -243,7 +243,7 @@ def test_the_commands_of_the_readme_can_be_asked():
 
 
 @pytest.mark.usefixtures("narrow_enhancer")
-def test_the_python_of_the_readme_does_what_it_says(tmp_path, monkeypatch, capsys):
+def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in readme.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
     snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
@@ -259,7 +259,7 @@ def test_the_python_of_the_readme_does_what_it_says(tmp_path, monkeypatch, capsy
     assert (tmp_path / "model_dir" / "manifest.json").is_file() and "Anomalies of 4 standard" in capsys.readouterr().out
 
 
-# what is refused
+# invalid input
 
 FIT = ["fit", "WORLD/one.csv", "--out", "models"]
 GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
@@ -339,13 +339,13 @@ WRONG = {
 }
 
 
-def test_there_are_enough_wrong_uses():
+def test_there_are_at_least_sixty_invalid_uses():
     assert len(WRONG) >= 60
 
 
 @pytest.mark.filterwarnings("error:::enhsim_tf")
 @pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_use_is_one_line_and_changes_nothing(told, world, tmp_path, case):
+def test_invalid_use_gives_one_line_and_changes_no_file(told, world, tmp_path, case):
     arguments, word = WRONG[case]
     before = files(world)
     code, out, errors = told(*arguments)
@@ -355,14 +355,14 @@ def test_a_wrong_use_is_one_line_and_changes_nothing(told, world, tmp_path, case
 
 
 @pytest.mark.parametrize("case", ["unknown command", "source that is not there", "unknown mode", "models that are damaged"])
-def test_a_wrong_use_as_the_shell_sees_it(world, tmp_path, case):
+def test_invalid_use_in_a_new_process(world, tmp_path, case):
     arguments = [argument.replace("WORLD", str(world)) for argument in WRONG[case][0]]
     ended = shell(*arguments, cwd=tmp_path)
     assert (ended.returncode, ended.stdout, len(ended.stderr.splitlines())) == (2, "", 1), ended.stderr
     assert not list(tmp_path.iterdir())
 
 
-# what the machine does
+# conditions of the machine
 
 
 def test_scores_of_a_folder_do_not_overwrite_the_telemetry(told, world, tmp_path):
@@ -378,7 +378,7 @@ def test_an_output_that_is_a_folder_is_refused(told, tmp_path):
     assert code == 2 and "a folder of that name" in errors[0]
 
 
-def test_a_full_disk_is_one_line(told, monkeypatch):
+def test_a_full_disk_gives_one_line(told, monkeypatch):
     from enhsim_tf.datasets import labelled_windows as training_sets
 
     def fail(*arguments):
@@ -389,7 +389,7 @@ def test_a_full_disk_is_one_line(told, monkeypatch):
     assert code == 2 and len(errors) == 1 and "No space left on device" in errors[0]
 
 
-def test_a_reader_that_leaves_ends_the_command_quietly(world, tmp_path):
+def test_a_closed_pipe_ends_the_command_without_a_message(world, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [*COMMAND, "generate", world / "models", "--windows", "5", "--out", tmp_path / "sets"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True)
@@ -410,11 +410,11 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
     while not (tmp_path / "models").is_dir():
         assert process.poll() is None
         time.sleep(0.1)
-    time.sleep(after_s)  # the processes begin, or are at work; whichever it is
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
+    time.sleep(after_s)  # the worker processes may be starting or fitting
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     out, error = process.communicate(timeout=60)
     assert (process.returncode, out, error) == (130, "", "interrupted; what was finished is kept\n")
-    with pytest.raises(ProcessLookupError):  # nobody is left in the session
+    with pytest.raises(ProcessLookupError):  # no process of the session is left
         while True:
             os.killpg(process.pid, 0)
             time.sleep(0.1)
@@ -422,7 +422,7 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
 
 
 @pytest.mark.parametrize(("module", "said"), [("ray", "said"), ("json", "said, and more")])
-def test_a_process_that_used_ray_ends_at_once_with_all_it_said(module, said):
+def test_a_process_that_used_ray_exits_at_once_and_flushes_its_output(module, said):
     program = (
         f"import atexit, sys, types; sys.modules[{module!r}] = types.ModuleType({module!r})\n"
         "from enhsim_tf.common.console import leave\n"

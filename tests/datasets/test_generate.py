@@ -1,4 +1,4 @@
-"""Data sets: the same bytes whoever worked and however often it was stopped; what is damaged is found; reading them back."""
+"""Large data sets: identical bytes after any interruption, detection of damage, and reading of the files."""
 
 import errno
 import importlib.metadata
@@ -21,7 +21,7 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.cli import generate_many as fleet_command
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.datasets import generate as fleet
-from enhsim_tf.datasets.folder import held
+from enhsim_tf.datasets.folder import locked
 from enhsim_tf.datasets.generate import generate_fleet, verify
 from enhsim_tf.datasets.plan import plan_of
 from enhsim_tf.datasets.scenario_file import Mix
@@ -33,13 +33,13 @@ WORKS = ROOT / "tests" / "faults" / "small_data_set.py"
 
 
 def serial(engine, work, numbers, workers=None):
-    """An engine in this process."""
+    """An engine that computes in this process."""
     yield from map(work, numbers)
 
 
 @pytest.fixture
 def here(monkeypatch):
-    """Makes data sets in this process, without networks; `made` lists the shards that were made."""
+    """Generates data sets in this process, without networks. The fixture lists the shards that were generated."""
     made = []
 
     class Maker(PlainMaker):
@@ -54,7 +54,7 @@ def here(monkeypatch):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    """The data set of 1,000 windows that the command of `small_data_set.py` makes, made without any disturbance."""
+    """The data set of 1,000 windows of `small_data_set.py`, generated without interruption."""
     folder = tmp_path_factory.mktemp("undisturbed") / "set"
     before = fleet.ShardMaker, fleet.engines.run
     fleet.ShardMaker, fleet.engines.run = PlainMaker, serial
@@ -73,7 +73,7 @@ def copy_of(folder, path):
 
 
 def told(call, *arguments, **options):
-    """The lines that a call tells."""
+    """Returns the lines of output of a call."""
     lines = []
     call(*arguments, tell=lines.append, **options)
     return lines
@@ -82,7 +82,7 @@ def told(call, *arguments, **options):
 # what is written
 
 
-def test_the_manifest_says_what_the_data_set_is(undisturbed):
+def test_the_manifest_contains_settings_and_records(undisturbed):
     manifest = json.loads((undisturbed / "_manifest.json").read_text())
     assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(file_of(shard) for shard in range(20))])
     assert (
@@ -92,10 +92,10 @@ def test_the_manifest_says_what_the_data_set_is(undisturbed):
     assert [shard["rows"] for shard in manifest["shards"]] == [50] * 20
     for shard in manifest["shards"]:
         assert sha256(undisturbed / shard["file"]) == shard["sha256"]
-    assert told(verify, undisturbed) == ["1,000 windows in 20 shards, all as they were recorded"]
+    assert told(verify, undisturbed) == ["1,000 windows in 20 shards, all intact"]
 
 
-def test_a_second_run_finds_all_of_it(undisturbed, tmp_path, here):
+def test_a_second_run_finds_all_shards(undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
     lines = told(generate_fleet, folder, plan())
     assert lines[0].startswith("20 of 20 shards") and here == [] and content_of(folder) == content_of(undisturbed)
@@ -122,7 +122,7 @@ def exchange(one, other):
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_damaged_shards_are_found_and_made_again(name, undisturbed, tmp_path, here):
+def test_damaged_shards_are_found_and_generated_again(name, undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
     DAMAGES[name](folder)
     lines = told(verify, folder)
@@ -132,7 +132,7 @@ def test_damaged_shards_are_found_and_made_again(name, undisturbed, tmp_path, he
 
 
 def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
-    """A data set as a killed run leaves it."""
+    """Makes an unfinished data set, as left by a killed run."""
     shutil.copytree(undisturbed, folder)
     manifest = json.loads((folder / "_manifest.json").read_text())
     lines = [json.dumps([shard, 50, manifest["shards"][shard]["sha256"]]).encode() + b"\n" for shard in done]
@@ -154,7 +154,7 @@ def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
         b'[99, 50, "a"]\n[true, 50, "a"]\n',
     ],
 )
-def test_a_run_goes_on_behind_what_is_finished(tail, undisturbed, tmp_path, here):
+def test_a_run_resumes_after_the_finished_shards(tail, undisturbed, tmp_path, here):
     folder = begun(tmp_path / "set", undisturbed, tail=tail)
     assert told(verify, folder)[0].startswith("not finished")
     told(generate_fleet, folder, plan())
@@ -162,17 +162,17 @@ def test_a_run_goes_on_behind_what_is_finished(tail, undisturbed, tmp_path, here
     assert content_of(folder) == content_of(undisturbed)
 
 
-def test_a_journal_goes_on_behind_a_torn_line(undisturbed, tmp_path, monkeypatch, here):
+def test_a_journal_continues_after_an_incomplete_line(undisturbed, tmp_path, monkeypatch, here):
     folder = begun(tmp_path / "set", undisturbed, tail=b'[3, 50, "01')
     monkeypatch.setattr(fleet.engines, "run", lambda engine, work, numbers, workers: serial(engine, work, itertools.islice(numbers, 3)))
-    with pytest.raises(KeyError):  # this engine stops after three
+    with pytest.raises(KeyError):  # this engine stops after three shards
         told(generate_fleet, folder, plan())
     monkeypatch.setattr(fleet.engines, "run", serial)
     assert told(generate_fleet, folder, plan())[0].startswith("7 of 20 shards")
     assert content_of(folder) == content_of(undisturbed)
 
 
-def test_a_removed_manifest_is_made_again(undisturbed, tmp_path, here):
+def test_a_removed_manifest_is_written_again(undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").unlink()
     told(generate_fleet, folder, plan())
@@ -192,7 +192,7 @@ def test_a_removed_manifest_is_made_again(undisturbed, tmp_path, here):
         b'{"format": "enhsim_tf.datasets.generate/1", "settings": {}}',
     ],
 )
-def test_a_damaged_manifest_is_one_line_that_says_what_to_do(content, undisturbed, tmp_path, here, refused):
+def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
     for call in (lambda: generate_fleet(folder, plan()), lambda: verify(folder)):
@@ -202,7 +202,7 @@ def test_a_damaged_manifest_is_one_line_that_says_what_to_do(content, undisturbe
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_manifest_damaged_anywhere_is_seen(seed, undisturbed, tmp_path, capsys):
+def test_damage_anywhere_in_a_manifest_is_detected(seed, undisturbed, tmp_path, capsys):
     folder, rng = copy_of(undisturbed, tmp_path / "set"), np.random.default_rng(seed)
     content = bytearray((folder / "_manifest.json").read_bytes())
     places = [place for place, byte in enumerate(content) if chr(byte).isalnum()]
@@ -214,16 +214,16 @@ def test_a_manifest_damaged_anywhere_is_seen(seed, undisturbed, tmp_path, capsys
     assert spoken.out + spoken.err and "Traceback" not in spoken.err
 
 
-def test_a_record_that_does_not_come_true_is_not_passed_over(undisturbed, tmp_path, here, refused):
+def test_a_shard_that_does_not_match_its_record_is_an_error(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     manifest = json.loads((folder / "_manifest.json").read_text())
     manifest["shards"][4]["sha256"] = "0" * 64
     (folder / "_manifest.json").write_text(json.dumps(manifest))
-    with refused(file_of(4), "computes otherwise"):
+    with refused(file_of(4), "computes different results"):
         generate_fleet(folder, plan())
 
 
-def test_a_shard_that_another_machine_kept_is_not_believed(tmp_path, here, monkeypatch, refused):
+def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, here, monkeypatch, refused):
     class Elsewhere(fleet.ShardMaker):
         def __call__(self, shard):
             record = super().__call__(shard)
@@ -239,7 +239,7 @@ def test_a_shard_that_another_machine_kept_is_not_believed(tmp_path, here, monke
     assert told(generate_fleet, tmp_path / "set", plan())[0].startswith("3 of 20 shards")
 
 
-def test_shards_of_a_larger_data_set_are_not_left_beside_a_smaller(undisturbed, tmp_path, here, refused):
+def test_shards_of_a_larger_data_set_are_refused(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").unlink()
     with refused(file_of(10)):
@@ -247,8 +247,8 @@ def test_shards_of_a_larger_data_set_are_not_left_beside_a_smaller(undisturbed, 
     assert not here
 
 
-def test_what_looks_at_a_folder_writes_nothing_but_the_lock(tmp_path, refused):
-    with held(tmp_path / "above" / "set"):
+def test_locking_a_folder_writes_only_the_lock_file(tmp_path, refused):
+    with locked(tmp_path / "above" / "set"):
         assert os.listdir(tmp_path / "above" / "set") == [".lock"]
     (tmp_path / "file").touch()
     with refused("can be written to"):
@@ -256,29 +256,29 @@ def test_what_looks_at_a_folder_writes_nothing_but_the_lock(tmp_path, refused):
 
 
 @pytest.mark.parametrize("reason", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
-def test_a_file_system_without_locks_is_told(reason, tmp_path, monkeypatch, refused):
+def test_a_file_system_without_locks_is_refused(reason, tmp_path, monkeypatch, refused):
     import fcntl
 
     def flock(file, operation):
         raise OSError(reason, os.strerror(reason))
 
     monkeypatch.setattr(fcntl, "flock", flock)
-    with refused("file system with locks", os.strerror(reason), "--out"), held(tmp_path):
+    with refused("file system with locks", os.strerror(reason), "--out"), locked(tmp_path):
         pass
     assert os.listdir(tmp_path) == [".lock"]
 
 
 def test_a_folder_is_held_against_the_same_process_too_and_let_go_of(tmp_path, refused):
-    with held(tmp_path), refused("no other run", "Wait"), held(tmp_path):
+    with locked(tmp_path), refused("no other run", "Wait"), locked(tmp_path):
         pass
-    with pytest.raises(KeyError), held(tmp_path):
+    with pytest.raises(KeyError), locked(tmp_path):
         raise KeyError
-    with held(tmp_path):
+    with locked(tmp_path):
         assert os.listdir(tmp_path) == [".lock"]
     assert os.listdir(tmp_path) == [".lock"]
 
 
-def test_a_line_without_end_in_the_journal_takes_no_memory(undisturbed, tmp_path):
+def test_a_very_long_line_in_the_journal_takes_little_memory(undisturbed, tmp_path):
     import tracemalloc
 
     from enhsim_tf.datasets.folder import read_records
@@ -295,7 +295,7 @@ def test_a_line_without_end_in_the_journal_takes_no_memory(undisturbed, tmp_path
     assert sorted(found) == [1, 2] and peak < 1_000_000
 
 
-def test_a_reader_who_has_left_is_no_fault_of_the_folder(tmp_path, here):
+def test_a_closed_pipe_is_not_reported_as_an_error_of_the_folder(tmp_path, here):
     def left(line):
         raise BrokenPipeError
 
@@ -318,7 +318,7 @@ def test_a_reader_who_has_left_is_no_fault_of_the_folder(tmp_path, here):
     ids=["seed", "windows", "shard", "mix", "models"],
 )
 @pytest.mark.parametrize("finished", [True, False])
-def test_a_data_set_of_other_settings_is_left_as_it_is(other, words, finished, undisturbed, tmp_path, here, refused):
+def test_a_data_set_with_other_settings_is_left_unchanged(other, words, finished, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set") if finished else begun(tmp_path / "set", undisturbed)
     before = content_of(folder)
     with refused(*words, "--out"):
@@ -326,7 +326,7 @@ def test_a_data_set_of_other_settings_is_left_as_it_is(other, words, finished, u
     assert content_of(folder) == before and not here
 
 
-def test_other_versions_do_not_go_on(undisturbed, tmp_path, here, monkeypatch, refused):
+def test_a_run_with_other_library_versions_does_not_resume(undisturbed, tmp_path, here, monkeypatch, refused):
     folder, known = begun(tmp_path / "set", undisturbed), importlib.metadata.version
     monkeypatch.setattr(importlib.metadata, "version", lambda name: "9.9" if name == "keras" else known(name))
     with refused("versions", "9.9"):
@@ -334,21 +334,21 @@ def test_other_versions_do_not_go_on(undisturbed, tmp_path, here, monkeypatch, r
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "shard-000000.parquet", "training.parquet", "folder"])
-def test_a_folder_of_something_else_is_left_as_it_is(name, tmp_path, here, refused):
+def test_a_folder_with_other_content_is_left_unchanged(name, tmp_path, here, refused):
     (tmp_path / name).mkdir() if name == "folder" else (tmp_path / name).write_text("mine")
     with refused(name):
         generate_fleet(tmp_path, plan())
     assert [path.name for path in tmp_path.iterdir()] == [name] and not here
 
 
-def test_shards_of_another_data_set_are_not_written_over(undisturbed, tmp_path, here, refused):
+def test_shards_of_another_data_set_are_not_overwritten(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").unlink()
     with refused(file_of(0)):
         generate_fleet(folder, plan(seed=4))
 
 
-def test_outputs_that_are_no_folder_are_refused(tmp_path, here, refused):
+def test_outputs_that_are_not_folders_are_refused(tmp_path, here, refused):
     (tmp_path / "file").touch()
     with refused("folder"):
         generate_fleet(tmp_path / "file", plan())
@@ -357,13 +357,13 @@ def test_outputs_that_are_no_folder_are_refused(tmp_path, here, refused):
 
 
 @pytest.mark.parametrize("extra", ["shard-000020.parquet", "_journal.jsonl"])
-def test_verify_names_what_does_not_belong(extra, undisturbed, tmp_path):
+def test_verify_names_unexpected_files(extra, undisturbed, tmp_path):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / extra).touch()
-    assert told(verify, folder) == [f"{extra}: not of this data set"]
+    assert told(verify, folder) == [f"{extra}: not a file of this data set"]
 
 
-def test_verify_sees_what_checksums_vouch_for(undisturbed, tmp_path):
+def test_verify_checks_content_with_a_correct_checksum(undisturbed, tmp_path):
     import pyarrow.parquet as pq
 
     folder = copy_of(undisturbed, tmp_path / "set")
@@ -376,10 +376,10 @@ def test_verify_sees_what_checksums_vouch_for(undisturbed, tmp_path):
     (folder / "_manifest.json").write_text(json.dumps(manifest))
     lines = told(verify, folder)
     assert [line.split(":")[0] for line in lines] == [file_of(0), file_of(1), file_of(2)]
-    assert "49 windows, 50 recorded" in lines[0] and "columns" in lines[1] and "no Parquet" in lines[2]
+    assert "49 windows, 50 recorded" in lines[0] and "columns" in lines[1] and "not a Parquet file" in lines[2]
 
 
-# faults, for real
+# real faults
 
 
 def started(folder, *options, **how):
@@ -389,20 +389,20 @@ def started(folder, *options, **how):
 
 
 def wait_for(folder, num_shards, process):
-    """Waits until a run has written some shards; the moment is that of a file, not of a clock."""
+    """Waits until a run has written some shards."""
     while len(list(folder.glob("shard-*"))) < num_shards and process.poll() is None:
         time.sleep(0.002)
 
 
 def children_of(process):
-    """The processes of a run's pool."""
+    """Returns the worker processes of a run."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rpartition(")")[2].split()
             if int(fields[1]) == process.pid and b"spawn_main" in (stat.parent / "cmdline").read_bytes():
                 found.append(int(stat.parent.name))
-        except OSError:  # it has ended meanwhile
+        except OSError:  # the process has ended in the meantime
             continue
     return found
 
@@ -423,7 +423,7 @@ def test_killed_runs_are_recovered_bit_for_bit(who, seed, undisturbed, tmp_path)
     process.communicate()
     if who == "driver":
         assert process.returncode == -signal.SIGKILL
-        again = started(folder)  # its orphans may still be at work
+        again = started(folder)  # the workers of the killed driver may still be running
         assert "shards are there" in again.communicate()[0] and again.returncode == 0
     else:
         assert process.returncode == 0
@@ -431,31 +431,31 @@ def test_killed_runs_are_recovered_bit_for_bit(who, seed, undisturbed, tmp_path)
     deadline = time.monotonic() + 20
     while any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()], "an orphan lives on"
+    assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()], "a worker of the killed driver is still running"
 
 
-def test_an_interrupt_is_one_line_and_nothing_is_lost(undisturbed, tmp_path):
+def test_an_interrupt_gives_one_line_and_finished_shards_are_kept(undisturbed, tmp_path):
     folder = tmp_path / "set"
     folder.mkdir()
     process = started(folder, start_new_session=True)
     wait_for(folder, 4, process)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers are told, too
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get the signal too
     out, err = process.communicate()
     assert (process.returncode, err, out) == (130, "interrupted; what was finished is kept\n", "")
     assert not [name for name in os.listdir(folder) if name.startswith(".shard")]
     assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
 
 
-def test_a_full_disk_is_one_line_and_what_was_finished_is_kept(undisturbed, tmp_path):
+def test_a_full_disk_gives_one_line_and_a_later_run_finishes(undisturbed, tmp_path):
     folder = tmp_path / "set"
-    process = started(folder, "--limit", 9_000)  # no file may grow beyond: what writing to a full disk looks like to a program
+    process = started(folder, "--limit", 9_000)  # limits the size of files, which for a program looks like a full disk
     out, err = process.communicate()
     assert process.returncode == 2 and err.startswith("error: Expected ") and len(err.splitlines()) == 1 and "large" in err
     assert not [name for name in os.listdir(folder) if "shard" in name]
     assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
 
 
-def test_a_disk_that_fills_up_while_records_are_written(undisturbed, tmp_path, here, monkeypatch, refused):
+def test_a_disk_that_becomes_full_while_records_are_written(undisturbed, tmp_path, here, monkeypatch, refused):
     from enhsim_tf.datasets import folder as shard_folder
 
     folder, dumps = tmp_path / "set", shard_folder.json.dumps
@@ -472,9 +472,9 @@ def test_a_disk_that_fills_up_while_records_are_written(undisturbed, tmp_path, h
     assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
 
 
-def test_a_folder_that_cannot_be_written_is_one_line():
-    as_another = ["--user", 65534] if os.geteuid() == 0 else []  # the superuser may write anywhere
-    with tempfile.TemporaryDirectory() as outer:  # which others may enter, unlike `tmp_path`
+def test_a_read_only_folder_gives_one_line():
+    as_another = ["--user", 65534] if os.geteuid() == 0 else []  # root may write anywhere
+    with tempfile.TemporaryDirectory() as outer:  # other users may enter this folder, unlike `tmp_path`
         folder = Path(outer) / "set"
         folder.mkdir()
         folder.chmod(0o555)
@@ -501,7 +501,7 @@ def test_a_second_run_into_the_same_folder_is_refused(undisturbed, tmp_path):
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """A folder of two saved simulators of tiny networks."""
+    """A folder with two saved simulators with tiny networks."""
     from tests.enhanced_simulator.test_simulator import small
 
     folder = tmp_path_factory.mktemp("models")
@@ -510,7 +510,7 @@ def models(tmp_path_factory):
     return folder
 
 
-def test_the_command_makes_what_one_process_makes(models, tmp_path, monkeypatch, capsys):
+def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monkeypatch, capsys):
     mix = tmp_path / "mix.yaml"
     mix.write_text("windows: 150\nshard: 50\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n")
     mix.write_text(mix.read_text() + "models: [{folder: amps, share: 0.4}, {folder: volts, share: 0.6}]\n")
@@ -555,7 +555,7 @@ def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, c
         ([], "--windows"),
     ],
 )
-def test_options_that_do_not_go_together(options, words, models, tmp_path, monkeypatch, capsys):
+def test_contradicting_options_are_refused(options, words, models, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mix.yaml").write_text("windows: 10\nseed: 1\nmodels: [{folder: volts}]\n")
     assert main(["generate", str(models), *options, "--out", "set"]) == 2
@@ -571,7 +571,7 @@ DOCS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "fleet.md").read_text
 
 
 @pytest.mark.parametrize(("number", "library"), list(enumerate(("pandas", "pyarrow.dataset", "tensorflow"))))
-def test_what_the_documentation_reads_is_what_was_made(number, library, undisturbed, monkeypatch):
+def test_the_reading_examples_of_the_documentation_return_the_data_set(number, library, undisturbed, monkeypatch):
     monkeypatch.chdir(undisturbed.parent)
     code = DOCS[number].replace('"training"', '"set"')
     assert f"import {library}" in code and len(DOCS) == 3

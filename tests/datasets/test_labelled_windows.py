@@ -1,4 +1,4 @@
-"""Labelled training data: what the labels say is what was generated, and files are whole or not there."""
+"""Labelled training data: labels agree with the generated data, and files are written atomically."""
 
 import hashlib
 
@@ -29,13 +29,13 @@ COARSE = SquareWaveSimulator([SquareWave(48, low=-0.5, high=0.5)])
 
 
 def known(noise_sd=0.1, interval_s=2.0):
-    """Made of known processes: the coarse signal itself plus white noise."""
+    """A simulator of known processes: the coarse signal plus white noise."""
     enhancer = keras.Sequential([keras.Input((WINDOW,)), keras.layers.Dense(WINDOW)])
     enhancer.layers[0].set_weights([np.eye(WINDOW), np.zeros(WINDOW)])
     return EnhancedSimulator(COARSE, enhancer, GaussianNoise(noise_sd, WINDOW), interval_s, trained={"telemetry": "volts"})
 
 
-# what is asked for
+# options
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def known(noise_sd=0.1, interval_s=2.0):
         ("dropout:1e-2", Degraded("dropout", 0.01)),
     ],
 )
-def test_scenarios_are_read(text, expected):
+def test_scenarios_are_parsed(text, expected):
     assert parse_scenario(text) == expected
 
 
@@ -67,7 +67,7 @@ def test_scenarios_are_read(text, expected):
         "nominal:0.5",
     ],
 )
-def test_what_is_no_scenario_is_refused(refused, text):
+def test_invalid_scenarios_are_refused(refused, text):
     with refused():
         parse_scenario(text)
 
@@ -87,7 +87,7 @@ def test_what_is_no_scenario_is_refused(refused, text):
         ("2.5 min", 10.0, 15),
     ],
 )
-def test_lengths_are_samples(text, interval_s, expected):
+def test_lengths_are_converted_to_samples(text, interval_s, expected):
     assert num_samples_of(text, interval_s) == expected
 
 
@@ -95,31 +95,31 @@ def test_lengths_are_samples(text, interval_s, expected):
     "text",
     ["", "0", "-5", "0s", "-1d", "nan", "NaT", "inf", "long", "1 fortnight", "5000.5", "1e3", "²", "1m", "1d 6h", "1.d", "d", "9" * 5_000],
 )
-def test_what_is_no_length_is_refused(refused, text):
+def test_invalid_lengths_are_refused(refused, text):
     with refused("1d, 6h", "5000"):
         parse_length(text)
 
 
 @pytest.mark.parametrize(("text", "interval_s"), [("1s", 10.0), ("1000d", 1.0), ("20000001", 1.0)])
-def test_lengths_out_of_range_are_refused_where_the_interval_is_known(refused, text, interval_s):
+def test_lengths_out_of_range_for_the_interval_are_refused(refused, text, interval_s):
     assert parse_length(text)
     with refused(f"one every {interval_s:g} s", repr(text)):
         num_samples_of(text, interval_s)
 
 
-def test_starts_are_in_utc():
+def test_start_times_are_converted_to_utc():
     assert start_of("2024-01-01") == pd.Timestamp("2024-01-01", tz="UTC")
     assert start_of("2024-06-01T12:00+02:00") == pd.Timestamp("2024-06-01T10:00", tz="UTC")
     assert start_of(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp("2024-06-01T10:00", tz="UTC")
 
 
 @pytest.mark.parametrize("text", ["", "soon", "01.02.2024", "1066-10-14", "9999-01-01", "2024-13-01"])
-def test_what_is_no_start_is_refused(refused, text):
+def test_invalid_start_times_are_refused(refused, text):
     with refused("2024-01-01"):
         start_of(text)
 
 
-# how windows are divided
+# division of windows
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_what_is_no_start_is_refused(refused, text):
         (1, 7, 1.0, [7]),
     ],
 )
-def test_windows_are_divided(num_scenarios, num_windows, nominal_share, expected):
+def test_windows_are_divided_between_scenarios(num_scenarios, num_windows, nominal_share, expected):
     scenarios = [Degraded(mode) for mode in list(MODES)[:num_scenarios]]
     shares = shares_of(scenarios, num_windows, nominal_share, seed=3)
     assert [share.num_windows for share in shares] == expected and sum(expected) == num_windows
@@ -144,7 +144,7 @@ def test_windows_are_divided(num_scenarios, num_windows, nominal_share, expected
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
-def test_a_share_that_is_none_is_refused(refused, share):
+def test_a_share_out_of_range_is_refused(refused, share):
     with refused("from 0 to 1"):
         shares_of([Degraded("stuck")], 10, share, 0)
 
@@ -159,14 +159,14 @@ def test_no_scenario_is_dropped_silently(refused):
 
 @pytest.fixture
 def written(tmp_path):
-    """A training set, its shares and the simulator that made it."""
+    """A training set, its shares and the simulator that generated it."""
     scenarios = [Degraded("stuck", 0.5, 0.4), Degraded("drift", 0.8, 0.29), Degraded("gain_loss", 0.0)]
     shares, path = shares_of(scenarios, 80, 0.25, seed=7), tmp_path / "deep" / "training.parquet"
     write_windows_labelled(path, known(), shares)
     return path, shares
 
 
-def test_labels_say_what_was_generated(written):
+def test_labels_agree_with_the_generated_windows(written):
     path, shares = written
     frame, first = pd.read_parquet(path), 0
     assert list(frame.columns) == ["window", "scenario", "severity", "onset"] and len(frame) == 80
@@ -181,8 +181,8 @@ def test_labels_say_what_was_generated(written):
 
 
 @pytest.mark.parametrize("onset", [0.0, 0.25, 0.29, 0.4, 0.99])
-def test_the_onset_is_the_first_sample_concerned(tmp_path, onset):
-    # a drift of the coarse signal alone begins with nothing: the first difference is one sample later
+def test_the_onset_is_the_first_affected_sample(tmp_path, onset):
+    # a drift begins at zero, so the first difference is one sample after the onset
     scenario = Degraded("drift", 1.0, onset)
     write_windows_labelled(tmp_path / "x.parquet", known(noise_sd=0), [Share(None, 5, 1), Share(scenario, 5, 1)])
     frame = pd.read_parquet(tmp_path / "x.parquet")
@@ -194,7 +194,7 @@ def test_the_onset_is_the_first_sample_concerned(tmp_path, onset):
         assert (drifting[:, int(label) + 1 :] != nominal[:, int(label) + 1 :]).all()
 
 
-def test_an_onset_behind_the_last_sample_is_refused(tmp_path, refused):
+def test_an_onset_after_the_last_sample_is_refused(tmp_path, refused):
     late = Degraded("friction", 0.5, 1 - 1e-9)
     with refused("onset within 60 samples"):
         write_windows_labelled(tmp_path / "x.parquet", known(), [Share(late, 5, 1)])
@@ -203,7 +203,7 @@ def test_an_onset_behind_the_last_sample_is_refused(tmp_path, refused):
     assert not list(tmp_path.iterdir())
 
 
-def test_other_programs_can_read_it(written):
+def test_other_programs_can_read_the_file(written):
     path, _ = written
     schema = pq.read_schema(path)
     assert str(schema.field("window").type) == "fixed_size_list<element: float>[60]" or schema.field("window").type.list_size == WINDOW
@@ -228,7 +228,7 @@ def test_same_seed_same_bytes(tmp_path):
 
 
 @pytest.mark.parametrize("scenario", [None, Degraded("dropout", 0.7, 0.3), Degraded("stuck", 0.0)], ids=str)
-def test_a_series_is_that_of_the_simulator(tmp_path, scenario):
+def test_a_series_equals_that_of_the_simulator(tmp_path, scenario):
     write_series_labelled(tmp_path / "x.parquet", known(), 1_234, scenario, 9)
     frame = pd.read_parquet(tmp_path / "x.parquet")
     assert list(frame.columns) == ["time_s", "value", "scenario", "severity"]
@@ -251,7 +251,7 @@ def test_a_series_with_a_start_has_times(tmp_path):
     assert (pd.DatetimeIndex(read["time"]) == expected).all() and (read["value"].to_numpy() == frame["value"].to_numpy()).all()
 
 
-# nothing half
+# failures
 
 
 class Broken(EnhancedSimulator):
@@ -266,7 +266,7 @@ class Broken(EnhancedSimulator):
 
 
 @pytest.mark.parametrize("there_before", [False, True])
-def test_nothing_is_written_when_it_fails(tmp_path, there_before):
+def test_a_failed_generation_writes_nothing(tmp_path, there_before):
     broken = Broken(COARSE, known().enhancer, GaussianNoise(0.1, WINDOW))
     for name in ("windows.parquet", "series.parquet") if there_before else ():
         (tmp_path / name).write_text("the old one")

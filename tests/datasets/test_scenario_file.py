@@ -1,4 +1,4 @@
-"""The scenario file: what it means, every mistake with its place, and nothing that a hostile one could do."""
+"""The scenario file: its meaning, error messages with the place of a mistake, and malicious files."""
 
 import re
 import subprocess
@@ -33,13 +33,13 @@ def written(path, content):
     return path
 
 
-def test_what_a_file_means(tmp_path):
+def test_a_file_with_all_keys(tmp_path):
     scenarios = ScenarioShare("stuck", 0.3, (0.2, 0.9), (0, 0.5)), ScenarioShare("drift", 0.2, (1, 1), (0.25, 0.25))
     models = ModelShare("a", "a", 0.25), ModelShare("second", "b/volts", 0.75)
     assert read_mix(written(tmp_path / "mix.yaml", GOOD)) == Mix(0.5, scenarios, models, 1_000, 7, 100)
 
 
-def test_what_may_be_left_out(tmp_path):
+def test_optional_keys_may_be_left_out(tmp_path):
     assert read_mix(written(tmp_path / "mix.yaml", "{}")) == Mix()
     some = {"scenarios": GOOD["scenarios"], "models": [{"folder": "a"}, {"folder": "b"}, {"folder": "./c/"}]}
     mix = read_mix(written(tmp_path / "mix.yaml", some))
@@ -48,7 +48,7 @@ def test_what_may_be_left_out(tmp_path):
     assert read_mix(written(tmp_path / "mix.yaml", "windows: 10_000_000\nseed:\n")).num_windows == 10**7
 
 
-def test_the_example_of_the_documentation_is_one(tmp_path):
+def test_the_example_of_the_documentation_is_valid(tmp_path):
     (text,) = re.findall(r"```yaml\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
     mix = read_mix(written(tmp_path / "mix.yaml", text))
     assert mix.num_windows and mix.seed is not None and len(mix.scenarios) > 2 and len(mix.models) > 1
@@ -56,7 +56,7 @@ def test_the_example_of_the_documentation_is_one(tmp_path):
         assert f"`{word}`" in DOCS.read_text(encoding="utf-8"), f"{word} is not explained"
 
 
-def test_options_make_the_same_mix_as_a_file(tmp_path):
+def test_options_give_the_same_mix_as_a_file(tmp_path):
     by_option = mix_of([Degraded("stuck", 0.5), Degraded("drift", 0.2, 0.0)], 0.4)
     text = "nominal: 0.4\nscenarios:\n- {mode: stuck, share: 0.3, severity: 0.5}\n- {mode: drift, share: 0.3, severity: 0.2, onset: 0}\n"
     assert read_mix(written(tmp_path / "mix.yaml", text)) == by_option
@@ -64,7 +64,7 @@ def test_options_make_the_same_mix_as_a_file(tmp_path):
 
 
 def changed(*path, to):
-    """The good content with another value at a place."""
+    """Returns the valid content with one value replaced."""
     content = yaml.safe_load(yaml.safe_dump(GOOD))
     *before, last = path
     inner = content
@@ -128,7 +128,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_mistakes_are_named_with_their_place(name, tmp_path, refused):
+def test_error_messages_name_the_place(name, tmp_path, refused):
     content, words = MISTAKES[name]
     with refused(*words):
         read_mix(written(tmp_path / "mix.yaml", content))
@@ -165,7 +165,7 @@ PLACES += [("models",), ("models", 1), ("models", 0, "folder"), ("models", 1, "n
 
 
 def read_or_refuse(path):
-    """Reads a file; anything but a mix or one line of refusal is an error."""
+    """Reads a file, which must give a mix or an error message of one line."""
     try:
         assert isinstance(read_mix(path), Mix)
     except InputError as error:
@@ -174,7 +174,7 @@ def read_or_refuse(path):
 
 @settings(max_examples=60, derandomize=True, deadline=None)
 @given(st.sampled_from(PLACES), JUNK)
-def test_anything_at_any_place_is_read_or_refused(tmp_path_factory, place, junk):
+def test_any_value_at_any_place_is_read_or_refused(tmp_path_factory, place, junk):
     read_or_refuse(written(tmp_path_factory.getbasetemp() / "junk.yaml", changed(*place, to=junk)))
 
 

@@ -1,4 +1,4 @@
-"""Shards: what each window is, shown on closed forms; a pure function of plan and number; plans that cannot be are refused."""
+"""Shards: windows compared with closed forms, dependence on plan and number only, and invalid plans."""
 
 import json
 import zipfile
@@ -15,7 +15,7 @@ from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare
 from enhsim_tf.datasets.shard import draw_rows, file_of, make_windows, schema_of, systematic
 from tests.faults.small_data_set import COARSE, INTERVAL_S, WINDOW, Plain, PlainMaker, plan
 
-EVERY_MODE = ("stuck", "drift", "gain_loss", "period_change")  # those that leave nothing to chance
+EVERY_MODE = ("stuck", "drift", "gain_loss", "period_change")  # the modes without random draws
 ALL = Mix(0.2, tuple(ScenarioShare(mode, 0.2, (0.2, 0.9), (0.1, 0.7)) for mode in EVERY_MODE))
 
 
@@ -24,10 +24,10 @@ def table_of(maker, shard):
     return record, pq.read_table(maker.folder / file_of(shard)).to_pandas()
 
 
-def test_each_window_is_what_its_labels_say(tmp_path):
+def test_each_window_agrees_with_its_labels(tmp_path):
     maker = PlainMaker(plan(200, 100, mix=ALL), tmp_path)
     maker.__class__ = type("Silent", (PlainMaker,), {"simulators": [Plain(noise_sd=0)]})
-    times = INTERVAL_S * (np.arange(240)[:, None] + np.arange(WINDOW))  # every phase that there is
+    times = INTERVAL_S * (np.arange(240)[:, None] + np.arange(WINDOW))  # all phases
     severities = []
     for shard in range(2):
         record, table = table_of(maker, shard)
@@ -52,14 +52,14 @@ def test_windows_have_the_levels_and_the_noise_of_their_simulator():
     windows, _ = make_windows(nominal, [Plain(0, levels)], 0)
     at = {}
     for shift, gain in levels:
-        inside = np.abs((windows - shift) / gain).max(axis=1) <= 0.7501  # the coarse signal's range
+        inside = np.abs((windows - shift) / gain).max(axis=1) <= 0.7501  # the range of the coarse signal
         at[shift] = inside.sum()
     assert sum(at.values()) == 600 and min(at.values()) > 200 - 5 * np.sqrt(600 * 2 / 9)
     noise = make_windows(nominal, [Plain(0.3)], 0)[0] - make_windows(nominal, [Plain(0)], 0)[0]
     assert np.std(noise) == pytest.approx(0.3, rel=5 / np.sqrt(2 * noise.size))
 
 
-def test_a_shard_is_a_function_of_plan_and_number_alone(tmp_path):
+def test_a_shard_depends_only_on_plan_and_number(tmp_path):
     folders = [tmp_path / name for name in ("forth", "back", "alone")]
     for folder in folders:
         folder.mkdir()
@@ -76,26 +76,26 @@ def test_a_shard_is_a_function_of_plan_and_number_alone(tmp_path):
 def test_shards_do_not_repeat_each_other():
     drawn = [draw_rows(plan(2_000, 500, seed=seed), shard)[0].begin for seed in (0, 1) for shard in range(4)]
     assert len({values.tobytes() for values in drawn}) == 8
-    assert len(np.unique(np.concatenate(drawn))) > 3_980  # of 4,000 among a million: 8 meet by chance
+    assert len(np.unique(np.concatenate(drawn))) > 3_980  # 4,000 draws from a million values: about 8 repeat by chance
 
 
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=8).filter(any), st.integers(1, 200), st.integers(0, 2**32))
-def test_each_part_has_its_share_of_the_rows(weights, num_rows, seed):
+def test_each_category_gets_its_share_of_the_rows(weights, num_rows, seed):
     shares = np.array(weights) / np.sum(weights)
     counts = np.bincount(systematic(shares, num_rows, np.random.default_rng(seed)), minlength=len(shares))
     assert counts.sum() == num_rows and (np.abs(counts - shares * num_rows) < 1 + 1e-9).all()
     assert (counts[shares == 0] == 0).all()
 
 
-def test_rare_parts_and_the_order_are_left_to_chance():
+def test_rare_categories_and_the_order_are_random():
     drawn = np.stack([systematic([0.999, 0.001], 100, np.random.default_rng(seed)) for seed in range(4_000)])
-    assert drawn.sum() == pytest.approx(400, abs=5 * 20)  # a tenth of a window a shard
+    assert drawn.sum() == pytest.approx(400, abs=5 * 20)  # expected: a tenth of a window per shard
     halves = np.stack([systematic([0.5, 0.5], 10, np.random.default_rng(seed)) for seed in range(2_000)])
-    np.testing.assert_allclose(halves.mean(axis=0), 0.5, atol=5 * 0.5 / np.sqrt(2_000))  # at every place alike
+    np.testing.assert_allclose(halves.mean(axis=0), 0.5, atol=5 * 0.5 / np.sqrt(2_000))  # the same at every position
 
 
-def test_what_stands_in_the_file(tmp_path):
+def test_the_content_of_a_shard_file(tmp_path):
     family = plan(100, 100, shares=(0.25, 0.75))
     maker = PlainMaker(family, tmp_path)
     record, table = table_of(maker, 0)
@@ -108,7 +108,7 @@ def test_what_stands_in_the_file(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["shard-000000.parquet"]
 
 
-def test_a_worker_of_other_versions_refuses(tmp_path, monkeypatch, refused):
+def test_a_worker_with_other_library_versions_is_refused(tmp_path, monkeypatch, refused):
     from enhsim_tf.datasets import plan as fleet_plan
     from enhsim_tf.datasets.shard import ShardMaker
 
@@ -123,7 +123,7 @@ def test_a_worker_of_other_versions_refuses(tmp_path, monkeypatch, refused):
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
-    """A saved simulator of tiny networks; nobody writes there."""
+    """A read-only saved simulator with tiny networks."""
     from tests.enhanced_simulator.test_simulator import small
 
     folder = tmp_path_factory.mktemp("models") / "volts"
@@ -140,14 +140,14 @@ def copied(model, tmp_path):
     return folder
 
 
-def test_a_plan_knows_its_model_without_loading_it(model):
+def test_a_plan_is_made_without_loading_the_model(model):
     made = plan_of(Mix(), model, seed=1, num_windows=20_000)
     assert (made.window, made.models[0].interval_s, made.models[0].name) == (60, 2.0, "volts")
     assert (made.shard, made.num_shards, made.rows_of(2)) == (8_192, 3, 20_000 - 2 * 8_192)
     assert str(model) not in json.dumps(made.settings())
 
 
-def test_shards_of_real_networks_are_what_the_simulator_makes(model, tmp_path):
+def test_shards_of_real_networks_equal_the_output_of_the_simulator(model, tmp_path):
     from enhsim_tf.datasets.shard import ShardMaker
 
     made = plan_of(Mix(shard=40), model, seed=1, num_windows=80)
@@ -172,7 +172,7 @@ def test_damaged_models_are_refused(copied, file, damage, refused):
 
 
 @pytest.mark.parametrize("interval", ["1" + "0" * 400, "-1", "1e999", "true", '"2"', "null"])
-def test_an_interval_that_is_none_is_refused(copied, interval, refused):
+def test_an_invalid_interval_is_refused(copied, interval, refused):
     settings = json.loads((copied / "settings.json").read_text())
     (copied / "settings.json").write_text(json.dumps(settings | {"interval_s": 12345}).replace("12345", interval))
     vouch(copied)
@@ -187,7 +187,7 @@ def vouch(folder):
 
 
 @pytest.mark.parametrize("config", ["{}", "[]", "1", "{", '{"config": {"layers": [{"config": {"batch_shape": [null, true]}}]}}'])
-def test_enhancers_without_a_width_are_refused(copied, config, refused):
+def test_enhancers_without_a_fixed_width_are_refused(copied, config, refused):
     with zipfile.ZipFile(copied / "enhancer.keras", "w") as archive:
         for name, content in {"config.json": config, "metadata.json": "{}", "model.weights.h5": ""}.items():
             archive.writestr(name, content)
@@ -196,7 +196,7 @@ def test_enhancers_without_a_width_are_refused(copied, config, refused):
         plan_of(Mix(), copied, 0, 10)
 
 
-def test_descriptions_that_unpack_without_end_are_refused(copied, refused):
+def test_compressed_large_descriptions_are_refused(copied, refused):
     with zipfile.ZipFile(copied / "enhancer.keras", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("config.json", b" " * 60_000_000)
     vouch(copied)
@@ -205,7 +205,7 @@ def test_descriptions_that_unpack_without_end_are_refused(copied, refused):
 
 
 @pytest.mark.parametrize("interval", ["0", "-1", "true", '"1"', "NaN", "null", "1e999"])
-def test_intervals_that_are_none_are_refused(copied, interval, refused):
+def test_invalid_intervals_of_any_type_are_refused(copied, interval, refused):
     path = copied / "settings.json"
     path.write_text(path.read_text().replace('"interval_s": 2.0', f'"interval_s": {interval}'))
     vouch(copied)
@@ -213,24 +213,24 @@ def test_intervals_that_are_none_are_refused(copied, interval, refused):
         plan_of(Mix(), copied, 0, 10)
 
 
-def test_a_model_that_was_exchanged_meanwhile_is_refused(copied, tmp_path, refused):
+def test_a_model_replaced_after_planning_is_refused(copied, tmp_path, refused):
     from enhsim_tf.datasets.shard import ShardMaker
 
     maker = ShardMaker(plan_of(Mix(), copied, 0, 10), tmp_path)
     path = copied / "settings.json"
     path.write_text(path.read_text().replace('"offset": 0.1', '"offset": 0.2'))
     vouch(copied)
-    with refused("begun with"):
+    with refused("at the start of the data set"):
         maker(0)
 
 
-def test_families_need_one_window(model, tmp_path, refused):
+def test_models_with_different_windows_are_refused(model, tmp_path, refused):
     from tests.enhanced_simulator.test_simulator import small
 
     small(window=64).save(tmp_path / "wide")
     (tmp_path / "narrow").symlink_to(model)
     mix = Mix(models=(ModelShare("a", "narrow", 0.5), ModelShare("b", "wide", 0.5)))
-    with refused("one window", "60", "64"):
+    with refused("same window", "60", "64"):
         plan_of(mix, tmp_path, 0, 10)
 
 
@@ -243,6 +243,6 @@ def test_families_need_one_window(model, tmp_path, refused):
         ({"num_windows": 10**9, "shard": 1}, "shard:"),
     ],
 )
-def test_data_sets_beyond_any_size_are_refused(changes, words, refused):
+def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
     with refused(words):
         plan(**changes)

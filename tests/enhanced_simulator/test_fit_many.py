@@ -1,4 +1,4 @@
-"""Many channels at once: the same simulators in any number of processes, names that stay in the folder, nothing half written."""
+"""Fits of many channels: identical results with any number of workers, safe folder names, and atomic output."""
 
 import contextlib
 import dataclasses
@@ -28,7 +28,7 @@ from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
 TINY = {"window": 64, "num_windows": 30, "epochs": 1, "num_iterations": 2, "seed": 3}
-REPORTS = []  # of the first fit
+REPORTS = []  # reports of the first fit
 HOSTILE = ["../x", "a/b", "<b>", ".", "..", ".hidden", "%2E", "a%2Fb", " ", "ä 漢", "C:\\x", "[!.]*", "~", "-rf", "a\nb", "manifest.json"]
 
 
@@ -39,13 +39,13 @@ def series(period=40, num_samples=1_200, seed=0):
 
 
 def files(folder):
-    """Every file below a folder, hidden ones too, with its bytes."""
+    """Returns the bytes of every file in a folder, including hidden files."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.fixture
 def quick(monkeypatch):
-    """A narrow enhancer, and one report, measured on a few windows, for all."""
+    """Uses a narrow enhancer, and one report, measured on a few windows, for all fits."""
     measure = fitting.report_on
 
     def report_on(simulator, learnt, *others):
@@ -68,7 +68,7 @@ def fit(out, given, workers=0, engine="local", **changed):
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_no_name_leaves_the_folder_or_hides_in_it(tmp_path, name):
+def test_no_name_gives_a_hidden_folder_or_a_folder_elsewhere(tmp_path, name):
     folder = folder_of(tmp_path / "models", name)
     assert folder.parent == tmp_path / "models" and not folder.name.startswith(".")
     assert os.path.abspath(folder) == str(folder)
@@ -81,7 +81,7 @@ def test_different_names_have_different_folders():
     assert len({folder_of("m", name) for name in HOSTILE}) == len(HOSTILE)
 
 
-def test_two_folders_of_one_name_are_refused(refused, tmp_path):
+def test_two_folders_for_the_same_name_are_refused(refused, tmp_path):
     for name in ("a b", "a%20b"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "manifest.json").write_text("{}")
@@ -90,7 +90,7 @@ def test_two_folders_of_one_name_are_refused(refused, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["", "x" * 161, "漢" * 21])
-def test_names_that_no_folder_can_have_are_refused(refused, tmp_path, name):
+def test_names_that_are_empty_or_too_long_are_refused(refused, tmp_path, name):
     with refused("1 to 160"):
         fit(tmp_path / "models", {name: series(), "volts": series()})
     assert files(tmp_path) == {}
@@ -101,7 +101,7 @@ def test_folders_without_models_are_refused(refused, tmp_path, where):
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()
     (tmp_path / "only hidden" / ".volts.host.1.0123abcd.tmp").mkdir(parents=True)
-    (tmp_path / "only hidden" / ".volts.host.1.0123abcd.tmp" / MANIFEST).write_text("{}")  # what a killed process left
+    (tmp_path / "only hidden" / ".volts.host.1.0123abcd.tmp" / MANIFEST).write_text("{}")  # temporary folder of a killed process
     with refused("fitted simulators", where[:50]):
         models_of(tmp_path / where)
 
@@ -118,7 +118,7 @@ def test_a_model_below_the_working_directory_has_its_name(tmp_path, monkeypatch)
 # fits
 
 
-def test_a_folder_holds_the_simulator_and_its_report(tmp_path, quick):
+def test_a_folder_contains_the_simulator_and_its_report(tmp_path, quick):
     failed, told = fit(tmp_path, {"a/b": series()})
     assert failed == {} and len(told) == 1
     assert {path.name for path in tmp_path.iterdir()} == {"a%2Fb"}
@@ -136,7 +136,7 @@ GIVEN = {"../sine": series(num_samples=600), "still": pd.Series(np.ones(600)), "
 
 @pytest.fixture(scope="module")
 def in_one_process(tmp_path_factory):
-    """Two channels fitted one after the other, and a third that cannot be."""
+    """Two channels fitted one after the other; a third channel cannot be fitted."""
     folder = tmp_path_factory.mktemp("one")
     failed, told = fit(folder, GIVEN, workers=1, window=32)
     assert list(failed) == ["still"] and "periodic" in failed["still"] and len(told) == 2
@@ -144,7 +144,7 @@ def in_one_process(tmp_path_factory):
 
 
 def same_models(folder, other):
-    """Whether two folders of models hold the same, up to the dates that Keras writes beside the weights."""
+    """Whether two folders contain the same models, except for the dates that Keras stores."""
     assert models_of(folder).keys() == models_of(other).keys() == {"../sine", "slow"}
     for name, path in models_of(folder).items():
         one, another = files(path), files(models_of(other)[name])
@@ -160,7 +160,7 @@ def same_models(folder, other):
 
 
 def kill_one_at_work(killed):
-    """Kills a process of this one's pool once it has TensorFlow, so in the middle of a fit."""
+    """Kills a worker of this process after it has loaded TensorFlow, that is, during a fit."""
     while not killed:
         for process in multiprocessing.active_children():
             with contextlib.suppress(OSError):
@@ -171,7 +171,7 @@ def kill_one_at_work(killed):
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="looks for processes in /proc")
-def test_two_processes_of_which_one_is_killed_make_the_same_simulators(in_one_process, tmp_path):
+def test_a_killed_worker_does_not_change_the_simulators(in_one_process, tmp_path):
     killed = []
     killer = threading.Thread(target=kill_one_at_work, args=[killed], daemon=True)
     killer.start()
@@ -183,42 +183,42 @@ def test_two_processes_of_which_one_is_killed_make_the_same_simulators(in_one_pr
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
-def test_ray_makes_the_same_simulators(in_one_process, tmp_path, monkeypatch):
+def test_ray_fits_the_same_simulators(in_one_process, tmp_path, monkeypatch):
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # where actors find a package that is not installed
-    monkeypatch.chdir(tmp_path)  # actors stand elsewhere: the folder has to reach them in full
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # actors need it to import a package that is not installed
+    monkeypatch.chdir(tmp_path)  # actors have another working directory, so the path must be absolute
     failed, told = fit("ray", GIVEN, workers=2, window=32, engine="ray")
     assert list(failed) == ["still"] and "periodic" in failed["still"]
     assert sorted(line.splitlines()[-1].rpartition(" in ")[2] for line in told) == ["ray/%2E%2E%2Fsine/", "ray/slow/"]
     assert same_models(in_one_process, tmp_path / "ray")
 
 
-def test_a_process_that_is_killed_does_not_take_the_command_with_it(tmp_path, monkeypatch):
+def test_a_worker_that_is_always_killed_does_not_stop_the_command(tmp_path, monkeypatch):
     failed, _ = fit(tmp_path, {"a": series(num_samples=600), "b": Deadly()}, workers=2, window=32)
     assert list(failed) == ["b"] and "were killed" in failed["b"] and list(models_of(tmp_path)) == ["a"]
 
 
 class Deadly:
-    """Ends the process that unpacks it, as a machine without memory does."""
+    """Ends the process that unpickles it, as a machine without free memory does."""
 
     def __reduce__(self):
         return os._exit, (9,)
 
 
-# what stands there
+# existing folders
 
 
 @pytest.mark.parametrize("content", ["notes.txt", MANIFEST])
-def test_a_foreign_folder_is_left_as_it_is(refused, tmp_path, content):
+def test_a_folder_with_other_content_is_left_unchanged(refused, tmp_path, content):
     (tmp_path / "volts").mkdir()
     (tmp_path / "volts" / content).write_text('{"name": "an extension of a browser"}')
     before = files(tmp_path)
     with refused("something else", "volts"):
         fit(tmp_path, {"amps": series(), "volts": series()})
-    assert files(tmp_path) == before  # amps was not fitted either: one learns of it before the work, not after
+    assert files(tmp_path) == before  # amps was not fitted either: all folders are checked before the first fit
 
 
-def test_a_file_of_that_name_is_left_as_it_is(refused, tmp_path):
+def test_a_file_of_the_same_name_is_left_unchanged(refused, tmp_path):
     (tmp_path / "volts").write_text("mine")
     with refused("something else"):
         fit(tmp_path, {"volts": series()})
@@ -228,13 +228,13 @@ def test_a_file_of_that_name_is_left_as_it_is(refused, tmp_path):
     assert (tmp_path / "volts").read_text() == "mine"
 
 
-def test_a_model_is_no_folder_for_models(refused, tmp_path, quick):
+def test_the_folder_of_a_model_is_refused_as_output(refused, tmp_path, quick):
     fit(tmp_path, {"volts": series()})
     with refused("a model itself"):
         fit(tmp_path / "volts", {"amps": series()})
 
 
-def test_an_earlier_fit_is_replaced_and_an_empty_folder_filled(tmp_path, quick):
+def test_an_earlier_fit_or_an_empty_folder_is_replaced(tmp_path, quick):
     folder_of(tmp_path, "volts").mkdir()
     assert fit(tmp_path, {"volts": series()})[0] == {}
     before = files(tmp_path)
@@ -244,7 +244,7 @@ def test_an_earlier_fit_is_replaced_and_an_empty_folder_filled(tmp_path, quick):
 
 
 @pytest.mark.parametrize("there_before", [False, True])
-def test_nothing_is_half_written_after_a_failure(tmp_path, quick, monkeypatch, refused, there_before):
+def test_a_failure_leaves_no_partial_output(tmp_path, quick, monkeypatch, refused, there_before):
     if there_before:
         fit(tmp_path, {"volts": series()})
     before = files(tmp_path)
@@ -258,14 +258,14 @@ def test_nothing_is_half_written_after_a_failure(tmp_path, quick, monkeypatch, r
     assert files(tmp_path) == before and [path.name for path in tmp_path.iterdir()] == ["volts"] * there_before
 
 
-def test_what_a_killed_process_left_is_cleared_away(tmp_path, quick):
+def test_temporary_folders_of_killed_processes_are_removed(tmp_path, quick):
     left = tmp_path / f".volts.{channels.remove_leftovers.__globals__['_host']()}.4194305.0123abcd.tmp"  # no process has this number
     left.mkdir()
     fit(tmp_path, {"volts": series()})
     assert [path.name for path in tmp_path.iterdir()] == ["volts"]
 
 
-def test_a_foreign_folder_that_came_meanwhile_is_left_too(tmp_path, quick, refused, monkeypatch):
+def test_other_content_written_during_the_fit_is_left_unchanged(tmp_path, quick, refused, monkeypatch):
     job = channels.Job("volts", series(), tmp_path / "volts", FitOptions(**TINY), Cleaning())
     (tmp_path / "volts").mkdir()
     (tmp_path / "volts" / "notes.txt").write_text("mine")

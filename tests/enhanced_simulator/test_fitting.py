@@ -1,4 +1,4 @@
-"""A channel's simulator and its report: what was held out stays out, and the sentences agree with the numbers."""
+"""Fit and report of a channel: held-out telemetry is not used, and the sentences agree with the numbers."""
 
 import dataclasses
 import json
@@ -31,7 +31,7 @@ def channel(num_samples=2_000, seed=0, **fields):
 
 @pytest.fixture(scope="module")
 def fitted():
-    """A simulator at tiny counts and its report, measured on the end of two stretches."""
+    """A simulator fitted with a tiny budget, and its report, evaluated on the end of two parts."""
     whole = channel(start="2024-01-01T00:00:00+00:00", interval_s=10.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(channel_report, "_NUM_WINDOWS", 100)
@@ -41,12 +41,12 @@ def fitted():
 # the report
 
 
-def test_the_report_says_what_was_measured_on_what(fitted):
+def test_the_fields_of_the_report(fitted):
     simulator, report = fitted
     assert simulator.window == report.window == 64
     assert (report.channel, report.unit, report.time_unit, report.is_held_out) == ("volts", "V", "s", True)
     assert report.period_s == pytest.approx(400, rel=0.01)
-    assert report.num_windows == min(200, 380 - 64 + 1) and report.num_disjoint == 380 // 64  # a fifth of 1900, in one stretch
+    assert report.num_windows == min(200, 380 - 64 + 1) and report.num_disjoint == 380 // 64  # a fifth of 1,900 samples, in one part
     assert set(report.nrmse) == {"coarse", "ridge", "enhanced"} and all(error > 0 for error in report.nrmse.values())
     assert set(report.false_alarms) == {"generated", "real"}
     assert all(tuple(rates) == DETECTORS and all(0 <= rate <= 1 for rate in rates.values()) for rates in report.false_alarms.values())
@@ -58,13 +58,13 @@ def test_the_report_says_what_was_measured_on_what(fitted):
     assert all(np.shape(window) == (64,) for window in report.examples.values())
 
 
-def test_the_errors_are_those_of_an_independent_reckoning(fitted):
+def test_the_error_agrees_with_an_independent_computation(fitted):
     simulator, report = fitted
     held_out = channel(interval_s=10.0).part(1_620, 2_000)  # the last fifth of 900 + 1000 samples
     begins = np.unique(np.linspace(0, 316, 200).astype(int))
     target = np.stack([held_out.values[begin : begin + 64] for begin in begins])
     moved = []
-    for begin, window in zip(begins, target, strict=True):  # every clock of a grid twice as fine as the simulator's own
+    for begin, window in zip(begins, target, strict=True):  # all time shifts, on a grid twice as fine as that of the simulator
         times = held_out.offset_s + 10.0 * (begin + np.arange(64))
         coarse = np.stack([simulator.coarse(times + shift) for shift in np.linspace(-200, 200, 401)])
         design = [np.linalg.lstsq(np.stack([np.ones(64), each], 1), window, rcond=None)[0] for each in coarse]
@@ -89,16 +89,16 @@ def test_same_seed_same_simulator_and_report(fitted, monkeypatch):
     assert report.to_dict() == fitted[1].to_dict()
 
 
-# what is held out
+# held-out telemetry
 
 
 @pytest.fixture
 def unmeasured(monkeypatch):
-    """Fits are not reported on; the arguments of the report come back in its place."""
+    """Replaces the report by the arguments of the function that makes it."""
     monkeypatch.setattr(fitting, "report_on", lambda *arguments: arguments)
 
 
-def test_what_is_held_out_is_in_nothing_that_was_learnt(unmeasured):
+def test_held_out_telemetry_does_not_affect_training(unmeasured):
     whole = channel()
     changed = whole.values.copy()
     changed[1_600:] = 1e6
@@ -113,21 +113,21 @@ def test_what_is_held_out_is_in_nothing_that_was_learnt(unmeasured):
 
 
 @pytest.mark.parametrize(("held_out", "num_learnt", "is_held_out"), [(0.0, 2_000, False), (0.05, 1_900, False), (0.5, 1_000, True)])
-def test_too_little_to_hold_out_is_told(unmeasured, monkeypatch, held_out, num_learnt, is_held_out):
+def test_the_report_states_whether_telemetry_was_held_out(unmeasured, monkeypatch, held_out, num_learnt, is_held_out):
     monkeypatch.setattr(EnhancedSimulator, "fit", lambda *arguments, **options: SimpleNamespace(window=options["window"]))
     _, about = fit_channel([channel()], dataclasses.replace(TINY, held_out=held_out), 0)
     assert sum(map(len, about[1])) == num_learnt and about[3] is is_held_out
     assert (sum(map(len, about[2])) == 2_000 * held_out) or about[2] is about[1] or about[2] == about[1]
 
 
-def test_stretches_shorter_than_a_window_are_not_learnt_from(unmeasured, monkeypatch):
+def test_parts_shorter_than_a_window_are_not_used_for_training(unmeasured, monkeypatch):
     monkeypatch.setattr(EnhancedSimulator, "fit", lambda telemetry, *arguments, **options: SimpleNamespace(window=options["window"]))
     whole = channel()
     _, about = fit_channel([whole.part(0, 63), whole.part(100, 1_000), whole.part(1_010, 2_000)], TINY, 0)
     assert [len(part) for part in about[1]] == [900, pytest.approx(600, abs=5)]
 
 
-# what cannot be fitted
+# telemetry that cannot be fitted
 
 
 @pytest.mark.parametrize(
@@ -135,14 +135,14 @@ def test_stretches_shorter_than_a_window_are_not_learnt_from(unmeasured, monkeyp
     [
         (np.full(2_000, 3.0), "periodic"),
         (np.zeros(2_000), "periodic"),
-        (channel(600).values, "8 windows of 64"),  # four fifths of it are 480 samples, seven windows and a half
+        (channel(600).values, "8 windows of 64"),  # four fifths of the samples are 480, that is seven and a half windows
         (channel(5).values, "periodic"),
         (np.random.default_rng(0).standard_normal(2_000), "explains"),
         (np.arange(2_000.0), "explains"),
         (np.cumsum(np.random.default_rng(0).standard_normal(2_000)), "explains"),
     ],
 )
-def test_what_cannot_be_learnt_from_is_refused(refused, values, word):
+def test_telemetry_that_cannot_be_fitted_is_refused(refused, values, word):
     with refused(word, "volts"):
         fit_channel([Telemetry(np.asarray(values, np.float32), name="volts")], TINY, 0)
 
@@ -159,21 +159,21 @@ def test_what_cannot_be_learnt_from_is_refused(refused, values, word):
         {"num_iterations": -1},
     ],
 )
-def test_options_that_cannot_be_are_refused(refused, options):
+def test_options_out_of_range_are_refused(refused, options):
     with refused(next(iter(options))):
         FitOptions(**options)
 
 
 @pytest.mark.parametrize(("period_s", "interval_s", "window"), [(100, 1.0, 200), (100, 10.0, 64), (1_000, 1.0, 500), (900, 10.0, 180)])
-def test_a_window_has_two_periods_within_what_networks_are_made_for(period_s, interval_s, window):
+def test_the_default_window_is_two_periods_within_limits(period_s, interval_s, window):
     assert window_of(SquareWaveSimulator([SquareWave(period_s), SquareWave(period_s / 3)]), interval_s) == window
 
 
-# the sentences
+# sentences of the verdict
 
 
 def made_up(**changed):
-    """A report whose numbers are chosen."""
+    """Makes a report with given numbers."""
     noise = [{"measure": f"measure {number}", "ratio": ratio} for number, ratio in enumerate((0.5, 1.9, 1.0, 0.2))]
     rates = {"limit check": 0.0, "PCA residual": 0.02, "nearest neighbours": 0.1, "isolation forest": 1.0}
     recall = {name: dict.fromkeys(("spike", "level_shift", "stuck"), 0.5) for name in DETECTORS}
@@ -210,12 +210,12 @@ def sentence(report, word):
         ((0.0, 0.0, 0.0), "The enhancer is no nearer than the coarse simulator."),
     ],
 )
-def test_the_signal_in_a_sentence(errors, judged):
+def test_the_sentence_on_the_signal(errors, judged):
     said = sentence(made_up(nrmse=dict(zip(("coarse", "ridge", "enhanced"), errors, strict=True))), "Signal")
     assert said.endswith(judged) and f"error {errors[2]:.3f}" in said and f"coarse simulator {errors[0]:.3f}" in said
 
 
-def test_telemetry_that_does_not_move_has_no_error_and_the_report_is_still_json():
+def test_constant_telemetry_has_no_error_and_the_report_is_valid_json():
     report = made_up(nrmse=dict.fromkeys(("coarse", "ridge", "enhanced"), float("nan")))
     assert "no window of telemetry it has not seen moves" in sentence(report, "Signal")
     assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["nrmse"] == dict.fromkeys(("coarse", "ridge", "enhanced"))
@@ -232,7 +232,7 @@ def test_telemetry_that_does_not_move_has_no_error_and_the_report_is_still_json(
         ([3.0, 9.0, 4.0, 2.5, 0.0], "4 of 5 measures tell generated noise from the telemetry's; most of all m1, m2 and m0."),
     ],
 )
-def test_the_noise_in_a_sentence(ratios, said):
+def test_the_sentence_on_the_noise(ratios, said):
     report = made_up(noise=[{"measure": f"m{number}", "ratio": ratio} for number, ratio in enumerate(ratios)])
     assert said in sentence(report, "Noise")
 
@@ -255,16 +255,16 @@ def test_the_noise_in_a_sentence(ratios, said):
         (1, 1, "1 window tried. With so few"),
     ],
 )
-def test_false_alarms_in_a_sentence(num_windows, num_disjoint, said):
+def test_the_sentence_on_false_alarms(num_windows, num_disjoint, said):
     line = sentence(made_up(num_windows=num_windows, num_disjoint=num_disjoint), "False alarms")
     assert said in line and ("With so few" in line) is (num_disjoint < 100)
     assert "limit check 0% (1%), PCA residual 2% (1%), nearest neighbours 10% (1%) and isolation forest 100% (1%)" in line
 
 
-def test_anomalies_in_a_sentence():
+def test_the_sentence_on_anomalies():
     recall = {name: {"spike": 0.0, "level_shift": 0.3, "stuck": 0.1, "ramp": 0.2} for name in DETECTORS}
     recall["PCA residual"] |= {"level_shift": 0.8, "ramp": 0.21}
-    recall["isolation forest"] = dict.fromkeys(("spike", "level_shift", "stuck", "ramp"), 1.0)  # it alarms on everything
+    recall["isolation forest"] = dict.fromkeys(("spike", "level_shift", "stuck", "ramp"), 1.0)  # this detector flags every window
     report = made_up(recall=recall)
     assert report.usable == list(DETECTORS[:3])
     assert report.found == {
@@ -280,19 +280,19 @@ def test_anomalies_in_a_sentence():
     )
 
 
-def test_where_nothing_is_missed_nothing_is_said_of_it():
+def test_the_sentence_on_anomalies_without_missed_ones():
     report = made_up(recall={name: {"spike": 1.0, "stuck": 0.9} for name in DETECTORS})
     said = sentence(report, "Anomalies")
     assert "notices spike (limit check, 100%) and stuck (limit check, 90%)." in said and "misses" not in said and "some of" not in said
 
 
-def test_a_detector_that_alarms_on_everything_notices_nothing():
+def test_detectors_that_flag_everything_are_not_usable():
     report = made_up(false_alarms={arm: dict.fromkeys(DETECTORS, 0.9) for arm in ("generated", "real")})
     assert report.usable == [] and report.found == {}
     assert "no detector trained on this can be used" in sentence(report, "Anomalies")
 
 
-def test_where_it_was_measured_is_told():
+def test_the_report_states_the_evaluation_telemetry():
     assert "volts: windows of 64 samples, period 400 s; measured on 200 windows held out" == made_up().lines()[0]
     seen = made_up(is_held_out=False, num_windows=1, time_unit="samples")
     assert seen.lines()[0] == "volts: windows of 64 samples, period 400 samples; measured on 1 window of the training telemetry"
@@ -307,7 +307,7 @@ def test_where_it_was_measured_is_told():
 def test_levels_of_quantised_values_are_found(step):
     rng = np.random.default_rng(0)
     values = (step * np.round(rng.normal(20, 3, 5_000))).astype(np.float32)
-    values[100:103] += np.float32(step) * np.array([0.25, 0.5, 0.75], np.float32)  # a gap, filled by a straight line
+    values[100:103] += np.float32(step) * np.array([0.25, 0.5, 0.75], np.float32)  # an interpolated gap
     found = levels_of(values)
     assert found["step"] == pytest.approx(step, rel=1e-3) and 15 <= found["count"] <= 25
     said = sentence(made_up(levels=found), "Levels")
@@ -318,12 +318,12 @@ def test_levels_of_quantised_values_are_found(step):
     "values",
     [
         np.random.default_rng(0).standard_normal(5_000),
-        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),  # values of a wave without noise repeat too
-        np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a sensor at its limits
+        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),  # values of a noise-free wave repeat too
+        np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a saturated sensor
         np.arange(20.0),
     ],
     ids=["noise", "wave", "clipped", "short"],
 )
-def test_other_values_have_no_levels(values):
+def test_values_that_are_not_quantised_have_no_levels(values):
     assert levels_of(values.astype(np.float32)) == {}
     assert not [line for line in made_up().verdict if line.startswith("Levels")]

@@ -1,4 +1,4 @@
-"""The figure of a channel's report: its message, its curves, and nothing that lies on anything else, whatever the numbers are."""
+"""The figure of a channel's report: its title, its curves, and no overlapping text for any numbers."""
 
 import dataclasses
 import warnings
@@ -61,7 +61,7 @@ CASES = {
 
 
 def shown(figure):
-    """Visible texts with their boxes in pixels, labels of ticks beyond the limits left out."""
+    """Returns visible texts with their boxes in pixels, without tick labels outside the axis limits."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     out_of_view = []
@@ -72,9 +72,9 @@ def shown(figure):
     return [(text, text.get_window_extent(canvas.get_renderer())) for text in texts]
 
 
-@pytest.mark.filterwarnings("error")  # a letter that the font has not would be one
+@pytest.mark.filterwarnings("error")  # a character that is missing in the font would be a warning
 @pytest.mark.parametrize("case", CASES)
-def test_no_text_leaves_the_sheet_or_lies_on_another(case):
+def test_texts_stay_on_the_page_and_do_not_overlap(case):
     figure = channel_figure(CASES[case])
     boxes = shown(figure)
     width, height = figure.get_size_inches() * figure.dpi
@@ -88,7 +88,7 @@ def test_no_text_leaves_the_sheet_or_lies_on_another(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_no_text_lies_in_another_panel(case):
+def test_texts_do_not_overlap_other_panels(case):
     figure = channel_figure(CASES[case])
     for axes in figure.axes:
         frame = axes.get_window_extent()
@@ -110,12 +110,12 @@ def test_no_text_lies_in_another_panel(case):
         (NAN, "nothing can be said of the enhanced signal"),
     ],
 )
-def test_the_title_is_the_message(nrmse, message):
+def test_the_title_states_the_result(nrmse, message):
     texts = [text for text in channel_figure(made_up(nrmse=nrmse)).texts if text.get_weight() == "bold"]
     assert " ".join(text.get_text() for text in texts).startswith("volts: ") and message in " ".join(text.get_text() for text in texts)
 
 
-def test_curves_and_rates_are_those_of_the_report():
+def test_curves_and_rates_agree_with_the_report():
     report = made_up()
     signal, alarms, made, found = channel_figure(report).axes
     drawn = [line.get_ydata() for line in signal.lines]
@@ -134,14 +134,14 @@ def test_curves_and_rates_are_those_of_the_report():
     ("case", "label"),
     [("usual", "value (V)"), ("no unit", "value"), ("large", "value (V, 1e9)"), ("far from zero", "value (V, +1.2345e6)")],
 )
-def test_axes_have_their_units(case, label):
+def test_axis_labels_contain_units(case, label):
     signal, alarms, made, found = channel_figure(CASES[case]).axes
     assert signal.get_xlabel() == made.get_xlabel() == "sample"
     assert signal.get_ylabel() == label
     assert "(%)" in alarms.get_xlabel() and "(%)" in found.get_xlabel()
 
 
-def test_curves_of_one_panel_differ_without_colour():
+def test_curves_of_a_panel_can_be_distinguished_without_colour():
     signal = channel_figure(made_up()).axes[0]
     looks = [(line.get_linestyle(), line.get_linewidth()) for line in signal.lines]
     assert len(set(looks)) == 3
@@ -149,12 +149,12 @@ def test_curves_of_one_panel_differ_without_colour():
     assert np.diff(grey).min() > 0.1
 
 
-def test_few_windows_are_told_at_the_foot():
+def test_the_footer_states_the_number_of_disjoint_windows():
     for report, words in ((made_up(), "200 windows, of which 5 share no sample"), (CASES["all alike"], "rates on 1 window")):
         assert any(text.get_text().endswith(words) for text in channel_figure(report).texts)
 
 
-def test_drawing_changes_neither_the_report_nor_settings():
+def test_drawing_changes_neither_the_report_nor_the_style_settings():
     report, before = made_up(), dict(matplotlib.rcParams)
     kept = {key: values.copy() for key, values in report.examples.items()}
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Scores of telemetry: the rate asked for on what is alike, flags where something is wrong, none where nothing can be said."""
+"""Scores of telemetry: the given rate on simulated telemetry, flags at anomalies, and no score in short parts."""
 
 import keras
 import numpy as np
@@ -20,7 +20,7 @@ COARSE = SquareWaveSimulator([SquareWave(48, low=-0.5, high=0.5)])
 
 @pytest.fixture(scope="module")
 def known():
-    """Made of known processes: the coarse signal itself plus white noise."""
+    """A simulator of known processes: the coarse signal plus white noise."""
     enhancer = keras.Sequential([keras.Input((WINDOW,)), keras.layers.Dense(WINDOW)])
     enhancer.layers[0].set_weights([np.eye(WINDOW), np.zeros(WINDOW)])
     return EnhancedSimulator(COARSE, enhancer, GaussianNoise(0.1, WINDOW), interval_s=2.0)
@@ -28,7 +28,7 @@ def known():
 
 @pytest.fixture
 def short(monkeypatch):
-    """A short series sets the threshold."""
+    """Uses a short series for the threshold."""
     monkeypatch.setattr(scoring, "_THRESHOLD_WINDOWS", 100)
 
 
@@ -38,9 +38,9 @@ def telemetry(known, num_samples=3_000, seed=99, **fields):
 
 
 @pytest.mark.parametrize("detector", ["PCA residual", "nearest neighbours"])
-def test_what_is_alike_is_flagged_at_the_rate_asked_for(known, short, detector):
-    # scores within two windows depend on each other, so a series of 100 windows has 50 independent places: at a rate of a
-    # tenth, sd = sqrt(0.09 / 50) for the flags and as much again for the threshold, over as many seeds as there are
+def test_simulated_telemetry_is_flagged_at_the_given_rate(known, short, detector):
+    # scores within two windows are correlated, so a series of 100 windows has about 50 independent scores. At a rate of 0.1
+    # the flags have sd = sqrt(0.09 / 50), and the threshold adds the same variance; both are averaged over the seeds
     num_seeds, rate = 12, 0.1
     shares = []
     for seed in range(num_seeds):
@@ -48,35 +48,35 @@ def test_what_is_alike_is_flagged_at_the_rate_asked_for(known, short, detector):
         shares.append(score_channel(known, [telemetry(known, 100 * WINDOW, 1_000 + seed)], options)["flag"].mean())
     sd = np.sqrt(2 * rate * (1 - rate) / 50 / num_seeds)
     assert abs(np.mean(shares) - rate) < 4 * sd
-    assert 4 * sd < rate  # else nothing would be shown
+    assert 4 * sd < rate  # otherwise the test would show nothing
 
 
 @pytest.mark.parametrize("detector", [name for name in DETECTORS if "autoencoder" not in name])
-def test_a_gross_anomaly_is_flagged_at_its_place(known, short, detector):
+def test_a_large_anomaly_is_flagged_at_its_position(known, short, detector):
     series = telemetry(known)
-    series.values[1_500:1_520] += 4.0  # 40 times the noise
+    series.values[1_500:1_520] += 4.0  # 40 standard deviations of the noise
     frame = score_channel(known, [series], ScoreOptions(detector, num_windows=300, seed=1))
     assert frame["flag"].iloc[1_500:1_520].all()
     assert frame["flag"].iloc[: 1_500 - WINDOW].mean() < 0.1 and frame["flag"].iloc[1_520 + WINDOW :].mean() < 0.1
     assert 1_500 - WINDOW < int(np.argmax(frame["score"])) < 1_520 + WINDOW
 
 
-def test_a_sensor_that_is_stuck_is_flagged(known, short):
+def test_a_stuck_sensor_is_flagged(known, short):
     series = telemetry(known)
     series.values[900:1_300] = series.values[900]
     frame = score_channel(known, [series], ScoreOptions("nearest neighbours", num_windows=300))
     assert frame["flag"].iloc[960:1_240].all()
 
 
-def test_flags_begin_where_the_score_is_one(known, short):
+def test_samples_with_a_score_above_one_are_flagged(known, short):
     frame = score_channel(known, [telemetry(known)], ScoreOptions(num_windows=100, false_alarm_rate=0.2))
     np.testing.assert_array_equal(frame["flag"], frame["score"] > 1)
     assert 0 < frame["flag"].mean() < 1 and frame["flag"].dtype == bool
     assert frame.attrs["expected_false_alarm_rate"] == 0.2
 
 
-def test_scores_stay_on_their_side_where_the_threshold_is_not_positive():
-    # a limit check scores below zero inside its limits: a quotient of two such numbers would turn the order round
+def test_scores_keep_their_order_if_the_threshold_is_not_positive():
+    # a limit check scores below zero inside its limits, and dividing by a negative threshold would reverse the order
     scores = np.array([-3.0, -1.0, 0.5])
     for threshold in (2.0, 0.0, -1.5):
         relative = scoring._relative(scores, threshold)
@@ -85,7 +85,7 @@ def test_scores_stay_on_their_side_where_the_threshold_is_not_positive():
 
 
 @pytest.mark.parametrize("has_time", [True, False])
-def test_the_index_is_that_of_the_series(known, short, has_time):
+def test_the_index_equals_that_of_the_series(known, short, has_time):
     fields = {} if has_time else {"start": None}
     series = telemetry(known, 1_000, **fields)
     first, rest = series.part(0, 400), series.part(450, 1_000)
@@ -97,7 +97,7 @@ def test_the_index_is_that_of_the_series(known, short, has_time):
     assert list(frame.columns) == ["value", "score", "flag"] and frame["score"].notna().all()
 
 
-def test_stretches_shorter_than_a_window_have_no_score(known, short):
+def test_parts_shorter_than_a_window_have_no_score(known, short):
     series = telemetry(known, 500)
     parts = [series.part(0, WINDOW - 1), series.part(100, 100 + WINDOW), series.part(200, 500)]
     frame = score_channel(known, parts, ScoreOptions(num_windows=100))
@@ -113,7 +113,7 @@ def test_same_seed_same_scores_and_another_differs(known, short):
     assert (frames[0]["score"] != frames[2]["score"]).any()
 
 
-def test_what_cannot_be_scored_is_refused(known, refused):
+def test_telemetry_that_cannot_be_scored_is_refused(known, refused):
     with refused("every 2 s", "every 1 s"):
         score_channel(known, [telemetry(known, interval_s=1.0)])
     with refused(f"{WINDOW} samples", "Received: 59"):
@@ -132,18 +132,18 @@ def test_what_cannot_be_scored_is_refused(known, refused):
         {"num_windows": 9},
     ],
 )
-def test_options_that_cannot_be_are_refused(refused, options):
+def test_options_out_of_range_are_refused(refused, options):
     with refused():
         ScoreOptions(**options)
 
 
-def test_a_rate_slightly_off_is_the_same_rate(known, short):
-    series = telemetry(known, 300, interval_s=2.0 * (1 + 5e-4))  # what was told from times with jitter
+def test_a_slightly_different_sampling_interval_is_accepted(known, short):
+    series = telemetry(known, 300, interval_s=2.0 * (1 + 5e-4))  # an interval estimated from times with jitter
     assert len(score_channel(known, [series], ScoreOptions(num_windows=50))) == 300
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_written_scores_come_back(known, short, tmp_path, suffix):
+def test_written_scores_can_be_read(known, short, tmp_path, suffix):
     frame = score_channel(known, [telemetry(known, 300)], ScoreOptions(num_windows=50))
     path = tmp_path / f"scores{suffix}"
     write_scores(path, frame)

@@ -1,4 +1,4 @@
-"""The product: a sum of known parts, series without seams, folders that come back to the bit or are refused."""
+"""The enhanced simulator: windows as a sum of known parts, continuous series, training, saving and loading."""
 
 import copy
 import functools
@@ -32,19 +32,19 @@ FILES = ["discriminator.keras", "enhancer.keras", "generator.keras", "manifest.j
 
 
 def identity(window):
-    """An enhancer that answers its input, to the bit."""
+    """An enhancer that returns its input unchanged."""
     model = keras.Sequential([keras.Input((window,)), keras.layers.Dense(window)])
     model.layers[0].set_weights([np.eye(window), np.zeros(window)])
     return model
 
 
 def known(noise_sd=0.0, window=500, **arguments):
-    """Made of known processes: the coarse signal itself plus white noise."""
+    """A simulator of known processes: the coarse signal plus white noise."""
     return EnhancedSimulator(COARSE, identity(window), GaussianNoise(noise_sd, window), **arguments)
 
 
 def small(window=60, seed=0):
-    """Made of real, untrained, narrow networks."""
+    """A simulator with narrow, untrained networks."""
     generator, discriminator = build_generator(window, 4, 8, seed=seed), build_discriminator(window, 8, seed=seed)
     noise = NoiseGAN(generator, discriminator, latent_span=1.5, scale=0.3, seed=seed)
     return EnhancedSimulator(
@@ -54,7 +54,7 @@ def small(window=60, seed=0):
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    """A simulator and the folder it was saved to; nobody writes there."""
+    """A simulator and the read-only folder to which it was saved."""
     simulator, folder = small(), tmp_path_factory.mktemp("saved") / "model"
     simulator.save(folder)
     return simulator, folder
@@ -69,7 +69,7 @@ def copied(saved, tmp_path):
 
 
 def vouch_for(folder):
-    """Makes the manifest agree with the files, as somebody who means harm would."""
+    """Updates the manifest to match the files, as an attacker would."""
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["sha256"] = {name: sha256(folder / name) for name in manifest["sha256"]}
     (folder / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
@@ -82,7 +82,7 @@ def test_coarse_windows_begin_at_random_samples_of_the_coarse_simulator():
     windows = known(interval_s=2.0).generate_coarse(300, seed=0)
     assert windows.shape == (300, 500) and windows.dtype == np.float32
     begins = {COARSE.simulate(begin + 2.0 * np.arange(500)[None]).tobytes(): begin for begin in range(0, 480, 2)}
-    phases = [begins[window.tobytes()] for window in windows]  # every window is one of the 240 there are
+    phases = [begins[window.tobytes()] for window in windows]  # every window is one of the 240 possible ones
     assert len(set(phases)) > 0.6 * 240 and np.mean(phases) == pytest.approx(239, abs=5 * 480 / np.sqrt(12 * 300))
 
 
@@ -91,7 +91,7 @@ def test_enhanced_windows_are_in_the_telemetry_s_unit():
     same = known(window=60, offset=0.25, scale=4.0).enhance(coarse)
     np.testing.assert_allclose(same, coarse, atol=1e-6)
     constant = identity(60)
-    constant.layers[0].set_weights([np.zeros((60, 60)), np.ones(60)])  # always answers one scale above the offset
+    constant.layers[0].set_weights([np.zeros((60, 60)), np.ones(60)])  # always returns offset + scale
     enhanced = EnhancedSimulator(COARSE, constant, GaussianNoise(0, 60), offset=0.25, scale=4.0).enhance(coarse)
     assert (enhanced == 4.25).all() and enhanced.dtype == np.float32
     doubled = identity(60)
@@ -147,7 +147,7 @@ def test_series_of_an_identity_enhancer_is_the_coarse_series(window, num_samples
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("num_samples", [40, 60, 700, 1_234])
 def test_scenario_of_a_series_is_that_of_its_own_length(mode, num_samples):
-    # not of the last window, which may reach beyond the end
+    # the last window may extend beyond the end of the series
     scenario, times = Degraded(mode, severity=0.6, onset=0.35), np.arange(float(num_samples))[None]
     series = known(window=60).generate_series(num_samples, scenario, seed=6)
     expected = COARSE.simulate(times, scenario, np.random.default_rng(6))[0]
@@ -155,14 +155,14 @@ def test_scenario_of_a_series_is_that_of_its_own_length(mode, num_samples):
 
 
 @pytest.mark.parametrize("onset", [0.1, 0.29, 0.5, 0.73])
-def test_onset_of_a_series_lands_where_it_was_asked_for(onset):
+def test_onset_of_a_series_is_at_the_given_share(onset):
     for num_samples in (300, 1_000, 1_111):
         degraded = known(window=60).generate_series(num_samples, Degraded("drift", 1.0, onset))
         changed = np.flatnonzero(degraded != known(window=60).generate_series(num_samples))
         assert changed[0] == int(round(onset * num_samples, 6)) + 1  # the ramp begins at zero
 
 
-def test_noise_of_a_series_has_no_seams():
+def test_noise_of_a_series_has_no_visible_joins():
     window, sd = 100, 0.3
     noise = known(noise_sd=sd, window=window).generate_series(200_000, seed=2) - known(window=window).generate_series(200_000)
     by_position = noise.reshape(-1, window // 2)  # a window begins and another ends at position 0
@@ -171,21 +171,21 @@ def test_noise_of_a_series_has_no_seams():
         assert np.var(part) == pytest.approx(sd**2, rel=5 * np.sqrt(2 / part.size))
     # position for position
     assert np.var(by_position, axis=0) == pytest.approx(np.full(window // 2, sd**2), rel=5 * np.sqrt(2 / len(by_position)))
-    # white noise stays white, across the seams too
+    # white noise stays white, also where windows join
     assert np.mean(noise[1:] * noise[:-1]) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(len(noise)))
     across = by_position[1:, 0] * by_position[:-1, -1]
     assert np.mean(across) / sd**2 == pytest.approx(0, abs=5 / np.sqrt(len(across)))
 
 
 @pytest.mark.parametrize("num_samples", [1_000, 1_400])
-def test_noise_of_a_series_fades_at_neither_end(num_samples):
+def test_noise_of_a_series_has_full_amplitude_at_both_ends(num_samples):
     noise = known(noise_sd=0.3, window=1_000).generate_series(num_samples, seed=2) - known(window=1_000).generate_series(num_samples)
     for part in (noise, noise[:400], noise[-400:]):
         assert np.var(part) == pytest.approx(0.3**2, rel=5 * np.sqrt(2 / part.size))
 
 
-def test_noise_has_draws_of_its_own():
-    # with the seed of the coarse windows its draws would be made of the same random bits
+def test_noise_is_drawn_independently_of_the_coarse_windows():
+    # with the same seed, both would use the same random bits
     class Drawing(GaussianNoise):
         def _draw(self, shape, seed):
             drawn.append(np.random.default_rng(copy.deepcopy(seed)).integers(1_000_000))
@@ -202,7 +202,7 @@ def test_noise_has_draws_of_its_own():
 # folders
 
 
-def test_saved_folder_holds_what_it_says(saved):
+def test_the_content_of_a_saved_folder(saved):
     simulator, folder = saved
     assert sorted(file.name for file in folder.iterdir()) == FILES
     assert [file.name for file in folder.parent.iterdir()] == ["model"]
@@ -210,7 +210,7 @@ def test_saved_folder_holds_what_it_says(saved):
     assert manifest["sha256"] == {name: sha256(folder / name) for name in FILES if name != "manifest.json"}
 
 
-def test_save_load_generate_gives_equal_bits(saved):
+def test_a_loaded_simulator_generates_identical_windows(saved):
     simulator, folder = saved
     loaded = EnhancedSimulator.load(folder)
     assert loaded.coarse.waves == COARSE.waves
@@ -224,7 +224,7 @@ def test_save_load_generate_gives_equal_bits(saved):
     assert (judged[0] == judged[1]).all()
 
 
-def test_a_simulator_that_takes_the_place_of_another_while_that_is_read_is_not_mixed_with_it(copied, monkeypatch, refused):
+def test_a_simulator_replaced_during_loading_is_refused(copied, monkeypatch, refused):
     load, other = keras.saving.load_model, small(seed=1)
 
     def replaced_meanwhile(path, **options):
@@ -248,9 +248,9 @@ def test_saving_again_replaces_the_folder(saved, copied):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_flipped_byte_is_noticed(copied, refused, name):
+def test_a_flipped_byte_is_detected(copied, refused, name):
     content = (copied / name).read_bytes()
-    every = 3 if name == "manifest.json" else len(content) // 4  # nothing but its own form protects the manifest
+    every = 3 if name == "manifest.json" else len(content) // 4  # the manifest itself has no checksum
     for place in range(0, len(content), every):
         damaged = bytearray(content)
         damaged[place] ^= 1
@@ -261,7 +261,7 @@ def test_flipped_byte_is_noticed(copied, refused, name):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_missing_file_is_noticed(copied, refused, name):
+def test_a_missing_file_is_detected(copied, refused, name):
     (copied / name).unlink()
     with refused(str(copied)):
         EnhancedSimulator.load(copied)
@@ -318,7 +318,7 @@ SETTINGS = {
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_settings_that_cannot_be_are_refused_though_their_checksum_is_right(copied, refused, name):
+def test_invalid_settings_with_a_correct_checksum_are_refused(copied, refused, name):
     content, path = SETTINGS[name], copied / "settings.json"
     path.write_text(json.dumps(content(json.loads(path.read_text()))) if callable(content) else content)
     vouch_for(copied)
@@ -327,14 +327,14 @@ def test_settings_that_cannot_be_are_refused_though_their_checksum_is_right(copi
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive"])
-def test_network_that_cannot_be_is_refused_though_its_checksum_is_right(copied, refused, content):
+def test_an_invalid_network_with_a_correct_checksum_is_refused(copied, refused, content):
     (copied / "enhancer.keras").write_bytes(content)
     vouch_for(copied)
     with refused(str(copied)):
         EnhancedSimulator.load(copied)
 
 
-def test_network_that_carries_code_is_refused(copied, refused):
+def test_a_network_that_contains_code_is_refused(copied, refused):
     model = keras.Sequential([keras.Input((60,)), keras.layers.Lambda(lambda values: values + 1)])
     model.save(copied / "enhancer.keras")
     vouch_for(copied)
@@ -342,11 +342,11 @@ def test_network_that_carries_code_is_refused(copied, refused):
         EnhancedSimulator.load(copied)
 
 
-# the fit
+# training
 
 
 def measured(number=1_500):
-    """A noisy sine of 50 samples in a unit far from one."""
+    """A noisy sine with a period of 50 samples and values far from 1."""
     times = 2.0 * np.arange(number)
     values = 1_000 + 50 * np.sin(2 * np.pi * times / 100) + 4 * np.random.default_rng(0).standard_normal(number)
     return Telemetry(values.astype(np.float32), interval_s=2.0)
@@ -354,17 +354,17 @@ def measured(number=1_500):
 
 @pytest.fixture
 def small_batches(monkeypatch):
-    """A step of the noise networks on 200 rows takes long to trace."""
+    """Uses small batches for the noise networks, because a step on 200 rows takes long to trace."""
     monkeypatch.setattr(training, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
 
 
 def fitted(seed=0, **arguments):
-    """In the manner of the paper, with small counts."""
+    """Fits with the settings of the paper and a small budget."""
     counts = {"num_windows": 60, "epochs": 4, "num_iterations": 2, "window": 60, "verbose": 0}
     return EnhancedSimulator.fit(measured(), seed=seed, **{**PAPER, **counts, **arguments})
 
 
-def test_the_recipe_of_the_paper_is_that_of_the_reproduction():
+def test_the_settings_of_the_paper_equal_those_of_the_reproduction():
     chosen = make_settings("full")
     assert (PAPER["num_windows"], PAPER["epochs"]) == (chosen.telemetry.num_windows, chosen.enhancer.epochs) == (1_500, 40)
     assert (PAPER["noise"], PAPER["extraction"], PAPER["decay"]) == ("paper", "moving average", False)
@@ -379,17 +379,17 @@ def test_fit_to_short_telemetry_end_to_end(small_batches):
     simulator = fitted()
     assert (simulator.window, simulator.interval_s) == (60, 2.0)
     assert simulator.coarse.waves[0].period_s == pytest.approx(100, rel=0.005)
-    # the enhancer has learnt the sine: it is nearer to it than the coarse square wave is
+    # after training, the enhanced signal is closer to the sine than the coarse square wave
     windows = simulator.generate_coarse(40, seed=1)
     clean = simulator.enhance(windows)
     amplitude = np.sqrt(2) * np.std(clean)
     assert np.mean(clean) == pytest.approx(1_000, abs=5) and amplitude == pytest.approx(50, rel=0.15)
     phases = np.fft.rfft(windows, axis=1)[:, 1]
     assert np.mean(np.abs(np.diff(clean, axis=1))) < 0.6 * 50 and np.isfinite(phases).all()
-    # the noise, hardly trained, is at the scale of the telemetry's noise: ten standard deviations at most
+    # with little training, generated noise is within ten standard deviations of the telemetry's noise
     noise, _ = extract_noise(measured().values, 25)
     added = simulator.generate(40, seed=1) - clean
-    assert simulator.noise.scale == pytest.approx(noise_unit(noise), rel=0.03)  # of the windows that were drawn
+    assert simulator.noise.scale == pytest.approx(noise_unit(noise), rel=0.03)  # the scale was estimated from the drawn windows only
     assert added.any() and np.abs(added).max() <= simulator.noise.scale * 1.001
 
     again = fitted()
@@ -404,9 +404,9 @@ def test_fit_with_another_seed_and_without_normalisation(small_batches):
         assert (np.asarray(weight) == np.asarray(begun)).all()
 
 
-def test_fit_of_the_convolutional_noise_to_what_the_enhancer_leaves(tmp_path):
+def test_fit_of_the_convolutional_noise_to_the_residual_of_the_enhancer(tmp_path):
     simulator = fitted(noise="convolutional", extraction="enhancer", num_windows=300, epochs=8, decay=True, held_out=0.25)
-    # white noise of 4 and what error the enhancer has: at least 4, and far below the 35 that the sine's own deviation is
+    # the residual is white noise of 4 plus the error of the enhancer: at least 4, and far below the 35 of the sine itself
     assert 3.9 < simulator.noise.scale < 10
     series = simulator.generate_series(1_000, seed=3)
     assert series.shape == (1_000,) and abs(np.mean(series) - 1_000) < 10
@@ -417,8 +417,8 @@ def test_fit_of_the_convolutional_noise_to_what_the_enhancer_leaves(tmp_path):
     assert (loaded.generate(7, seed=4) == simulator.generate(7, seed=4)).all()
 
 
-def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batches):
-    # noise that is constant over 50 samples: a moving average over 5 takes most of it away with the signal
+def test_slow_noise_is_kept_by_the_enhancer_and_removed_by_the_moving_average(small_batches):
+    # noise that is constant over 50 samples: a moving average over 5 samples removes most of it
     steps = np.repeat(np.random.default_rng(1).normal(0, 4, 60), 50)
     clean = 1_000 + 50 * np.sin(2 * np.pi * 2.0 * np.arange(3_000) / 100)
     telemetry = Telemetry((clean + steps).astype(np.float32), interval_s=2.0)
@@ -428,16 +428,16 @@ def test_slow_noise_survives_the_enhancer_and_not_the_moving_average(small_batch
         extraction: EnhancedSimulator.fit(telemetry, seed=0, extraction=extraction, **settings).noise.scale * 0.1
         for extraction in ("moving average", "enhancer")
     }
-    true = np.std(steps[2_250:])  # of the quarter that the noise is taken from
+    true = np.std(steps[2_250:])  # in the quarter from which the noise is extracted
     assert scales["moving average"] < 0.3 * true
-    assert 0.9 * true < scales["enhancer"] < 1.5 * true  # the error of a little trained enhancer comes on top
+    assert 0.9 * true < scales["enhancer"] < 1.5 * true  # includes the error of an enhancer with little training
 
 
-# telemetry that drifts away
+# telemetry that drifts
 
 
 def drifting(number=4_000):
-    """A sine of 40 samples whose level and amplitude grow for ever: at its end both are far outside what the beginning had."""
+    """A sine with a period of 40 samples whose level and amplitude grow, at the end far beyond the range of the beginning."""
     places = np.arange(number)
     clean = 100 + 0.005 * places + (1 + places / 1_000) * np.sin(2 * np.pi * places / 40)
     return Telemetry((clean + 0.02 * np.random.default_rng(0).standard_normal(number)).astype(np.float32))
@@ -445,7 +445,7 @@ def drifting(number=4_000):
 
 @pytest.fixture(scope="module")
 def followers():
-    """Simulators that follow the telemetry and that do not, fitted to its first half."""
+    """Simulators with and without `follow`, fitted to the first half of the telemetry."""
     coarse, counts = SquareWaveSimulator([SquareWave(40, low=99, high=101)]), {"window": 80, "num_windows": 300, "epochs": 6}
     settings = {"num_iterations": 2, "verbose": 0}
     learnt = drifting().part(0, 2_000)
@@ -453,32 +453,32 @@ def followers():
     return {follow: EnhancedSimulator.fit(parts, coarse, 0, **counts, **settings, follow=follow) for follow in (True, False)}
 
 
-def test_following_keeps_the_error_small_where_level_and_amplitude_have_left_their_range(followers):
+def test_follow_keeps_the_error_small_outside_the_range_of_training_levels(followers):
     later, errors = drifting().part(2_500, 4_000), {}
     for follow, simulator in followers.items():
         pairs = cut_pairs([later], simulator.coarse, even_places([later], 80, 50), 80, follow)
         enhanced = simulator.follow(pairs)
         errors[follow] = np.median(np.sqrt(np.mean((enhanced - pairs.target) ** 2, axis=1)) / pairs.target.std(axis=1))
-    assert errors[True] < 0.3 and errors[False] > 3  # units of each window's own deviation
+    assert errors[True] < 0.3 and errors[False] > 3  # in standard deviations of each window
     assert followers[False].levels is None
     levels = followers[True].levels
-    assert levels.shape == (500, 2) and np.corrcoef(levels[:, 1], np.arange(500))[0, 1] > 0.95  # in the order of time: it grows
-    middle = levels[:, 0] + 100 * levels[:, 1]  # of each window
+    assert levels.shape == (500, 2) and np.corrcoef(levels[:, 1], np.arange(500))[0, 1] > 0.95  # in the order of time: the gain grows
+    middle = levels[:, 0] + 100 * levels[:, 1]  # mean level of each window
     assert middle.min() > 99.5 and middle.max() < 100.5 + 0.005 * 2_000 and np.ptp(middle) > 8
 
 
-def test_generated_windows_have_levels_and_amplitudes_that_were_seen(followers):
+def test_generated_windows_use_levels_and_gains_of_the_training(followers):
     simulator = followers[True]
     windows = simulator.generate_coarse(400, seed=1)
     centre, amplitude = (windows.max(axis=1) + windows.min(axis=1)) / 2, np.ptp(windows, axis=1) / 2
     shift, gain = simulator.levels.T
-    known_levels = np.stack([shift + 100 * gain, gain], axis=1)  # the coarse simulator's own are 100 and 1
+    known_levels = np.stack([shift + 100 * gain, gain], axis=1)  # the coarse simulator itself has 100 and 1
     nearest = np.abs(known_levels[None] - np.stack([centre, amplitude], axis=1)[:, None]).max(axis=2).min(axis=1)
     assert nearest.max() < 1e-3
     assert np.ptp(centre) > 8 and len(np.unique(np.round(amplitude, 4))) > 100
 
 
-def test_levels_come_back_from_the_folder(followers, tmp_path):
+def test_levels_are_saved_and_loaded(followers, tmp_path):
     for follow, simulator in followers.items():
         simulator.save(tmp_path / str(follow))
         loaded = EnhancedSimulator.load(tmp_path / str(follow))
@@ -489,20 +489,20 @@ def test_levels_come_back_from_the_folder(followers, tmp_path):
         assert (loaded.generate_series(500, seed=4) == simulator.generate_series(500, seed=4)).all()
 
 
-def test_a_series_with_levels_has_no_seams():
-    # a coarse signal of one value: each window is a constant, and the series goes from one to the next as the fade does
+def test_a_series_with_levels_has_no_visible_joins():
+    # with a constant coarse signal, each window is constant, and the series cross-fades from one to the next
     one = SquareWaveSimulator([SquareWave(1e9, low=0.0, high=1.0)])
     levels = np.random.default_rng(2).normal(0, 1, (7, 2))
     simulator = EnhancedSimulator(one, identity(60), GaussianNoise(0.0, 60), levels=levels)
     series = simulator.generate_series(3_000, seed=5).astype(np.float64)
     constants = levels.sum(axis=1)
-    largest = np.abs(np.diff(constants)).max()  # there and back again: neighbours in time only
+    largest = np.abs(np.diff(constants)).max()  # windows that follow each other have neighbouring levels
     assert np.abs(np.diff(series)).max() <= largest * np.pi / 60 + 1e-6
     assert series.min() >= constants.min() - 1e-6 and series.max() <= constants.max() + 1e-6
-    assert np.ptp(series) > 0.9 * np.ptp(constants)  # in 100 half windows every level has its turn
+    assert np.ptp(series) > 0.9 * np.ptp(constants)  # the series is long enough to use every level
 
 
-def test_a_fitted_series_with_levels_has_no_seams(followers):
+def test_a_fitted_series_with_levels_has_no_visible_joins(followers):
     fitted = followers[True]
     simulator = EnhancedSimulator(fitted.coarse, fitted.enhancer, GaussianNoise(0.0, 80), 1.0, fitted.offset, fitted.scale, fitted.levels)
     series = simulator.generate_series(8_000, seed=3)
@@ -512,7 +512,7 @@ def test_a_fitted_series_with_levels_has_no_seams(followers):
     assert steps[seams].max() < 1.2 * inside.max() and np.ptp(series) > np.ptp(fitted.levels[:, 1])
 
 
-def test_fit_refuses_what_it_does_not_know(refused):
+def test_fit_refuses_unknown_choices(refused):
     with refused("noise='pink'"):
         fitted(noise="pink")
     with refused("extraction='sieve'"):
@@ -520,7 +520,7 @@ def test_fit_refuses_what_it_does_not_know(refused):
 
 
 @pytest.mark.parametrize("number", [-1, 2.5, "3", None])
-def test_a_number_of_windows_that_cannot_be_is_refused(refused, tmp_path, number):
+def test_an_invalid_number_of_windows_is_refused(refused, tmp_path, number):
     simulator = known(window=60)
     words = f"num_windows={number!r}"
     for made in (simulator.generate, simulator.generate_coarse, lambda count: list(simulator.generate_chunks(count))):
@@ -547,7 +547,7 @@ def test_fit_refuses_counts_below_one(refused, count):
             fitted(**{count: number})
 
 
-def test_what_is_no_telemetry_is_refused(refused):
+def test_invalid_telemetry_is_refused(refused):
     values = measured().values
     for made in (lambda: EnhancedSimulator.fit(values), lambda: EnhancedSimulator.fit(values, coarse=COARSE)):
         with refused("Expected a Telemetry", "ndarray"):
@@ -557,7 +557,7 @@ def test_what_is_no_telemetry_is_refused(refused):
 
 
 @pytest.mark.parametrize("is_terminal", [False, True])
-def test_bars_of_the_fit_are_for_terminals(small_batches, capsys, monkeypatch, is_terminal):
+def test_fit_shows_progress_bars_only_on_terminals(small_batches, capsys, monkeypatch, is_terminal):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: is_terminal)
     fitted(verbose="auto", epochs=1, num_iterations=1)
     out, error = capsys.readouterr()
@@ -580,7 +580,7 @@ def test_a_moving_average_of_a_wrong_width_is_refused_before_training(monkeypatc
         EnhancedSimulator.fit(Telemetry(values), window=60, moving_average=width, **PAPER)
 
 
-def test_saving_leaves_a_folder_with_a_foreign_manifest_alone(tmp_path):
+def test_saving_refuses_a_folder_with_a_foreign_manifest(tmp_path):
     (tmp_path / "manifest.json").write_text('{"name": "an extension"}')
     with pytest.raises(InputError, match="something else"):
         small().save(tmp_path)

@@ -49,7 +49,7 @@ def damaged_shard(bench, name, rng):
     shard = sorted(bench.copy(name).glob("shard-*"))[rng.integers(60)]
     flip(shard, rng)
     verified = subprocess.run([sys.executable, "-m", "enhsim_tf", "verify", bench.folder / name], cwd=ROOT, capture_output=True, text=True)
-    found = verified.returncode == 2 and verified.stdout.splitlines() == [f"{shard.name}: its checksum is not the one that was recorded"]
+    found = verified.returncode == 2 and verified.stdout.splitlines() == [f"{shard.name}: its checksum differs from the recorded one"]
     return f"named by verify; {bench.recovered(name)}" if found else "NOT found by verify"
 
 
