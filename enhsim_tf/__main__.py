@@ -1,7 +1,7 @@
 """`python -m enhsim_tf`: telemetry of one's own, from a table to a trained simulator, training data and scores."""
 
 from enhsim_tf.cli.main import main
-from enhsim_tf.common.console import leave
+from enhsim_tf.common.console import exit_process
 
 if __name__ == "__main__":
-    leave(main())
+    exit_process(main())

@@ -17,7 +17,7 @@ def run_fit(options: argparse.Namespace) -> int:
 
     counts = (options.num_windows, options.epochs, options.iterations)
     chosen = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed)
-    from enhsim_tf.common.parallel.engines import workers_of
+    from enhsim_tf.common.parallel.engines import parse_workers
 
     workers = workers_of(options.workers)
     from enhsim_tf.enhanced_simulator.fit_many import fit_channels  # imported here, because pandas is slow to import

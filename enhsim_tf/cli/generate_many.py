@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.parallel.engines import workers_of
+from enhsim_tf.common.parallel.engines import parse_workers
 from enhsim_tf.datasets.generate import generate_fleet
 from enhsim_tf.datasets.labelled_windows import parse_scenario
 from enhsim_tf.datasets.plan import Plan, plan_of

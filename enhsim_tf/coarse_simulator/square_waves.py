@@ -166,7 +166,7 @@ class SquareWaveSimulator:
         return cls([SquareWave(**wave) for wave in config["waves"]])
 
 
-def units_of(coarse: SquareWaveSimulator) -> tuple[float, float]:
+def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
     """`(offset, scale)` that put the coarse simulator's lowest and highest level at -1 and 1."""
     low, high = coarse.levels
     return (low + high) / 2, (high - low) / 2 or 1.0

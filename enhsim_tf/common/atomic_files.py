@@ -27,7 +27,7 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 
 _LEFT = re.compile(r"\.(?P<name>.*?)\.(?P<host>[\w-]+)\.(?P<process>\d+)\.[0-9a-f]{8}(?P<suffix>\.\w+|)")
-_MOST_LETTERS = 160  # of a file name, encoded: with what two temporary names add (40 each) it stays below the 255 of most file systems
+_MAX_CHARACTERS = 160  # of a file name, encoded: with what two temporary names add (40 each) it stays below the 255 of most file systems
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
 _HERE, _RENAME_EXCHANGE = -100, 2  # AT_FDCWD and the flag, see renameat2(2)
 _OLD_S = 24 * 3600  # no process writes nothing for so long
@@ -45,7 +45,7 @@ def _host() -> str:
     return f"{re.sub(r'[^A-Za-z0-9-]', '-', name)[:8]}-{hashlib.sha256(whole.encode(errors='replace')).hexdigest()[:8]}"
 
 
-def encoded(name: str) -> str:
+def encode_name(name: str) -> str:
     """A name, such as a channel's, as that of a file or folder; `urllib.parse.unquote` turns it back.
 
     It is percent-encoded: no name can leave a folder, hide in it, or be one that a system keeps for itself.
@@ -60,9 +60,9 @@ def encoded(name: str) -> str:
     found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # which Windows takes away
     if _KEPT.fullmatch(found):
         found = f"%{ord(found[0]):02X}{found[1:]}"
-    if not 1 <= len(found) <= _MOST_LETTERS:
+    if not 1 <= len(found) <= _MAX_CHARACTERS:
         raise InputError(
-            f"Expected a channel name of 1 to {_MOST_LETTERS} letters (signs and letters beyond ASCII count for three or more). "
+            f"Expected a channel name of 1 to {_MAX_CHARACTERS} letters (signs and letters beyond ASCII count for three or more). "
             f"Received: {name[:60]!r} with {len(found)}. Rename it, or name the other channels."
         )
     return found

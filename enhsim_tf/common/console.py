@@ -129,7 +129,7 @@ def time_left(seconds: float) -> str:
     return f"about {round(seconds / 60)} min left" if seconds < 7_200 else f"about {seconds / 3_600:.1f} h left"
 
 
-def finish(run: Callable[[], int], interrupted: str) -> int:
+def run_command(run: Callable[[], int], interrupted: str) -> int:
     """Runs a command and returns its exit code.
 
     It is 2 with one line for a user's mistake and for what the machine refuses, 130 for an interrupt, and 141, as a shell
@@ -157,7 +157,7 @@ def finish(run: Callable[[], int], interrupted: str) -> int:
         return 130
 
 
-def leave(code: int) -> NoReturn:
+def exit_process(code: int) -> NoReturn:
     """Ends the process of a command with its exit code.
 
     Ray, beside TensorFlow and after an interrupt, now and then crashes a process that Python is taking down, when all is

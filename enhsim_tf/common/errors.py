@@ -3,10 +3,10 @@
 import os
 import re
 
-_MOST_LETTERS, _END = 600, 150  # of a message, and of these at its end, where it says what to do
+_MAX_CHARACTERS, _END = 600, 150  # of a message, and of these at its end, where it says what to do
 _PASSWORD = re.compile(r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)")
 """The name and the password of an address: behind its //, up to the @; or, of one without, before `@host:port`."""
-_TOKEN, _LEAST_TOKEN = "INFLUXDB_V2_TOKEN", 8  # what is shorter is a word that a message may need
+_TOKEN, _MIN_TOKEN_CHARACTERS = "INFLUXDB_V2_TOKEN", 8  # what is shorter is a word that a message may need
 
 
 class InputError(ValueError):
@@ -22,11 +22,11 @@ class InputError(ValueError):
     def __init__(self, message: str = ""):
         line = printable(" ".join(str(message).splitlines()))
         token = os.environ.get(_TOKEN, "")
-        for form in (token, repr(token)[1:-1]) if len(token) >= _LEAST_TOKEN else ():  # as it is, and as a message quotes it
+        for form in (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ():  # as it is, and as a message quotes it
             line = line.replace(form, "***")
         line = _PASSWORD.sub("***@", line)
-        if len(line) > _MOST_LETTERS:
-            line = f"{line[: _MOST_LETTERS - _END - 5]} ... {line[-_END:]}"
+        if len(line) > _MAX_CHARACTERS:
+            line = f"{line[: _MAX_CHARACTERS - _END - 5]} ... {line[-_END:]}"
         super().__init__(line)
 
 

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-MOST_COLUMNS = 10_000  # of a table or an array; each becomes a channel
-_FEW_VALUES = 2_000_000  # that any table may hold, however small its file
-_VALUES_A_BYTE = 100  # of the file, beyond that
-_FEW_BYTES = 2**28  # that any text column may become in memory
-DAMAGES = (  # what damaged headers and archives raise
+MAX_COLUMNS = 10_000  # of a table or an array; each becomes a channel
+_SMALL_TABLE_VALUES = 2_000_000  # that any table may hold, however small its file
+_MAX_VALUES_PER_BYTE = 100  # of the file, beyond that
+_SMALL_TEXT_BYTES = 2**28  # that any text column may become in memory
+READ_ERRORS = (  # what damaged headers and archives raise
     OSError,
     ValueError,
     TypeError,
@@ -42,7 +42,7 @@ DAMAGES = (  # what damaged headers and archives raise
 )
 
 
-def whole_array(path: str | os.PathLike) -> np.ndarray:
+def load_npy(path: str | os.PathLike) -> np.ndarray:
     """The array of a `.npy` file, without pickle; its file has to be as long as its header says.
 
     Raises:
@@ -52,8 +52,8 @@ def whole_array(path: str | os.PathLike) -> np.ndarray:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that a header was written by Python 2
             mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a map beyond the file's end is refused
-    except DAMAGES as error:
-        raise ValueError(reason_of(error)) from None
+    except READ_ERRORS as error:
+        raise ValueError(short_reason(error)) from None
     if not isinstance(mapped, np.ndarray):
         mapped.close()
         raise ValueError("an archive")
@@ -67,12 +67,12 @@ def whole_array(path: str | os.PathLike) -> np.ndarray:
     return array
 
 
-def whole_arrays(path: str | os.PathLike, most_bytes: int) -> dict[str, np.ndarray]:
+def load_npz(path: str | os.PathLike, max_bytes: int) -> dict[str, np.ndarray]:
     """The arrays of a `.npz` file, without pickle.
 
     Args:
         path: The file.
-        most_bytes: What all of them may have together.
+        max_bytes: What all of them may have together.
 
     Raises:
         ValueError: If it cannot be read, or is larger; the message says why.
@@ -81,11 +81,11 @@ def whole_arrays(path: str | os.PathLike, most_bytes: int) -> dict[str, np.ndarr
         with zipfile.ZipFile(path) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             members = archive.infolist()
-            if sum(member.file_size for member in members) > most_bytes:
+            if sum(member.file_size for member in members) > max_bytes:
                 raise ValueError("larger than such a file is")
             return {member.filename.removesuffix(".npy"): _array_of(archive, member) for member in members}
-    except DAMAGES as error:
-        raise ValueError(reason_of(error)) from None
+    except READ_ERRORS as error:
+        raise ValueError(short_reason(error)) from None
 
 
 def _array_of(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
@@ -111,8 +111,8 @@ def check_parquet(path: str | os.PathLike) -> None:
         size, file = Path(path).stat().st_size, pq.ParquetFile(path)
         with file:
             about = file.metadata
-            if about.num_columns > MOST_COLUMNS:
-                raise ValueError(f"more than {MOST_COLUMNS:,} columns")
+            if about.num_columns > MAX_COLUMNS:
+                raise ValueError(f"more than {MAX_COLUMNS:,} columns")
             chunks = [
                 (about.row_group(group).column(column), about.schema.column(column))
                 for group in range(about.num_row_groups)
@@ -120,38 +120,38 @@ def check_parquet(path: str | os.PathLike) -> None:
             ]
             # of a list a row has many values, and one of fixed width may be wide
             values = max(about.num_rows * max(1, about.num_columns), sum(chunk.num_values for chunk, _ in chunks))
-            if values > max(_FEW_VALUES, _VALUES_A_BYTE * size):
+            if values > max(_SMALL_TABLE_VALUES, _MAX_VALUES_PER_BYTE * size):
                 raise ValueError(f"{values:,} values in {size:,} bytes, more than a file of telemetry holds; save it as CSV")
-            most_bytes = max(_FEW_BYTES, _VALUES_A_BYTE * size)
-            if sum(chunk.num_values * (column.length or 0) for chunk, column in chunks) > most_bytes:
-                raise ValueError(f"values of fixed width that become {most_bytes:,} bytes and more; save it as CSV")
-            _check_text(file, most_bytes)
-    except (*DAMAGES, pa.ArrowException) as error:
-        raise ValueError(reason_of(error)) from None
+            max_bytes = max(_SMALL_TEXT_BYTES, _MAX_VALUES_PER_BYTE * size)
+            if sum(chunk.num_values * (column.length or 0) for chunk, column in chunks) > max_bytes:
+                raise ValueError(f"values of fixed width that become {max_bytes:,} bytes and more; save it as CSV")
+            _check_text(file, max_bytes)
+    except (*READ_ERRORS, pa.ArrowException) as error:
+        raise ValueError(short_reason(error)) from None
 
 
-def _check_text(file: Any, most_bytes: int) -> None:
+def _check_text(file: Any, max_bytes: int) -> None:
     """Refuses columns of text that repeat long words until they fill the memory; the others' size is known from the rows."""
     for column in range(file.metadata.num_columns):
         if file.metadata.schema.column(column).physical_type != "BYTE_ARRAY":
             continue
         groups = [file.metadata.row_group(number) for number in range(file.metadata.num_row_groups)]
         longest = max((max(1, group.column(column).total_uncompressed_size) for group in groups), default=1)
-        if longest * file.metadata.num_rows <= most_bytes:
+        if longest * file.metadata.num_rows <= max_bytes:
             continue
         total, name = 0, file.metadata.schema.column(column).path.split(".")[0]
-        for batch in file.iter_batches(max(1, _FEW_BYTES // longest), columns=[name]):
+        for batch in file.iter_batches(max(1, _SMALL_TEXT_BYTES // longest), columns=[name]):
             total += batch.nbytes
-            if total > most_bytes:
-                raise ValueError(f"text that becomes {most_bytes:,} bytes and more; save it as CSV")
+            if total > max_bytes:
+                raise ValueError(f"text that becomes {max_bytes:,} bytes and more; save it as CSV")
 
 
-def read_json(path: str | os.PathLike, most_bytes: int) -> Any:
+def read_json(path: str | os.PathLike, max_bytes: int) -> Any:
     """What a JSON file holds.
 
     Args:
         path: The file.
-        most_bytes: Its largest size.
+        max_bytes: Its largest size.
 
     Raises:
         ValueError: If it is larger, nested too deeply, or no JSON; the message says why.
@@ -161,7 +161,7 @@ def read_json(path: str | os.PathLike, most_bytes: int) -> Any:
         raise ValueError("what is no file")
     with open(path, "rb") as file:
         size = os.fstat(file.fileno()).st_size
-        if size > most_bytes:
+        if size > max_bytes:
             raise ValueError("a file too large")
         content = file.read(size)
     try:
@@ -170,6 +170,6 @@ def read_json(path: str | os.PathLike, most_bytes: int) -> Any:
         raise ValueError("a file nested too deeply") from None
 
 
-def reason_of(error: Exception) -> str:
+def short_reason(error: Exception) -> str:
     """The first line of an error, or what it is called."""
     return (getattr(error, "strerror", None) or str(error)).splitlines()[0] if str(error).splitlines() else type(error).__name__

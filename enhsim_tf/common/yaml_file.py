@@ -127,19 +127,19 @@ def _load(path: Path) -> Any:
     """What a YAML file holds."""
     try:
         with open(path, "rb") as file:
-            raw = file.read(_MOST_BYTES + 1)
+            raw = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"Expected a settings file that can be read. Received: {str(path)!r} ({reason}).") from None
-    if len(raw) > _MOST_BYTES:
-        raise InputError(f"Expected a settings file of at most {_MOST_BYTES:,} bytes. Received: a longer one, {path.name!r}.")
+    if len(raw) > _MAX_BYTES:
+        raise InputError(f"Expected a settings file of at most {_MAX_BYTES:,} bytes. Received: a longer one, {path.name!r}.")
     try:
         text = raw.decode("utf-8-sig")
         depth = 0
         for number, event in enumerate(yaml.parse(text, _Loader)):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             bad = isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) or getattr(event, "tag", None)
-            if bad or depth > _MOST_DEPTH or number > _MOST_EVENTS:
+            if bad or depth > _MAX_DEPTH or number > _MAX_EVENTS:
                 problem = "an alias, anchor or tag" if bad else "more or deeper than settings are"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
         return yaml.load(text, _Loader)

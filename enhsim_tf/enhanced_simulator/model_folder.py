@@ -5,7 +5,7 @@ import urllib.parse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from enhsim_tf.common.atomic_files import encoded
+from enhsim_tf.common.atomic_files import encode_name
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.enhanced_simulator.saving import MANIFEST, is_foreign
 
@@ -20,7 +20,7 @@ def folder_of(models: str | os.PathLike, channel: str) -> Path:
     Raises:
         InputError: If the name is empty or too long for a folder.
     """
-    return Path(models) / encoded(channel)
+    return Path(models) / encode_name(channel)
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:

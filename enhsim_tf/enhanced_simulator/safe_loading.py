@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from enhsim_tf.common.size_limits import DAMAGES
+from enhsim_tf.common.size_limits import READ_ERRORS
 
 _MEMBERS = ["config.json", "metadata.json", "model.weights.h5"]
 _MOST_DESCRIPTION = 10_000_000  # maximum bytes of a network's description; that of a discriminator has about 100,000
@@ -47,7 +47,7 @@ def read_description(path: str | os.PathLike) -> dict[str, Any]:
     try:
         with zipfile.ZipFile(path) as archive:
             return _description_of(archive, Path(path).stat().st_size)
-    except DAMAGES as error:
+    except READ_ERRORS as error:
         raise ValueError(" ".join(str(error).split())[:120] or type(error).__name__) from None
 
 
@@ -72,7 +72,7 @@ def check_network(path: str | os.PathLike) -> None:
                 num_declared += _num_declared(part)
         if num_declared > num_saved or num_unsaved > _MOST_UNSAVED:
             raise ValueError(f"layers of {num_declared + num_unsaved:,} weights in a file of {num_saved:,}")
-    except DAMAGES as error:
+    except READ_ERRORS as error:
         raise ValueError(" ".join(str(error).split())[:120] or type(error).__name__) from None
 
 

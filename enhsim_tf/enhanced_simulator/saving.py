@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import DAMAGES, read_json
+from enhsim_tf.common.size_limits import READ_ERRORS, read_json
 from enhsim_tf.enhanced_simulator.safe_loading import check_network
 
 if TYPE_CHECKING:
@@ -131,6 +131,6 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
         if sha256(folder / MANIFEST) != as_checked:  # another process replaced the simulator, so the networks may be mixed
             raise ValueError("it was replaced while it was read; try again")
         return make(networks, settings)
-    except (*DAMAGES, UserWarning, tf.errors.OpError) as error:
+    except (*READ_ERRORS, UserWarning, tf.errors.OpError) as error:
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import whole_arrays
+from enhsim_tf.common.size_limits import load_npz
 
 _CHUNK = 2_048  # windows scored at a time
 _MOST_REMEMBERED = 10_000  # training windows whose coordinates are kept
@@ -121,7 +121,7 @@ class OutOfRange:
             InputError: If `save` did not write the file.
         """
         try:
-            kept = whole_arrays(path, _MOST_BYTES)
+            kept = load_npz(path, _MOST_BYTES)
             loaded = cls(float(kept["explained"]), float(kept["weight"]))
             for name in _FITTED:
                 setattr(loaded, f"_{name}", kept[name])

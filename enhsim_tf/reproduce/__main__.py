@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from enhsim_tf.common.console import Parser, finish, tell
+from enhsim_tf.common.console import Parser, run_command, tell
 
 EXAMPLES = """\
 examples:
@@ -296,7 +296,7 @@ def make_folders(options: argparse.Namespace) -> Path:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; a user's mistake is one line and exit code 2."""
-    return finish(lambda: run(parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them")
+    return run_command(lambda: run(parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them")
 
 
 if __name__ == "__main__":

@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import encoded, make_folder, replace_file, replace_folder
+from enhsim_tf.common.atomic_files import encode_name, make_folder, replace_file, replace_folder
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import check_parquet, reason_of
+from enhsim_tf.common.size_limits import check_parquet, short_reason
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 
 _DAY_NS = 86_400 * 10**9
@@ -123,7 +123,7 @@ class ParquetStore:
             times = table["time"].cast(pa.int64()).to_numpy()
         except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
             raise InputError(
-                f"Expected Parquet files of this store in {files[0].parent}. Received: {reason_of(error)}. Write the series again."
+                f"Expected Parquet files of this store in {files[0].parent}. Received: {short_reason(error)}. Write the series again."
             ) from None
         if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 1e-3 * interval_s * 1e9:
             raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
@@ -137,4 +137,4 @@ class ParquetStore:
         return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
 
     def _channel(self, name: str) -> Path:
-        return self.folder / encoded(name)
+        return self.folder / encode_name(name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-_MOST_S = 9_223_372_036  # seconds before and after 1970 that nanoseconds in 64 bits reach
+_MAX_S = 9_223_372_036  # seconds before and after 1970 that nanoseconds in 64 bits reach
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -
         start_s, since_s = start.timestamp(), telemetry.offset_s + telemetry.interval_s * samples
     except (ValueError, TypeError, AttributeError, OverflowError):
         raise InputError(f"Expected start as an ISO 8601 time. Received: {telemetry.start!r}. Correct it.") from None
-    if not max(abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < _MOST_S:
+    if not max(abs(start_s), np.abs(since_s).max(initial=0), np.abs(start_s + since_s).max(initial=0)) < _MAX_S:
         raise InputError(
             f"Expected times from 1678 to 2261. Received: start={telemetry.start}, offset_s={telemetry.offset_s}. Correct them."
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import DAMAGES, check_parquet, reason_of, whole_array
+from enhsim_tf.common.size_limits import READ_ERRORS, check_parquet, load_npy, short_reason
 from enhsim_tf.telemetry.series import Telemetry, check_values
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def load_array(path: str | os.PathLike) -> np.ndarray:
     """
     path = Path(path)
     try:
-        array = whole_array(path)
+        array = load_npy(path)
     except ValueError as error:
         raise InputError(
             f"Expected a NumPy array of numbers. Received: {path.name}, which cannot be read ({error}). Save it again."
@@ -100,8 +100,8 @@ def _read_table(path: Path, column: str | None, time: str | None):
             check_parquet(path)
             table = pd.read_parquet(path)
             names = table.columns.tolist()
-    except DAMAGES as error:  # pandas' and Arrow's parser errors are ValueErrors
-        reason = reason_of(error)
+    except READ_ERRORS as error:  # pandas' and Arrow's parser errors are ValueErrors
+        reason = short_reason(error)
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
     twice = [name for name in dict.fromkeys(names) if name != "" and names.count(name) > 1 and (column is None or name in (column, time))]
     if twice:

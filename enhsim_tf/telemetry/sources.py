@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import MOST_COLUMNS
+from enhsim_tf.common.size_limits import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import Finding
-from enhsim_tf.telemetry.cleaning.times import stamps_of
+from enhsim_tf.telemetry.cleaning.times import parse_times
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 from enhsim_tf.telemetry.single_file import load_array
@@ -115,8 +115,8 @@ def _read_array(path: Path, columns: list[str] | None, time: str | None, options
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     array = load_array(path)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
-    if columns is None and array.shape[1] > MOST_COLUMNS:
-        raise InputError(f"Expected at most {MOST_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
+    if columns is None and array.shape[1] > MAX_COLUMNS:
+        raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
     known = [str(number) for number in range(array.shape[1])]
     for column in columns or ():
         if column not in known:
@@ -144,7 +144,7 @@ def _read_table(path: Path, columns: list[str] | None, time: str | None, options
     index = pd.RangeIndex(len(table))
     if found not in (None, NO_TIME):
         what = f"the times {found!r} of {path.name}"
-        stamps, bad, noted = stamps_of(table[found], what, options.on_bad_times == "drop", options.time_unit, options.time_format)
+        stamps, bad, noted = parse_times(table[found], what, options.on_bad_times == "drop", options.time_unit, options.time_format)
         if bad.any():
             rows = tuple(f"row {row}" for row in np.flatnonzero(bad)[:3])
             noted = [*noted, Finding("bad times", int(bad.sum()), f"times that cannot be read, taken as missing: {int(bad.sum()):,}", rows)]

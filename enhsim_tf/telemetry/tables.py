@@ -12,8 +12,8 @@ import pandas as pd
 import pyarrow as pa
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import DAMAGES, MOST_COLUMNS, check_parquet, reason_of
-from enhsim_tf.telemetry.cleaning.numbers import is_missing, is_text, numbers_of
+from enhsim_tf.common.size_limits import MAX_COLUMNS, READ_ERRORS, check_parquet, short_reason
+from enhsim_tf.telemetry.cleaning.numbers import is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import Finding
 
 NO_TIME = "none"  # in place of a time column's name: samples are counted
@@ -41,8 +41,8 @@ def read_table(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
             table, findings = _read_text(path)
     except InputError:
         raise
-    except (*DAMAGES, pd.errors.ParserWarning, pa.ArrowException) as error:
-        reason = reason_of(error)
+    except (*READ_ERRORS, pd.errors.ParserWarning, pa.ArrowException) as error:
+        reason = short_reason(error)
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
     if not isinstance(table.index, pd.RangeIndex) and (any(table.index.names) or _holds_dates(table.index.to_series())):
         table = table.reset_index()  # what it is indexed by is a column like the others
@@ -74,14 +74,14 @@ def _read_text(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
     if any(line.strip() for line in lines[:comments]):
         findings.append(Finding("header lines", comments, f"lines before the header, skipped: {comments:,}"))
     separator = _separator(lines[comments : comments + 3])
-    if lines[comments].count(separator) >= MOST_COLUMNS:
-        raise ValueError(f"more than {MOST_COLUMNS:,} columns")
+    if lines[comments].count(separator) >= MAX_COLUMNS:
+        raise ValueError(f"more than {MAX_COLUMNS:,} columns")
     options = {"sep": separator, "skiprows": comments, "index_col": False, "skip_blank_lines": False, "low_memory": False}
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # lines longer than the header would lose their ends
         names = pd.read_csv(io.StringIO(text), header=None, nrows=1, dtype=str, keep_default_na=False, **options).iloc[0].str.strip()
         table = pd.read_csv(io.StringIO(text), **options)
-    if not numbers_of(names, path.name, drop=True)[1].any():
+    if not parse_numbers(names, path.name, drop=True)[1].any():
         raise InputError(
             f"Expected a header line with the columns' names. Received: {', '.join(names[:4])} in {path.name}. Add a line of names on top."
         )
@@ -130,7 +130,7 @@ def _holds_dates(values: pd.Series) -> bool:
         return False
     cells = values.astype(object)
     given = cells[~is_missing(cells)].iloc[:_LOOK]
-    if not len(given) or not numbers_of(given, "", drop=True)[1].all():  # a number is no date
+    if not len(given) or not parse_numbers(given, "", drop=True)[1].all():  # a number is no date
         return False
     return bool(pd.to_datetime(given.astype(str), format="ISO8601", utc=True, errors="coerce").notna().mean() > 0.5)
 
@@ -142,7 +142,7 @@ def numeric_columns(table: pd.DataFrame) -> tuple[list[str], list[str]]:
         values = table[name]
         if is_text(values):
             cells = values.astype(object)
-            parsed, _, _ = numbers_of(cells[~is_missing(cells)].iloc[:_LOOK], str(name), drop=True)
+            parsed, _, _ = parse_numbers(cells[~is_missing(cells)].iloc[:_LOOK], str(name), drop=True)
             is_number = bool(np.isfinite(parsed).any())
         elif name == "column 0" and np.array_equal(values, np.arange(len(values))):
             is_number = False  # the row numbers that pandas writes without a name

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import whole_array
+from enhsim_tf.common.size_limits import load_npy
 from enhsim_tf.telemetry.series import Telemetry
 
 LABELS = "labeled_anomalies.csv"
@@ -203,7 +203,7 @@ def _load(folder: Path, labels: Labels) -> LabelledChannel:
 def _read(folder: Path, channel: str) -> tuple[Telemetry, np.ndarray]:
     path = folder / f"{channel}.npy"
     try:
-        array = whole_array(path)
+        array = load_npy(path)
     except ValueError as error:
         raise InputError(f"Expected the array {folder.name}/{path.name}. Received: {error} in {folder}. Complete the data set.") from None
     if array.ndim == 1:

@@ -8,7 +8,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
 from enhsim_tf.coarse_simulator.period_search import fit_box
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, units_of
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.enhancer.training_pairs import paired_windows
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import split_by_time
@@ -75,7 +75,7 @@ def test_simulator_is_the_sum_of_its_waves(refused):
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
     assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(TIMES).dtype == np.float32
     assert TWO.levels == (0.5, 2.0) and TWO.shortest_period_s == 120
-    assert units_of(TWO) == (1.25, 0.75)
+    assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):
         SquareWaveSimulator([])
 

@@ -369,7 +369,7 @@ def test_machines_of_nearly_the_same_name_are_told_apart(monkeypatch):
 
 
 def test_the_longest_name_has_room_for_two_temporary_ones(tmp_path):
-    path = tmp_path / files.encoded("a" * 160)
+    path = tmp_path / files.encode_name("a" * 160)
     with (
         files.replace_folder(path) as outer,
         files.replace_folder(outer) as inner,

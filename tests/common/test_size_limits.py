@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from enhsim_tf.common.size_limits import MOST_COLUMNS, check_parquet, read_json, whole_array, whole_arrays
+from enhsim_tf.common.size_limits import MAX_COLUMNS, check_parquet, load_npy, load_npz, read_json
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,10 +32,10 @@ def npy(path, descr, shape, content=b"", version=2):
 )
 def test_an_array_is_read_as_it_was_written(tmp_path, array):
     np.save(tmp_path / "x.npy", array)
-    found = whole_array(tmp_path / "x.npy")
+    found = load_npy(tmp_path / "x.npy")
     assert type(found) is np.ndarray and found.dtype == array.dtype and found.shape == array.shape and (found == array).all()
     np.savez_compressed(tmp_path / "x.npz", first=array, second=array)
-    kept = whole_arrays(tmp_path / "x.npz", 10_000)
+    kept = load_npz(tmp_path / "x.npz", 10_000)
     assert list(kept) == ["first", "second"] and (kept["second"] == array).all() and kept["second"].shape == array.shape
 
 
@@ -55,7 +55,7 @@ def test_an_array_is_read_as_it_was_written(tmp_path, array):
 )
 def test_an_array_that_is_not_what_it_says_is_refused(tmp_path, descr, shape, word):
     with pytest.raises(ValueError, match=word):
-        whole_array(npy(tmp_path / "x.npy", descr, shape, b"\xff" * 480))
+        load_npy(npy(tmp_path / "x.npy", descr, shape, b"\xff" * 480))
 
 
 def zipped(path, compression=zipfile.ZIP_DEFLATED, **members):
@@ -71,14 +71,14 @@ def test_an_archive_of_arrays_that_unpacks_without_end_is_refused(tmp_path):
     path = zipped(tmp_path / "x.npz", value=bomb.getvalue())
     assert path.stat().st_size < 10**6
     with pytest.raises(ValueError, match="larger than"):
-        whole_arrays(path, 10**6)
+        load_npz(path, 10**6)
 
 
 @pytest.mark.parametrize("shape", [(10**12,), (10**6,), (0,), (3,)])
 def test_an_array_in_an_archive_has_to_be_as_long_as_it_says(tmp_path, shape):
     content = npy(tmp_path / "x.npy", "<f8", shape, bytes(32)).read_bytes()
     with pytest.raises(ValueError, match="another size"):
-        whole_arrays(zipped(tmp_path / "x.npz", value=content), 10**6)
+        load_npz(zipped(tmp_path / "x.npz", value=content), 10**6)
 
 
 def repeated(num_rows, word=None):
@@ -112,7 +112,7 @@ def test_a_table_that_would_fill_the_memory_is_refused(tmp_path):
     assert path.stat().st_size < 150_000
     with pytest.raises(ValueError, match="fixed width|text that becomes"):
         check_parquet(path)
-    pq.write_table(pa.table({str(number): [1.0] for number in range(MOST_COLUMNS + 1)}), path)
+    pq.write_table(pa.table({str(number): [1.0] for number in range(MAX_COLUMNS + 1)}), path)
     with pytest.raises(ValueError, match="columns"):
         check_parquet(path)
 

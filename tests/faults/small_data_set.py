@@ -13,7 +13,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
-from enhsim_tf.common.console import finish  # noqa: E402
+from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate as fleet  # noqa: E402
 from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
 from enhsim_tf.datasets.scenario_file import Mix, ScenarioShare  # noqa: E402
@@ -117,7 +117,7 @@ def main():
         fleet.generate_fleet(options.out, plan(options.windows), options.workers)
         return 0
 
-    return finish(run, "interrupted; what was finished is kept")
+    return run_command(run, "interrupted; what was finished is kept")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.cli.arguments import parse
-from enhsim_tf.cli.generate_many import workers_of
+from enhsim_tf.cli.generate_many import parse_workers
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.datasets.labelled_windows import num_samples_of, parse_scenario, start_of
 from enhsim_tf.datasets.scenario_file import read_mix
@@ -199,7 +199,7 @@ TARGETS = {
     "option --start": Target(
         lambda data, folder: start_of(text_of(data)), _lines("2024-01-01", "2024-01-01T12:00:00.5+02:00", "2024-W01-1"), "text", 6
     ),
-    "option --workers": Target(lambda data, folder: workers_of(text_of(data)), _lines("auto", "2", "16"), "text", 4),
+    "option --workers": Target(lambda data, folder: parse_workers(text_of(data)), _lines("auto", "2", "16"), "text", 4),
     "option --timezone": Target(_zone, _lines("Europe/Berlin", "UTC", "+02:00", "America/New_York"), "text", 2),
     "format of times": Target(_time_format, _lines("%d.%m.%y %H:%M:%S", "ISO8601", "mixed", "%Y-%m-%dT%H:%M:%S%z"), "text", 2),
     "options --column and --time": Target(_column_options, _lines("value", "time", "none", "0", "Größe"), "text", 2),

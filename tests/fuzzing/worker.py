@@ -19,7 +19,7 @@ with atheris.instrument_imports(include=["enhsim_tf"], enable_loader_override=Fa
 
 from tests.fuzzing.judge import MOST_MIB, judge, limit_memory, peak_mib  # noqa: E402
 
-_MOST_FAILURES = 5  # that are kept of a target
+_MAX_FAILURES = 5  # that are kept of a target
 
 
 def main(name: str, num_inputs: int, seed: int, record: Path, failures: Path) -> None:
@@ -47,7 +47,7 @@ def main(name: str, num_inputs: int, seed: int, record: Path, failures: Path) ->
         counts[outcome.verdict] += 1
         counts["inputs"] = sum(counts[verdict] for verdict in ("accepted", "refused", "failed"))
         counts["slowest_s"] = max(counts["slowest_s"], round(outcome.seconds, 3))
-        if outcome.verdict == "failed" and counts["failed"] <= _MOST_FAILURES:
+        if outcome.verdict == "failed" and counts["failed"] <= _MAX_FAILURES:
             path = failures / f"{name.replace(' ', '-')}-{counts['failed']}"
             path.write_bytes(data)
             path.with_suffix(".txt").write_text(outcome.why)

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.__main__ import main
-from enhsim_tf.common.atomic_files import encoded
+from enhsim_tf.common.atomic_files import encode_name
 from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of
 from enhsim_tf.reproduce.publish.page import write_page
 from enhsim_tf.telemetry.parquet_store import ParquetStore
@@ -37,7 +37,7 @@ ALLOWED = set(string.ascii_letters + string.digits + "%_-~ ")
 
 
 def check_file_name(name):
-    found = encoded(name)
+    found = encode_name(name)
     assert set(found) <= ALLOWED and 1 <= len(found) <= 160 and urllib.parse.unquote(found) == name
     assert found.casefold() not in KEPT and found == found.strip() and os.path.basename(found) == found
 
@@ -52,7 +52,7 @@ def test_a_name_becomes_one_of_a_file(name, tmp_path):
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_name_that_no_file_can_have_is_refused(name, refused, tmp_path):
-    for use in (encoded, lambda name: folder_of(tmp_path, name), ParquetStore(tmp_path).read):
+    for use in (encode_name, lambda name: folder_of(tmp_path, name), ParquetStore(tmp_path).read):
         with refused("name"):
             use(name)
     with refused("name"):
@@ -64,7 +64,7 @@ def test_a_name_that_no_file_can_have_is_refused(name, refused, tmp_path):
 @given(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=14), st.text(min_size=1, max_size=14))
 def test_any_name_becomes_one_of_a_file_and_no_two_the_same(name, other):
     check_file_name(name)
-    assert name == other or encoded(name) != encoded(other)
+    assert name == other or encode_name(name) != encode_name(other)
 
 
 def files_below(folder):
@@ -146,7 +146,7 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
     tiny = ["--num-windows", "40", "--epochs", "1", "--iterations", "2", "--window", "64", "--workers", "1"]
     assert main(["fit", str(source), "--out", str(out), *tiny]) == 2  # one is too short
     made = files_below(tmp_path) - {source}
-    assert {path.parent.parent for path in made} == {out} and {path.parent.name for path in made} == set(map(encoded, names))
+    assert {path.parent.parent for path in made} == {out} and {path.parent.name for path in made} == set(map(encode_name, names))
     assert set(models_of(out)) == set(names)
     lines = lines_of(capfd)
     assert sum("<script>" in line for line in lines) and sum(line.startswith("error: short") for line in lines) == 1

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
-from enhsim_tf.telemetry.cleaning.report import KINDS, Finding, finding_of
+from enhsim_tf.telemetry.cleaning.report import KINDS, Finding, finding_from_dict
 
 ROOT = Path(__file__).parents[2]
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
@@ -37,7 +37,7 @@ def check_balance(cleaned):
     assert all(finding.count > 0 and len(finding.line().splitlines()) == 1 for finding in report.findings)
     assert all(finding.action == "left out" or "stretches" in finding.kind for finding in report.findings if finding.rows_left_out)
     assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["rows_in"] == report.rows_in
-    assert [finding_of(content) for content in report.to_dict()["findings"]] == list(report.findings)
+    assert [finding_from_dict(content) for content in report.to_dict()["findings"]] == list(report.findings)
     ends = -np.inf
     for part in cleaned.parts:
         assert part.values.dtype == np.float32 and np.isfinite(part.values).all()

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.parallel.local import begin, run_local
+from enhsim_tf.common.parallel.local import run_local, start_worker
 from enhsim_tf.common.parallel.ray import run_ray
 
 ENGINES = {"local": 512, "ray": 10_000}  # and their most workers
@@ -34,11 +34,11 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
         raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
     if workers is not None and not 1 <= workers <= ENGINES[engine]:
         raise InputError(f"Expected from 1 to {ENGINES[engine]:,} workers, or auto. Received: {workers}.")
-    first = functools.partial(begin, pickle.dumps(work), threads)
+    first = functools.partial(start_worker, pickle.dumps(work), threads)
     return {"local": run_local, "ray": run_ray}[engine](first, iter(items), workers)
 
 
-def workers_of(text: str | None) -> int | None:
+def parse_workers(text: str | None) -> int | None:
     """The number of `--workers auto|N`; None is one a CPU.
 
     Raises:

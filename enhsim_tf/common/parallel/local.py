@@ -16,7 +16,7 @@ from typing import Any
 
 from enhsim_tf.common.errors import InputError
 
-_MOST_DEATHS = 5  # in a row, without anything finished between them
+_MAX_FAILURES = 5  # in a row, without anything finished between them
 
 _work: Callable[[Any], Any] | None = None  # of a process of the pool
 
@@ -34,7 +34,7 @@ class ProcessesDiedError(InputError):
         self.items = tuple(items)
 
 
-class Deaths:
+class WorkerFailures:
     """Counts processes that died in a row, each in the place of the one before it."""
 
     def __init__(self):
@@ -43,7 +43,7 @@ class Deaths:
     def add(self, items: Iterable[Any], reason: str = "") -> None:
         """One more, which was at one of these items, for a reason that is known or not."""
         self.count += 1
-        if self.count > _MOST_DEATHS:
+        if self.count > _MAX_FAILURES:
             raise ProcessesDiedError(
                 f"Expected processes that live. Received: {self.count} that died in a row{reason and f' ({reason})'}. "
                 "Is there memory enough? Take fewer --workers; what was finished is kept.",
@@ -55,11 +55,11 @@ class Deaths:
         self.count = 0
 
 
-def run_local(begin: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
+def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
     """`engines.run` in processes of this machine.
 
     Args:
-        begin: What a process does first; returns what is called for each item.
+        initialize: What a process does first; returns what is called for each item.
         items: What it is called with.
         workers: Processes; None: one a CPU.
 
@@ -67,25 +67,25 @@ def run_local(begin: Callable[[], Any], items: Iterator[Any], workers: int | Non
         InputError: That of the work; or if the processes keep dying.
     """
     first = list(itertools.islice(items, workers or num_cpus()))
-    num_processes, again, items, deaths = max(1, len(first)), collections.deque(), itertools.chain(first, items), Deaths()
+    num_processes, retry, items, failures = max(1, len(first)), collections.deque(), itertools.chain(first, items), WorkerFailures()
     del first
     while True:
-        with _pool(begin, num_processes) as pool:
+        with _pool(initialize, num_processes) as pool:
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:
-                    while len(running) < 2 * num_processes and (item := again.popleft() if again else next(items, None)) is not None:
-                        running[_submit(pool, item, again)] = item
+                    while len(running) < 2 * num_processes and (item := retry.popleft() if retry else next(items, None)) is not None:
+                        running[_submit(pool, item, retry)] = item
                     if not running:
                         return
                     for done in concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED).done:
                         result = done.result()
                         del running[done]
-                        deaths.end()
+                        failures.end()
                         yield result
             except BrokenProcessPool:
-                again.extend(running.values())
-        deaths.add(again)
+                retry.extend(running.values())
+        failures.add(retry)
 
 
 def num_cpus() -> int:
@@ -100,7 +100,7 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, again: coll
     try:
         return pool.submit(_call, item)
     except BrokenProcessPool:
-        again.append(item)
+        retry.append(item)
         raise
     finally:
         if masked:
@@ -108,10 +108,10 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, again: coll
 
 
 @contextlib.contextmanager
-def _pool(begin: Callable[[], Any], workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
+def _pool(initialize: Callable[[], Any], workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
     """A pool of spawned processes (a forked TensorFlow hangs) that ends at once when the block ends in an error."""
     others = set(multiprocessing.active_children())
-    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin_in_pool, (begin,))
+    pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _initialize_pool_worker, (initialize,))
     is_done = False
     try:
         yield pool
@@ -122,7 +122,7 @@ def _pool(begin: Callable[[], Any], workers: int) -> Iterator[concurrent.futures
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def begin(work: bytes, threads: int) -> Callable[[Any], Any]:
+def start_worker(work: bytes, threads: int) -> Callable[[Any], Any]:
     """What a process of any engine does first: its threads are set before the work comes out and imports what reads them.
 
     Args:
@@ -138,9 +138,9 @@ def begin(work: bytes, threads: int) -> Callable[[Any], Any]:
     return work
 
 
-def _begin_in_pool(begin: Callable[[], Any]) -> None:
+def _initialize_pool_worker(initialize: Callable[[], Any]) -> None:
     global _work
-    _work = begin()
+    _work = initialize()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.parallel.local import Deaths
+from enhsim_tf.common.parallel.local import WorkerFailures
 
 _ANSWER_S = 10
 _REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
@@ -27,8 +27,8 @@ _ACTOR_CPUS = 0.4  # of a CPU each: after half of a cluster is lost, its actors 
 class _Actor:
     """One process of the cluster."""
 
-    def __init__(self, begin: Callable[[], Any]):
-        self.work = begin()
+    def __init__(self, initialize: Callable[[], Any]):
+        self.work = initialize()
 
     def call(self, item: Any) -> tuple[str, Any]:
         """The result for an item, or why there is none; without an item, that the actor stands."""
@@ -40,11 +40,11 @@ class _Actor:
             return "refused", str(error)
 
 
-def run_ray(begin: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
+def run_ray(initialize: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
     """`engines.run` in actors of Ray.
 
     Args:
-        begin: What a process does first; returns what is called for each item.
+        initialize: What a process does first; returns what is called for each item.
         items: What it is called with.
         workers: Actors; None: one a CPU of the cluster.
 
@@ -58,36 +58,36 @@ def run_ray(begin: Callable[[], Any], items: Iterator[Any], workers: int | None)
     with _cluster() as ray:
         cpus = max(1.0, ray.cluster_resources().get("CPU", 1.0))
         first = list(itertools.islice(items, workers or int(cpus)))
-        again, items = collections.deque(), itertools.chain(first, items)
+        retry, items = collections.deque(), itertools.chain(first, items)
         share = round(min(_ACTOR_CPUS, _ACTOR_CPUS * cpus / max(1, len(first))), 4)
         make = ray.remote(_Actor).options(num_cpus=max(share, 1e-4), scheduling_strategy="SPREAD").remote
         lost = tuple(getattr(ray.exceptions, f"{name}Error") for name in ("RayActor", "ObjectLost", "NodeDied", "OutOfMemory"))
-        waiting: dict[Any, tuple[Any, Any, Deaths]] = {}
+        waiting: dict[Any, tuple[Any, Any, WorkerFailures]] = {}
 
-        def ask(actor: Any, item: Any, deaths: Deaths) -> None:
-            waiting[actor.call.remote(item)] = actor, item, deaths
+        def ask(actor: Any, item: Any, failures: WorkerFailures) -> None:
+            waiting[actor.call.remote(item)] = actor, item, failures
 
-        every = [Deaths() for _ in first]  # of an actor and those in its place: a node that is lost ends many, each of them once
-        for deaths in every:
-            ask(make(begin), None, deaths)  # an actor that finds no room yet holds no item that another could do
+        every = [WorkerFailures() for _ in first]  # of an actor and those in its place: a node that is lost ends many, each of them once
+        for failures in every:
+            ask(make(initialize), None, failures)  # an actor that finds no room yet holds no item that another could do
         while waiting:
             (done,), _ = ray.wait(list(waiting), num_returns=1)
-            actor, item, deaths = waiting.pop(done)
+            actor, item, failures = waiting.pop(done)
             try:
                 kind, result = ray.get(done)
             except lost as error:
-                deaths.add([] if item is None else [item], _last_line(error))
-                again.extend([] if item is None else [item])
-                ask(make(begin), None, deaths)
+                failures.add([] if item is None else [item], _last_line(error))
+                retry.extend([] if item is None else [item])
+                ask(make(initialize), None, failures)
                 continue
             if kind == "refused":
                 raise InputError(result)
             if kind == "done":
-                for deaths_of_one in every:
-                    deaths_of_one.end()
-            following = again.popleft() if again else next(items, None)
+                for failures_of_one in every:
+                    failures_of_one.end()
+            following = retry.popleft() if retry else next(items, None)
             if following is not None:
-                ask(actor, following, deaths)
+                ask(actor, following, failures)
             elif not any(each is not None for _, each, _ in waiting.values()):
                 waiting.clear()  # what is left are actors that never found room
             if kind == "done":

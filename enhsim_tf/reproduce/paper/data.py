@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded, degrade
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, units_of
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.training_pairs import paired_windows
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
@@ -180,7 +180,9 @@ class Data:
         channel = self.channels[0]
         if channel.truth is not None:
             return 0.0, 1.0, 1.0
-        return *units_of(channel.coarse), noise_unit(extract_noise(channel.train.values, self.settings.noise.moving_average)[0])
+        return *level_offset_and_scale(channel.coarse), noise_unit(
+            extract_noise(channel.train.values, self.settings.noise.moving_average)[0]
+        )
 
     def windows(self, part: str, num_windows: int | None, purpose: str = "", synchronised: bool = False) -> dict[str, np.ndarray]:
         """Paired windows of one part of every channel, as many of each.

@@ -11,15 +11,21 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import numbers_of
+from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
-from enhsim_tf.telemetry.cleaning.regular_grid import binned_stretches, find_interval, regular_share, regular_stretches
-from enhsim_tf.telemetry.cleaning.report import Book, Report, finding_of, iso_time
-from enhsim_tf.telemetry.cleaning.resampling import Rows, at_one_rate, parts_of, without_doubles, without_missing
-from enhsim_tf.telemetry.cleaning.times import UNITS_NS, localised, refuse_local_clock, stamps_of
+from enhsim_tf.telemetry.cleaning.regular_grid import find_binned_segments, find_interval, find_regular_segments, regular_step_fraction
+from enhsim_tf.telemetry.cleaning.report import CleaningLog, Report, finding_from_dict, iso_time
+from enhsim_tf.telemetry.cleaning.resampling import (
+    Rows,
+    build_parts,
+    drop_duplicate_timestamps,
+    drop_missing_values,
+    resample_to_common_interval,
+)
+from enhsim_tf.telemetry.cleaning.times import UNITS_NS, localize_times, parse_times, refuse_repeated_local_hour
 from enhsim_tf.telemetry.series import Telemetry
 
-_LEAST_REGULAR = 0.4  # share of steps; times drawn at random reach 0.25
+_MIN_REGULAR_FRACTION = 0.4  # share of steps; times drawn at random reach 0.25
 _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
     "on_bad_values": ("refuse", "drop"),
@@ -83,7 +89,7 @@ class Cleaned:
     """Regular telemetry and how it was come by.
 
     Args:
-        parts: Regular stretches on one clock, in the order of time: one interval, one start, each with its own offset.
+        parts: Regular segments on one clock, in the order of time: one interval, one start, each with its own offset.
         report: What was accepted, repaired and left out.
     """
 
@@ -115,23 +121,23 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     is_series = isinstance(series, pd.Series)
     name = "telemetry" if not is_series or series.name is None else str(series.name)
     about = series.attrs if is_series else {}
-    values, bad, noted = numbers_of(series, name, options.on_bad_values == "drop", options.decimal)
+    values, bad, noted = parse_numbers(series, name, options.on_bad_values == "drop", options.decimal)
     if not len(values):
         raise InputError(f"Expected samples. Received: none from {name}. Give a source that holds a series.")
     has_time = is_series and not isinstance(series.index, pd.RangeIndex)
     if has_time:
-        book, rows = _timed_rows(series.index, values, name, options, about)
+        log, rows = _timed_rows(series.index, values, name, options, about)
     elif options.interval_s is not None:
         raise InputError(f"Expected interval_s with times only. Received: interval_s={options.interval_s} with {name}, which has none.")
     else:
-        book = Book(None, map(finding_of, about.get("findings", ())))
+        log = CleaningLog(None, map(finding_from_dict, about.get("findings", ())))
         numbers = np.arange(len(values))
         begin = series.index.start if is_series and series.index.step == 1 else 0  # a piece of a longer series keeps its clock
         rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers, np.ones(len(values), np.int64))
-    book.findings += noted
+    log.findings += noted
 
-    rows = without_doubles(rows, bad, book, name, options.same_time)
-    rows = without_missing(rows, bad, book, name)
+    rows = drop_duplicate_timestamps(rows, bad, log, name, options.same_time)
+    rows = drop_missing_values(rows, bad, log, name)
     base = int(rows.times[0])
     rows.times = rows.times - base
     if not has_time:
@@ -140,58 +146,58 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         interval = options.interval_s * 1e9
     elif len(rows) > 1:
         interval = find_interval(rows.times)
-        if regular_share(rows.times, interval) < _LEAST_REGULAR:
+        if regular_step_fraction(rows.times, interval) < _MIN_REGULAR_FRACTION:
             raise InputError(
                 f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
                 f"{np.diff(rows.times).max() / 1e9:g} s without a rate that most have, in {name}. Give interval_s to average over."
             )
-        rows = at_one_rate(rows, interval, book, options.other_rates == "resample", options.max_fill)
+        rows = resample_to_common_interval(rows, interval, log, options.other_rates == "resample", options.max_fill)
     else:
         raise InputError(f"Expected at least 2 rows to tell the interval. Received: 1 usable row from {name}. Give interval_s.")
     if options.interval_s is not None:
-        stretches = binned_stretches(rows.times, interval, options.max_fill + 1)
+        segments = find_binned_segments(rows.times, interval, options.max_fill + 1)
     else:
-        stretches = regular_stretches(rows.times, interval, options.max_jitter, options.max_fill + 1)
+        segments = find_regular_segments(rows.times, interval, options.max_jitter, options.max_fill + 1)
     share = "mean" if options.interval_s is not None else options.same_time
-    parts, used = parts_of(rows, stretches, interval, book, name, share, options.max_fill, options.min_part)
-    describe_values(parts, book)
+    parts, used = build_parts(rows, segments, interval, log, name, share, options.max_fill, options.min_part)
+    describe_values(parts, log)
 
     first = parts[0].begin if has_time else -base
     start = iso_time(base + round(first)) if has_time else None
     unit = str(about.get("unit", "1"))
     telemetry = [Telemetry(part.values.astype(np.float32), interval / 1e9, (part.begin - first) / 1e9, start, name, unit) for part in parts]
-    report = Report(name, len(values), used, sum(map(len, telemetry)), len(telemetry), interval / 1e9, tuple(book.findings))
+    report = Report(name, len(values), used, sum(map(len, telemetry)), len(telemetry), interval / 1e9, tuple(log.findings))
     return Cleaned(telemetry, report)
 
 
-def _timed_rows(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[Book, Rows]:
+def _timed_rows(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
     """Rows with a time, in the order of time."""
-    stamps, bad, noted = stamps_of(index, f"the times of {name}", options.on_bad_times == "drop", options.time_unit, options.time_format)
+    stamps, bad, noted = parse_times(index, f"the times of {name}", options.on_bad_times == "drop", options.time_unit, options.time_format)
     had_time = stamps.notna()
     local = stamps.tz is None
     if local and options.timezone:
-        stamps = localised(stamps, options.timezone)
+        stamps = localize_times(stamps, options.timezone)
     changed = had_time & stamps.isna()
     times = stamps.as_unit("ns").asi8 if stamps.tz is None else stamps.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8
-    book = Book(times, [*map(finding_of, about.get("findings", ())), *noted])
+    log = CleaningLog(times, [*map(finding_from_dict, about.get("findings", ())), *noted])
     kept = np.flatnonzero(stamps.notna())
     unreadable, missing = np.flatnonzero(bad), np.flatnonzero(~had_time & ~bad)
-    book.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))
-    book.add("missing times", missing, "rows without a time: {count}", rows_left_out=len(missing))
+    log.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))
+    log.add("missing times", missing, "rows without a time: {count}", rows_left_out=len(missing))
     lost = np.flatnonzero(changed)
-    book.add("clock change", lost, f"rows at times that {options.timezone} has twice or never: {{count}}", rows_left_out=len(lost))
+    log.add("clock change", lost, f"rows at times that {options.timezone} has twice or never: {{count}}", rows_left_out=len(lost))
     if not len(kept):
         raise InputError(f"Expected rows with times. Received: none in {name}. Name another time column.")
     if local:
         zone = options.timezone or "UTC"
-        book.add("time zone", (), f"times without a zone, taken as {zone}: {{count}}", count=len(kept))
+        log.add("time zone", (), f"times without a zone, taken as {zone}: {{count}}", count=len(kept))
         if options.timezone is None:
-            refuse_local_clock(times[kept], kept, book, name)
+            refuse_repeated_local_hour(times[kept], kept, log, name)
     steps = np.diff(times[kept])
     if len(steps) and (steps <= 0).all() and (steps < 0).any():
-        book.add("descending", (), "rows in falling order of time, turned round: {count}", count=len(kept))
+        log.add("descending", (), "rows in falling order of time, turned round: {count}", count=len(kept))
     else:
         early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
-        book.add("unsorted", early, "rows that stood after later ones, sorted: {count}")
+        log.add("unsorted", early, "rows that stood after later ones, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
-    return book, Rows(times[kept], values[kept], kept, np.ones(len(kept), np.int64))
+    return log, Rows(times[kept], values[kept], kept, np.ones(len(kept), np.int64))

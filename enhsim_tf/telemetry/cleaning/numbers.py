@@ -21,7 +21,7 @@ _THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
 _LARGEST = float(np.finfo(np.float32).max)
 
 
-def numbers_of(values: Any, what: str, drop: bool = False, decimal: str | None = None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+def parse_numbers(values: Any, what: str, drop: bool = False, decimal: str | None = None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     """Reads a column of values.
 
     Args:
@@ -43,7 +43,7 @@ def numbers_of(values: Any, what: str, drop: bool = False, decimal: str | None =
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
     findings: list[Finding] = []
     if is_text(values):
-        parsed, bad, findings = _numbers_of_text(values.astype(object), decimal)
+        parsed, bad, findings = _parse_text_numbers(values.astype(object), decimal)
     else:
         with np.errstate(over="ignore"):
             parsed = values.to_numpy(np.float64, na_value=np.nan)
@@ -95,12 +95,12 @@ def is_missing(cells: pd.Series) -> np.ndarray:
     return missing
 
 
-def _numbers_of_text(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     parsed, bad, findings = np.full(len(cells), np.nan), np.zeros(len(cells), bool), []
     left = ~is_missing(cells)
     of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
     for row in np.flatnonzero(left & ~of_text):
-        parsed[row], bad[row] = _number_of_object(cells.iloc[row])
+        parsed[row], bad[row] = _parse_object(cells.iloc[row])
     rows = np.flatnonzero(left & of_text)
     text = cells.iloc[rows].str.strip()
     plain = text.str.fullmatch(f"{_NUMBER}|{_INFINITE}", case=False).to_numpy(bool)
@@ -120,7 +120,7 @@ def _numbers_of_text(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray,
     return parsed, bad, findings
 
 
-def _number_of_object(cell: Any) -> tuple[float, bool]:
+def _parse_object(cell: Any) -> tuple[float, bool]:
     is_number = isinstance(cell, numbers.Real | decimal_module.Decimal) and not isinstance(cell, bool | np.bool_)
     try:
         return (float(cell), False) if is_number else (np.nan, True)

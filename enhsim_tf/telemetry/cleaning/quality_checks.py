@@ -4,43 +4,43 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.telemetry.cleaning.report import Book
+from enhsim_tf.telemetry.cleaning.report import CleaningLog
 from enhsim_tf.telemetry.cleaning.resampling import Part
 
 _NUM_STRETCHES = 10  # of which level and amplitude are compared
-_MOST_LEVELS = 4_096  # a quantised channel has at most
+_MAX_LEVELS = 4_096  # a quantised channel has at most
 _STUCK = 20  # samples of one value
 
 
-def describe_values(parts: Sequence[Part], book: Book) -> None:
+def describe_values(parts: Sequence[Part], log: CleaningLog) -> None:
     """Notes what the values are like.
 
     Args:
         parts: The regular parts of one channel.
-        book: Takes what is found.
+        log: Takes what is found.
     """
     values = np.concatenate([part.values for part in parts])
-    numbers = np.concatenate([part.number for part in parts])
+    numbers = np.concatenate([part.source_row for part in parts])
     if np.ptp(values) == 0:
-        book.add("constant", (), f"the channel is {values[0]:g} throughout", count=len(values))
+        log.add("constant", (), f"the channel is {values[0]:g} throughout", count=len(values))
         return
-    _tell_resolution(values, book)
-    _tell_levels(values, book)
-    _tell_stuck(values, numbers, book)
-    _tell_drift(values, book)
+    _log_resolution(values, log)
+    _log_levels(values, log)
+    _log_stuck(values, numbers, log)
+    _log_drift(values, log)
 
 
-def _tell_resolution(values: np.ndarray, book: Book) -> None:
+def _log_resolution(values: np.ndarray, log: CleaningLog) -> None:
     rounded = values.astype(np.float32).astype(np.float64)
     error, spread = float(np.abs(rounded - values).max()), float(values.std())
     if error > 1e-3 * spread:
         text = f"float32 rounds the values by up to {error:.3g}, where their standard deviation is {spread:.3g}: subtract their level"
-        book.add("resolution", (), text, count=int((rounded != values).sum()), details={"error": error})
+        log.add("resolution", (), text, count=int((rounded != values).sum()), details={"error": error})
 
 
-def _tell_levels(values: np.ndarray, book: Book) -> None:
+def _log_levels(values: np.ndarray, log: CleaningLog) -> None:
     levels = np.unique(values)
-    if not 2 <= len(levels) <= min(_MOST_LEVELS, len(values) // 10):
+    if not 2 <= len(levels) <= min(_MAX_LEVELS, len(values) // 10):
         return
     steps = np.diff(levels)
     step = float(steps.min())
@@ -48,10 +48,10 @@ def _tell_levels(values: np.ndarray, book: Book) -> None:
     even = float(np.abs(multiples - np.round(multiples)).max()) < 0.05
     how = f"in steps of {step:.4g}" if even else f"the closest {step:.4g} apart"
     text = f"quantised values, {{count}} levels {how}: noise below a step cannot be learnt"
-    book.add("quantised", (), text, count=len(levels), details={"step": step, "is_even": even})
+    log.add("quantised", (), text, count=len(levels), details={"step": step, "is_even": even})
 
 
-def _tell_stuck(values: np.ndarray, numbers: np.ndarray, book: Book) -> None:
+def _log_stuck(values: np.ndarray, numbers: np.ndarray, log: CleaningLog) -> None:
     begins = np.flatnonzero(np.diff(values, prepend=values[0] - 1) != 0)
     lengths = np.diff(begins, append=len(values))
     usual = float(np.quantile(lengths, 0.9))
@@ -59,10 +59,10 @@ def _tell_stuck(values: np.ndarray, numbers: np.ndarray, book: Book) -> None:
     if stuck.any():
         longest = int(lengths.max())
         text = f"stretches of one value, the longest for {longest:,} samples: {{count}}"
-        book.add("stuck", numbers[begins[stuck]], text, details={"longest": longest})
+        log.add("stuck", numbers[begins[stuck]], text, details={"longest": longest})
 
 
-def _tell_drift(values: np.ndarray, book: Book) -> None:
+def _log_drift(values: np.ndarray, log: CleaningLog) -> None:
     if len(values) < 10 * _NUM_STRETCHES:
         return
     low, middle, high = np.array([np.quantile(stretch, (0.05, 0.5, 0.95)) for stretch in np.array_split(values, _NUM_STRETCHES)]).T
@@ -74,4 +74,4 @@ def _tell_drift(values: np.ndarray, book: Book) -> None:
             f"level and amplitude change: over {_NUM_STRETCHES} stretches the median goes from {middle.min():.4g} to {middle.max():.4g}, "
             f"the span of 90 % from {spans.min():.4g} to {spans.max():.4g}"
         )
-        book.add("changing level", (), text, count=_NUM_STRETCHES, details={"low": low.tolist(), "high": high.tolist()})
+        log.add("changing level", (), text, count=_NUM_STRETCHES, details={"low": low.tolist(), "high": high.tolist()})

@@ -55,7 +55,7 @@ def _longest_run(marks: np.ndarray) -> tuple[int, int]:
     return int(first), int(last)
 
 
-def regular_share(times: np.ndarray, interval: float) -> float:
+def regular_step_fraction(times: np.ndarray, interval: float) -> float:
     """Share of the steps that are about a whole number of intervals; a quarter or so where times fall at random."""
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
@@ -63,7 +63,7 @@ def regular_share(times: np.ndarray, interval: float) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class OtherRate:
+class OtherRateSegment:
     """A stretch of rows of another rate than the rest, from row `first` to row `last`, both in it.
 
     Args:
@@ -79,25 +79,25 @@ class OtherRate:
     longest: float
 
 
-def other_rates(times: np.ndarray, interval: float) -> list[OtherRate]:
+def find_other_rates(times: np.ndarray, interval: float) -> list[OtherRateSegment]:
     """Stretches whose steps are all shorter, or all longer and alike, than the interval."""
     ratios = np.diff(times) / interval
     if len(ratios) < _RUN:
         return []
     windows = np.lib.stride_tricks.sliding_window_view(ratios, _RUN)
     lowest, highest = windows.min(axis=1), windows.max(axis=1)
-    stretches = []
+    segments = []
     for is_other in (highest < _ALIKE[0], (lowest > _ALIKE[1]) & (highest < 1.3 * lowest)):
         covered = np.convolve(is_other, np.ones(_RUN)) > 0.5
         edges = np.flatnonzero(np.diff(np.concatenate([[0], covered.view(np.int8), [0]])))
         for first, last in edges.reshape(-1, 2).tolist():
             inside = ratios[first:last]
-            stretches.append(OtherRate(first, last, float(np.median(inside)), float(inside.max())))
-    return sorted(stretches, key=lambda stretch: stretch.first)
+            segments.append(OtherRateSegment(first, last, float(np.median(inside)), float(inside.max())))
+    return sorted(segments, key=lambda segment: segment.first)
 
 
 @dataclasses.dataclass(frozen=True)
-class Stretch:
+class Segment:
     """Rows on one regular grid.
 
     Args:
@@ -113,20 +113,20 @@ class Stretch:
     off: np.ndarray
 
 
-def regular_stretches(times: np.ndarray, interval: float, max_jitter: float, max_step: int) -> list[Stretch]:
+def find_regular_segments(times: np.ndarray, interval: float, max_jitter: float, max_step: int) -> list[Segment]:
     """Parts a series into stretches whose rows lie on regular grids of one interval, each with its own beginning.
 
     Args:
         times: Times of the rows.
         interval: The interval in nanoseconds.
         max_jitter: How far a row may lie off its place, in intervals, at most 0.5.
-        max_step: Longest step inside a stretch, in intervals.
+        max_step: Longest step inside a segment, in intervals.
     """
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
     whole = (numbers <= max_step) & (np.abs(ratios - numbers) <= 2 * max_jitter + 1e-9)
     breaks = [0, *(np.flatnonzero(~whole) + 1).tolist(), len(times)]
-    stretches = []
+    segments = []
     for start, stop in zip(breaks[:-1], breaks[1:], strict=True):
         all_places = np.concatenate([[0], np.cumsum(numbers[start : stop - 1])]).astype(np.int64)
         all_off = (times[start:stop] - times[start]) - all_places * interval
@@ -137,9 +137,9 @@ def regular_stretches(times: np.ndarray, interval: float, max_jitter: float, max
             middle = float(np.median(off))
             if np.abs(off - middle).max() > max_jitter * interval:
                 middle = float(off.max() + off.min()) / 2
-            stretches.append(Stretch(slice(start + first, start + end), places, float(times[start + first]) + middle, off - middle))
+            segments.append(Segment(slice(start + first, start + end), places, float(times[start + first]) + middle, off - middle))
             first = end
-    return stretches
+    return segments
 
 
 def _end_of_spread(values: np.ndarray, spread: float) -> int:
@@ -157,19 +157,19 @@ def _end_of_spread(values: np.ndarray, spread: float) -> int:
     return len(values)
 
 
-def binned_stretches(times: np.ndarray, interval: float, max_step: int) -> list[Stretch]:
+def find_binned_segments(times: np.ndarray, interval: float, max_step: int) -> list[Segment]:
     """Parts a series at its long gaps and puts every row on the nearest place of the one grid that begins with the first row.
 
     Args:
         times: Times of the rows.
         interval: The interval in nanoseconds.
-        max_step: Longest step inside a stretch, in intervals.
+        max_step: Longest step inside a segment, in intervals.
     """
     places = np.round((times - times[0]) / interval).astype(np.int64)
     breaks = [0, *(np.flatnonzero(np.diff(places) > max_step) + 1).tolist(), len(times)]
-    stretches = []
+    segments = []
     for start, stop in zip(breaks[:-1], breaks[1:], strict=True):
         begin = float(times[0]) + places[start] * interval
         inside = places[start:stop] - places[start]
-        stretches.append(Stretch(slice(start, stop), inside, begin, times[start:stop] - begin - inside * interval))
-    return stretches
+        segments.append(Segment(slice(start, stop), inside, begin, times[start:stop] - begin - inside * interval))
+    return segments

@@ -1,4 +1,4 @@
-"""The book that cleaning keeps: what was accepted, repaired or left out, how often and where.
+"""The log that cleaning keeps: what was accepted, repaired or left out, how often and where.
 
 Nothing is lost without a line in it: rows in = rows used + rows left out, samples = rows used + samples filled in.
 """
@@ -86,7 +86,7 @@ class Finding:
         return found | {"places": list(self.places), "details": dict(self.details), "action": self.action}
 
 
-def finding_of(content: Mapping[str, Any]) -> Finding:
+def finding_from_dict(content: Mapping[str, Any]) -> Finding:
     """The finding that `Finding.to_dict` wrote."""
     given = {name: value for name, value in content.items() if name != "action"}
     return Finding(**given | {"places": tuple(given.get("places", ()))})
@@ -143,7 +143,7 @@ class Report:
         return counted | sums | {"findings": [finding.to_dict() for finding in self.findings]}
 
 
-class Book:
+class CleaningLog:
     """Findings as they are made, with their places in the source.
 
     Args:

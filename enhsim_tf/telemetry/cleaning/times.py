@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import column, is_missing, is_text, numbers_of, shown
-from enhsim_tf.telemetry.cleaning.report import Book, Finding, iso_time
+from enhsim_tf.telemetry.cleaning.numbers import column, is_missing, is_text, parse_numbers, shown
+from enhsim_tf.telemetry.cleaning.report import CleaningLog, Finding, iso_time
 
 UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _EPOCHS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
@@ -20,7 +20,7 @@ _YEARS_S = (3.1e8, 4.2e9)  # 1979 to 2103: numbers of this size count seconds si
 _LARGEST_NS = 9.2e18  # what int64 nanoseconds since 1970 hold: years 1678 to 2262
 
 
-def stamps_of(
+def parse_times(
     times: Any, what: str, drop: bool = False, unit: str | None = None, form: str | None = None
 ) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
     """Reads a column of times.
@@ -52,27 +52,27 @@ def stamps_of(
         )
     kind = times.dtype
     if pd.api.types.is_datetime64_any_dtype(kind):
-        return _stamps_of_dates(times, what, drop)
+        return _times_from_dates(times, what, drop)
     if pd.api.types.is_timedelta64_dtype(kind):
-        return _stamps_of_numbers(times.dt.total_seconds(), what, drop, "s")
+        return _times_from_numbers(times.dt.total_seconds(), what, drop, "s")
     if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
         raise InputError(f"Expected times as ISO 8601 date-times or seconds. Received: dtype {kind} from {what}. Name another time column.")
     if not is_text(times):
-        return _stamps_of_numbers(times, what, drop, unit)
+        return _times_from_numbers(times, what, drop, unit)
     cells = times.astype(object)
     missing = is_missing(cells)
     given = cells[~missing]
     if given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # a datetime is a date
         aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
         dates = pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")
-        return _stamps_of_dates(pd.Series(dates), what, drop)
-    if form is None and not numbers_of(given.iloc[:1], what, drop=True)[1].any():  # the first cell is a number: all may be
-        values, bad, _ = numbers_of(cells, what, drop=True)
+        return _times_from_dates(pd.Series(dates), what, drop)
+    if form is None and not parse_numbers(given.iloc[:1], what, drop=True)[1].any():  # the first cell is a number: all may be
+        values, bad, _ = parse_numbers(cells, what, drop=True)
         if not bad.any():
             exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # keeps integers of nanoseconds whole
             is_exact = pd.api.types.is_integer_dtype(exact.dtype)
-            return _stamps_of_numbers(exact if is_exact else pd.Series(values), what, drop, unit)
-    return _stamps_of_text(cells, missing, what, drop, form)
+            return _times_from_numbers(exact if is_exact else pd.Series(values), what, drop, unit)
+    return _times_from_text(cells, missing, what, drop, form)
 
 
 def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> None:
@@ -87,7 +87,7 @@ def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> Non
     )
 
 
-def _stamps_of_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+def _times_from_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
     stamps, findings = pd.DatetimeIndex(times), []
     if stamps.tz is not None:
         if str(stamps.tz) != "UTC":
@@ -100,7 +100,7 @@ def _stamps_of_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.Dateti
     return stamps.where(~bad).as_unit("ns"), bad, findings
 
 
-def _stamps_of_numbers(times: pd.Series, what: str, drop: bool, unit: str | None) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+def _times_from_numbers(times: pd.Series, what: str, drop: bool, unit: str | None) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
     values = times.to_numpy(np.float64, na_value=np.nan)
     finite = np.isfinite(values)
     told = unit or _unit_of(values[finite], what)
@@ -145,7 +145,7 @@ def _unit_of(values: np.ndarray, what: str) -> str:
     )
 
 
-def _stamps_of_text(
+def _times_from_text(
     cells: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str | None
 ) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
     findings = []
@@ -163,7 +163,7 @@ def _stamps_of_text(
     bad = (stamps.isna() & ~missing).to_numpy(bool)
     if bad.any() and not drop:
         _refuse_time(cells, bad, what, f"Give time_format (such as {'%d.%m.%y %H:%M:%S'!r}) or name another time column")
-    stamps, too_far, _ = _stamps_of_dates(stamps, what, drop)
+    stamps, too_far, _ = _times_from_dates(stamps, what, drop)
     stamps = stamps + pd.to_timedelta(leap.astype(np.int64), unit="s").as_unit("ns")
     if leap.any():
         rows = tuple(f"row {row}" for row in np.flatnonzero(leap)[:3])
@@ -179,7 +179,7 @@ def _stamps_of_text(
     return stamps, bad | too_far, findings
 
 
-def localised(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
+def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """Times of a local clock, in its zone; NaT where a clock change gives none, or two that the order cannot part."""
     try:
         try:
@@ -190,13 +190,13 @@ def localised(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
         raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
 
 
-def refuse_local_clock(times: np.ndarray, numbers: np.ndarray, book: Book, name: str) -> None:
+def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
     """Refuses times that a local clock, set back by an hour, gives twice: merged by time they would mix two hours into one.
 
     Args:
         times: int64 nanoseconds, in the order of the source.
         numbers: Row of the source of each.
-        book: Knows the places.
+        log: Knows the places.
         name: Channel name, for the message.
 
     Raises:
@@ -207,7 +207,7 @@ def refuse_local_clock(times: np.ndarray, numbers: np.ndarray, book: Book, name:
     back = np.flatnonzero(steps < 0)
     hour = UNITS_NS["h"]
     if len(back) and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
-        place = book.place(numbers[back[0] + 1])
+        place = log.place(numbers[back[0] + 1])
         raise InputError(
             f"Expected times that rise, or their zone. Received: times without a zone, set back by an hour at {place} of {name}, as local clocks "
             "are. Give timezone (such as 'Europe/Berlin', or 'UTC' to take them as they are)."
