@@ -1,4 +1,4 @@
-"""What every package may use: errors, files that appear whole or not at all, limits of size, the console, parallel work.
+"""Utilities for all other packages: errors, atomic file writing, size limits, console output and parallel work.
 
-This package knows nothing of telemetry and imports none of the others.
+This package does not depend on telemetry and imports none of the other packages.
 """

@@ -1,10 +1,10 @@
-"""Files and folders that appear whole or not at all, and their checksums.
+"""Atomic writing of files and folders, and checksums.
 
-Everything the package writes goes to a temporary name beside its destination and is renamed when it is complete:
-a killed process leaves either the old content or the new, never a half. A folder that takes the place of another is
-exchanged with it in one step where the system can do that (Linux, on its usual file systems). Elsewhere it takes two
-renames; of a process that is killed between them the old content stands aside, and the next `replace_folder` or
-`remove_leftovers` puts it back.
+Everything the package writes goes to a temporary path beside its destination and is renamed when it is complete. A killed
+process therefore leaves either the old content or the new content, never a part of it. On Linux, a folder that replaces
+another one is exchanged with it in a single step, if the file system supports this. Elsewhere the exchange takes two renames:
+if the process is killed between them, the old content remains under a temporary name, and the next call of `replace_folder` or
+`remove_leftovers` restores it.
 """
 
 import contextlib
@@ -27,10 +27,10 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 
 _LEFT = re.compile(r"\.(?P<name>.*?)\.(?P<host>[\w-]+)\.(?P<process>\d+)\.[0-9a-f]{8}(?P<suffix>\.\w+|)")
-_MAX_CHARACTERS = 160  # of a file name, encoded: with what two temporary names add (40 each) it stays below the 255 of most file systems
-_KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names that Windows keeps for itself
-_HERE, _RENAME_EXCHANGE = -100, 2  # AT_FDCWD and the flag, see renameat2(2)
-_OLD_S = 24 * 3600  # no process writes nothing for so long
+_MAX_CHARACTERS = 160  # of an encoded name; two temporary names add 40 each, and most file systems allow 255
+_KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names reserved by Windows
+_HERE, _RENAME_EXCHANGE = -100, 2  # AT_FDCWD and RENAME_EXCHANGE, see renameat2(2)
+_OLD_S = 24 * 3600  # every running process writes at least once in this time
 
 
 def _temporary(path: Path, kind: str = "tmp") -> Path:
@@ -39,25 +39,32 @@ def _temporary(path: Path, kind: str = "tmp") -> Path:
 
 @functools.cache
 def _host() -> str:
-    """What says where a process number means something: this machine, and on it this container. 17 letters, without dots."""
+    """Identifies the machine and container in which a process number is valid: at most 17 characters, without dots."""
     name, container = socket.gethostname(), "/proc/self/ns/pid"
     whole = name + (os.readlink(container) if os.path.islink(container) else "")
     return f"{re.sub(r'[^A-Za-z0-9-]', '-', name)[:8]}-{hashlib.sha256(whole.encode(errors='replace')).hexdigest()[:8]}"
 
 
 def encode_name(name: str) -> str:
-    """A name, such as a channel's, as that of a file or folder; `urllib.parse.unquote` turns it back.
+    """Percent-encodes a name, such as a channel's, for use as a file or folder name.
 
-    It is percent-encoded: no name can leave a folder, hide in it, or be one that a system keeps for itself.
+    The result cannot point outside its folder, is not hidden, and is not a name that Windows reserves.
+    `urllib.parse.unquote` restores the original name.
+
+    Args:
+        name: The name.
+
+    Returns:
+        The encoded name.
 
     Raises:
-        InputError: If the name is empty, too long for a file, or no Unicode.
+        InputError: If the name is empty, too long for a file, or not valid Unicode.
     """
     try:
         found = urllib.parse.quote(name, safe=" ").replace(".", "%2E")
     except UnicodeEncodeError:
         raise InputError(f"Expected a channel name of Unicode characters. Received: {name[:60]!r}. Rename it.") from None
-    found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # which Windows takes away
+    found = re.sub("^ +| +$", lambda spaces: "%20" * len(spaces[0]), found)  # Windows strips them
     if _KEPT.fullmatch(found):
         found = f"%{ord(found[0]):02X}{found[1:]}"
     if not 1 <= len(found) <= _MAX_CHARACTERS:
@@ -69,7 +76,17 @@ def encode_name(name: str) -> str:
 
 
 def make_folder(path: str | os.PathLike) -> Path:
-    """Creates `path` with its parents and returns it; `InputError` where it cannot be a writable folder."""
+    """Creates a folder with its parents.
+
+    Args:
+        path: The folder.
+
+    Returns:
+        The folder as a `Path`.
+
+    Raises:
+        InputError: If the folder cannot be created or written to.
+    """
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -83,9 +100,13 @@ def make_folder(path: str | os.PathLike) -> Path:
 
 @contextlib.contextmanager
 def replace_file(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary path; when the block ends well, the file written there takes the name `path`."""
+    """Yields a temporary path. If the block succeeds, the file written there replaces `path`; if it fails, `path` stays unchanged.
+
+    Args:
+        path: The file to write.
+    """
     path = Path(path)
-    temporary = _temporary(path).with_suffix(path.suffix)  # writers that look at the suffix see the right one
+    temporary = _temporary(path).with_suffix(path.suffix)  # some writers choose the format by the suffix
     try:
         yield temporary
         os.replace(temporary, path)
@@ -95,12 +116,12 @@ def replace_file(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None = None) -> Iterator[Path]:
-    """Yields a temporary folder; when the block ends well, it takes the name `path`, replacing what stood there.
+    """Yields a temporary folder. If the block succeeds, that folder replaces `path`; if it fails, `path` stays unchanged.
 
     Args:
-        path: The folder.
-        keep: Asked of what stands there at the end; where it says so, that stays, and the new content is dropped: whoever
-            reads the work of another process does not lose it while reading.
+        path: The folder to write.
+        keep: Called with `path` before it is replaced. If it returns True, the existing folder is kept and the new one is
+            discarded, so that a process that is reading the existing folder does not lose it.
     """
     path = Path(path)
     make_folder(path.parent)
@@ -115,7 +136,7 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
                     return
                 if _exchange(temporary, path):
                     return
-                with contextlib.suppress(FileNotFoundError):  # another process has moved it meanwhile
+                with contextlib.suppress(FileNotFoundError):  # another process has moved it in the meantime
                     os.replace(path, old)
             try:
                 os.replace(temporary, path)
@@ -123,21 +144,21 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
             except OSError:
                 if not os.path.lexists(path):
                     raise
-                _remove(old)  # another process has put its own there meanwhile
+                _remove(old)  # another process has written the folder in the meantime
     finally:
         _remove(temporary)
         if os.path.lexists(old):
             if os.path.lexists(path):
                 _remove(old)
-            else:  # interrupted between the two renames: what is aside is all that there is
+            else:  # interrupted between the two renames: only the old content exists
                 os.replace(old, path)
 
 
 def _exchange(first: Path, second: Path) -> bool:
-    """Lets two files or folders change their names in one step, so that whoever reads one finds it at every moment.
+    """Exchanges two files or folders in one step, so that readers find a complete one at every moment.
 
     Returns:
-        Whether it was done; not every system and file system can.
+        Whether they were exchanged. Not every system and file system supports this.
     """
     if not sys.platform.startswith("linux"):
         return False
@@ -156,14 +177,14 @@ def _remove(path: Path) -> None:
 
 
 def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
-    """Removes what killed processes left in a folder under temporary names, and puts back what they had only moved aside.
+    """Removes the temporary files of killed processes, and restores old content that they had only moved aside.
 
-    A process of this machine that is dead left its own for certain, and one that is alive is at work. A folder that
-    belongs to neither may be of another machine that shares this one, and goes when nothing was written to it for a day.
+    A temporary file of this machine is removed if its process is dead and kept if its process is alive. A temporary folder of
+    another machine, which may share the file system, is removed if nothing was written to it for a day.
 
     Args:
-        folder: Where `replace_folder` and `replace_file` were to make theirs.
-        name: Only those that were to take this name.
+        folder: The folder in which `replace_folder` or `replace_file` was writing.
+        name: Considers only temporary files for this destination name. None: for every name.
     """
     folder = Path(folder)
     for left in folder.glob(".*"):
@@ -184,7 +205,7 @@ def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None
 
 
 def _now(folder: Path) -> float:
-    """The time by the clock that stamps the files of a folder, which may be another machine's; in seconds since 1970."""
+    """The current time of the file system's clock, which may be another machine's, in seconds since 1970."""
     probe = _temporary(folder / "probe.tmp")
     try:
         probe.touch()
@@ -197,19 +218,19 @@ def _now(folder: Path) -> float:
 
 
 def _is_alive(process: int) -> bool:
-    if os.name != "posix":  # elsewhere asking would end it
+    if os.name != "posix":  # on Windows, os.kill with signal 0 would end the process
         return True
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # somebody else's, or no number of a process
+    except (OSError, OverflowError):  # the process belongs to another user, or the number is out of range
         return True
     return True
 
 
 def _last_written(folder: Path) -> float:
-    """When anything in a folder was last written, in seconds since 1970; now, where it is being moved away meanwhile."""
+    """Time of the last change in a folder, in seconds since 1970; the current time if the folder is being moved away."""
     try:
         return max(path.stat().st_mtime for path in (folder, *folder.rglob("*")))
     except OSError:
@@ -217,7 +238,12 @@ def _last_written(folder: Path) -> float:
 
 
 def write_json(path: str | os.PathLike, content: Any) -> None:
-    """Writes `content` as indented JSON, whole or not at all."""
+    """Writes `content` atomically as indented JSON.
+
+    Args:
+        path: The file.
+        content: Anything that JSON can express, without NaN and infinity.
+    """
     with replace_file(path) as temporary:
         temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 

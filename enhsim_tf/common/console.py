@@ -1,4 +1,4 @@
-"""How the commands speak: one line for a user's mistake, nothing of what others write to the terminal."""
+"""Console output of the commands: printed lines, progress, and one-line error messages."""
 
 import argparse
 import math
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose refusals are those of the whole command: one line, exit code 2."""
+    """An argument parser that raises `InputError`, so that a wrong option ends in one line and exit code 2."""
 
     def error(self, message: str) -> NoReturn:
-        """Refuses the command line."""
+        """Raises an `InputError` for a command line that cannot be parsed."""
         missing = message.partition("arguments are required: ")[2]
         if missing:
             raise InputError(f"Expected {missing}. Received: no such argument. See {self.prog} --help.")
@@ -27,25 +27,28 @@ class Parser(argparse.ArgumentParser):
 
 
 def tell(line: str) -> None:
-    """Prints a line, or some, at once, so that whoever waits or reads through a pipe sees it.
+    """Prints one or more lines and flushes, so that they are also visible at once through a pipe.
 
     Args:
-        line: Names of channels and folders in it may hold anything.
+        line: The text. Unprintable characters, for example in channel names, are replaced by question marks.
     """
     text, encoding = "\n".join(printable(each) for each in line.split("\n")), getattr(sys.stdout, "encoding", None) or "utf-8"
-    text = text.encode(encoding, "replace").decode(encoding)  # a narrow terminal shows what it can
-    print(f"{text}\n", end="", flush=True)  # in one piece with its end: other processes may write lines of theirs meanwhile
+    text = text.encode(encoding, "replace").decode(encoding)  # characters that the terminal cannot encode become "?"
+    print(f"{text}\n", end="", flush=True)  # text and line break in one write, since other processes may print at the same time
 
 
 def progress(*arguments: Any, **options: Any) -> "tqdm":
-    """A bar of `tqdm`, which is of this process alone.
+    """Creates a `tqdm` progress bar with a lock that is local to this process.
 
-    Its own lock would be shared between processes by a semaphore; of a process of a pool that is ended in the middle, Python
-    then tells the user that one was leaked.
+    The default lock of `tqdm` holds a semaphore shared between processes. If a pool process is terminated while it has one,
+    Python warns the user about a leaked semaphore.
 
     Args:
-        *arguments: Those of `tqdm`.
-        **options: Those of `tqdm`.
+        *arguments: Positional arguments of `tqdm`.
+        **options: Keyword arguments of `tqdm`.
+
+    Returns:
+        The progress bar.
     """
     from tqdm import tqdm
 
@@ -54,55 +57,64 @@ def progress(*arguments: Any, **options: Any) -> "tqdm":
     return tqdm(*arguments, **options)
 
 
-INTERVAL_S = 15.0  # seconds without a word, after which a run without a terminal says how far it is
+INTERVAL_S = 15.0  # without a terminal, seconds between two progress lines
 
 
 class Progress:
-    """How far long work is, told in lines where no terminal shows bars: one whenever `INTERVAL_S` have passed without any.
+    """Reports the progress of long work as text lines, for output that cannot show progress bars.
+
+    A line is printed when `INTERVAL_S` seconds have passed since the last one.
 
     Args:
-        tell: Called with each line. None: nothing is told.
-        before: What each line begins with: the name of the work.
-        clock: Seconds that only rise.
+        tell: Called with each line. None: no lines are printed.
+        before: Prefix of each line, such as the name of the work.
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(self, tell: Callable[[str], None] | None = None, before: str = "", clock: Callable[[], float] = time.monotonic):
-        self.tell, self.before, self.clock, self.told = tell, before, clock, clock()
+        self.tell, self.before, self.clock, self.last_line_s = tell, before, clock, clock()
 
     def loop(self, unit: str, total: int) -> "Loop":
-        """A loop that begins now.
+        """Starts to report a loop.
 
         Args:
-            unit: What is counted, such as `epoch`.
-            total: How many there will be.
+            unit: What the loop counts, such as `epoch`.
+            total: Number of units in the loop.
+
+        Returns:
+            The `Loop`, to be called with the number of finished units.
         """
         return Loop(self, unit, total)
 
 
 class Loop:
-    """A loop of long work, called with how many of its units are done; the one under way may be done in part.
+    """One loop of long work, called with the number of finished units. The number may be fractional.
 
-    How long the rest takes is judged by all steps but the first, which builds the graph of a network.
+    The remaining time is extrapolated from all steps except the first, because the first step also builds the network's graph.
 
     Args:
-        progress: Whose lines tell of it.
-        unit: What is counted.
-        total: How many there will be.
+        progress: The `Progress` that prints the lines.
+        unit: What the loop counts, such as `epoch`.
+        total: Number of units in the loop.
     """
 
     def __init__(self, progress: Progress, unit: str, total: int):
         self.progress, self.unit, self.total = progress, unit, total
-        self.first: tuple[float, float] | None = None  # when the first step ended, and what was done then
+        self.first: tuple[float, float] | None = None  # time at which the first step ended, and units finished by then
 
     def __call__(self, done: float) -> None:
-        """Tells a line if it is time for one: 6.2 done of 40 are in number 7."""
+        """Prints a line if one is due. The unit in progress is counted from 1: with 6.2 of 40 units finished, it is unit 7.
+
+        Args:
+            done: Number of finished units.
+        """
         if self.progress.tell is None or not 0 < done < self.total:
             return
         now = self.progress.clock()
         self.first = self.first or (now, done)
-        if now - self.progress.told < INTERVAL_S:
+        if now - self.progress.last_line_s < INTERVAL_S:
             return
-        self.progress.told = now
+        self.progress.last_line_s = now
         line = f"{self.progress.before}{self.unit} {math.ceil(done):,} of {self.total:,}, {math.floor(100 * done / self.total)} %"
         began, before = self.first
         if done > before:
@@ -110,11 +122,14 @@ class Loop:
         self.progress.tell(line)
 
     def within(self, before: int, steps: int = 1) -> Callable[[float], None]:
-        """What is called with the steps that are done of one unit, or of some where a unit is a step.
+        """Returns a callback that reports progress inside one unit.
 
         Args:
-            before: Units that were done before.
-            steps: Steps of a unit.
+            before: Number of units finished before this one.
+            steps: Number of steps in a unit. With 1, the callback counts whole units.
+
+        Returns:
+            A function to be called with the number of finished steps.
         """
         return lambda done: self(before + done / steps)
 
@@ -123,21 +138,24 @@ SILENT = Progress()
 
 
 def time_left(seconds: float) -> str:
-    """About how long something will still take, in words."""
+    """Formats a remaining time, such as "about 5 min left"."""
     if seconds < 120:
         return f"about {max(1, round(seconds))} s left"
     return f"about {round(seconds / 60)} min left" if seconds < 7_200 else f"about {seconds / 3_600:.1f} h left"
 
 
 def run_command(run: Callable[[], int], interrupted: str) -> int:
-    """Runs a command and returns its exit code.
+    """Runs a command, prints its error as one line and returns its exit code.
 
-    It is 2 with one line for a user's mistake and for what the machine refuses, 130 for an interrupt, and 141, as a shell
-    has it, where whoever read the output has left.
+    The exit code is 2 for a user's mistake and for errors of files or memory, 130 for an interrupt, and 141 for a closed
+    output pipe. 130 and 141 follow the convention of shells.
 
     Args:
-        run: The command; returns its exit code.
-        interrupted: What to say of an interrupt.
+        run: The command, a function that returns the exit code.
+        interrupted: Message printed after an interrupt.
+
+    Returns:
+        The exit code.
     """
     try:
         return run()
@@ -145,11 +163,11 @@ def run_command(run: Callable[[], int], interrupted: str) -> int:
         print(f"error: {' '.join(str(error).splitlines())}", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it once more at its end
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes stdout again at exit
         return 141
     except (OSError, MemoryError) as error:
-        reason = " ".join(str(error).splitlines())[:300] or "more than there is"
-        line = InputError(f"Expected files and memory as they are needed. Received: {reason}. Make room, or ask for less.")
+        reason = " ".join(str(error).splitlines())[:300] or "too little memory"
+        line = InputError(f"Expected enough memory and files that can be used. Received: {reason}. Free some space, or ask for less.")
         print(f"error: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -160,8 +178,8 @@ def run_command(run: Callable[[], int], interrupted: str) -> int:
 def exit_process(code: int) -> NoReturn:
     """Ends the process of a command with its exit code.
 
-    Ray, beside TensorFlow and after an interrupt, now and then crashes a process that Python is taking down, when all is
-    said and done. Where Ray was loaded the process therefore ends at once.
+    If both Ray and TensorFlow are loaded, the interpreter sometimes crashes during shutdown after an interrupt. With Ray
+    loaded, the process therefore exits at once and skips the interpreter's shutdown.
 
     Args:
         code: The exit code.

@@ -1,28 +1,28 @@
-"""The one error that stands for a user's mistake; the commands turn it into one line and exit code 2."""
+"""The exception for a user's mistake. The commands print it as one line and exit with code 2."""
 
 import os
 import re
 
-_MAX_CHARACTERS, _END = 600, 150  # of a message, and of these at its end, where it says what to do
+_MAX_CHARACTERS, _END = 600, 150  # a longer message loses its middle; its last 150 characters, which say what to do, stay
 _PASSWORD = re.compile(r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)")
-"""The name and the password of an address: behind its //, up to the @; or, of one without, before `@host:port`."""
-_TOKEN, _MIN_TOKEN_CHARACTERS = "INFLUXDB_V2_TOKEN", 8  # what is shorter is a word that a message may need
+"""Matches `user:password@` in a URL, either after `//` or, in an address without a scheme, before `host:port`."""
+_TOKEN, _MIN_TOKEN_CHARACTERS = "INFLUXDB_V2_TOKEN", 8  # a shorter token may be an ordinary word of a message, so it is not masked
 
 
 class InputError(ValueError):
-    """Input that cannot be used. The message says what was expected, what was received and what to do.
+    """Raised when input cannot be used. The message says what was expected, what was received and what to do.
 
-    It is one line of printable characters, however long or hostile what it quotes of the input, and holds neither the
-    password of an address nor the token of the database.
+    The message is always one line of printable characters and at most 600 characters long, even where it quotes hostile
+    input. Passwords in URLs and the InfluxDB token are masked with `***`.
 
     Args:
-        message: What is wrong.
+        message: Description of the problem.
     """
 
     def __init__(self, message: str = ""):
         line = printable(" ".join(str(message).splitlines()))
         token = os.environ.get(_TOKEN, "")
-        for form in (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ():  # as it is, and as a message quotes it
+        for form in (token, repr(token)[1:-1]) if len(token) >= _MIN_TOKEN_CHARACTERS else ():  # plain, and escaped by repr()
             line = line.replace(form, "***")
         line = _PASSWORD.sub("***@", line)
         if len(line) > _MAX_CHARACTERS:
@@ -31,5 +31,5 @@ class InputError(ValueError):
 
 
 def printable(text: str) -> str:
-    """Text for one line of a terminal: what cannot be printed, such as a line's end, becomes a question mark."""
+    """Replaces every character that cannot be printed, such as a line break, by a question mark."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -1,7 +1,7 @@
-"""The sheet that every figure is drawn on: its heading, its panels, its colours, and labels that stand beside their curves.
+"""The common style of all figures: heading, panels, colours, and labels beside the curves.
 
-The colours survive a grey printer and colour-blind eyes: they differ in lightness, and where two of them meet in one
-panel also in line style, width or label.
+The colours remain distinguishable in greyscale and for colour-blind readers because they differ in lightness. Curves that share
+a panel also differ in line style, width or label.
 """
 
 import textwrap
@@ -15,25 +15,25 @@ from matplotlib.axes import Axes
 
 STYLE = ("default", Path(__file__).with_name("style.mplstyle"))  # for `matplotlib.style.context`
 REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
-QUIET, LINE = "#595959", "#8c8c8c"  # small print; outlines
-IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker, for words in the colour of a curve
+QUIET, LINE = "#595959", "#8c8c8c"  # secondary text; outlines
+IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker colours for text that names a curve
 BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
-SINGLE, DOUBLE = 3.5, 7.2  # widths of a journal's columns, inches
-FOOT = 0.26  # inches left free at the bottom of each sheet, for the caption line
-EDGE = 0.10  # inches from the sheet's edges to its text
+SINGLE, DOUBLE = 3.5, 7.2  # widths of one and two journal columns, in inches
+FOOT = 0.26  # free space for the caption line at the bottom of each figure, in inches
+EDGE = 0.10  # distance from the edges of the figure to its text, in inches
 
 
 def new_sheet(width: float, height: float, title: str, subtitle: str = "") -> tuple[matplotlib.figure.Figure, float]:
-    """An empty figure with its message on top.
+    """Creates an empty figure with a title and a subtitle.
 
     Args:
-        width: Inches.
-        height: Inches.
-        title: The message, wrapped to the width.
-        subtitle: What qualifies it, wrapped to the width.
+        width: Width in inches.
+        height: Height in inches.
+        title: The main message, wrapped to the width.
+        subtitle: A qualification of the message, wrapped to the width.
 
     Returns:
-        The figure, and how many inches the heading takes from its top.
+        The figure, and the height of the heading in inches.
     """
     figure = matplotlib.figure.Figure(figsize=(width, height))
     down = 0.10
@@ -55,17 +55,17 @@ def panels(
     height_ratios: Sequence[float] | None = None,
     **shared: bool,
 ) -> np.ndarray:
-    """Axes in a grid below the heading.
+    """Adds a grid of axes below the heading.
 
     Args:
-        figure: The sheet.
-        down: Inches from the sheet's top to the grid.
+        figure: The figure.
+        down: Distance from the top of the figure to the grid, in inches.
         rows: Number of rows.
         columns: Number of columns.
-        right: Inches from the grid to the sheet's right edge.
-        gap: Inches between rows and between columns.
-        height_ratios: Heights of the rows, relative to each other.
-        **shared: `sharex` and `sharey`, as Matplotlib has them.
+        right: Distance from the grid to the right edge of the figure, in inches.
+        gap: Distance between rows and between columns, in inches.
+        height_ratios: Relative heights of the rows.
+        **shared: `sharex` and `sharey` of `Figure.subplots`.
 
     Returns:
         Array of axes of shape `(rows, columns)`.
@@ -85,7 +85,7 @@ def panels(
 
 
 def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
-    """The time and the value axis of a grid, each with its unit, named once."""
+    """Labels the time axis and the value axis of a grid once, with their units."""
     figure, (width, height) = axes[0, 0].figure, axes[0, 0].figure.get_size_inches()
     last, first = axes[-1, -1].get_position(), axes[0, 0].get_position()
     figure.text((first.x0 + last.x1) / 2, (FOOT + 0.04) / height, f"time ({data['time_unit']})", ha="center")
@@ -93,27 +93,32 @@ def name_axes(axes: np.ndarray, data: Mapping[str, Any]) -> None:
 
 
 def beside(axes: Axes, height: float, text: str, color: str) -> None:
-    """Puts a label right of axes.
+    """Puts a label to the right of the axes.
 
     Args:
         axes: The axes.
-        height: Where, from 0 at their foot to 1.
+        height: Vertical position, from 0 at the bottom of the axes to 1 at the top.
         text: The label.
-        color: Of the curve it names; the label may be darker.
+        color: Colour of the curve that is labelled. The label may be darker.
     """
     style = {"color": IN_PRINT.get(color, color), "va": "center", "linespacing": 1.05, "annotation_clip": False}
     axes.annotate(text, (1, height), (5, 0), "axes fraction", "offset points", **style)
 
 
 def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
-    """Labels right of the ends of curves, moved apart where they would touch; values of a curve, or one height, and colour."""
+    """Labels the right ends of curves, moving labels apart where they would overlap.
+
+    Args:
+        axes: The axes.
+        curves: For each label, the values of the curve (or its height at the right end) and its colour.
+    """
     low, high = axes.get_ylim()
     inches = axes.get_position().height * axes.figure.get_size_inches()[1]
     ends = sorted((float(np.ravel(values)[-1]), name, color) for name, (values, color) in curves.items())
     at = np.array([(value - low) / (high - low) for value, _, _ in ends])
-    room = np.array([0.13 * (1 + name.count("\n")) / inches for _, name, _ in ends])
-    for _ in range(200):  # neighbours push each other apart until nobody touches
-        overlap = np.maximum((room[1:] + room[:-1]) / 2 - np.diff(at), 0)
+    needed = np.array([0.13 * (1 + name.count("\n")) / inches for _, name, _ in ends])
+    for _ in range(200):  # move overlapping neighbours apart until none overlap
+        overlap = np.maximum((needed[1:] + needed[:-1]) / 2 - np.diff(at), 0)
         at[1:] += overlap / 2
         at[:-1] -= overlap / 2
     for height, (_, name, color) in zip(at, ends, strict=True):
@@ -121,7 +126,12 @@ def label_ends(axes: Axes, curves: Mapping[str, tuple[Any, str]]) -> None:
 
 
 def title_words(axes: Axes, words: Sequence[tuple[str, str]]) -> None:
-    """A title whose words have the colours of the curves they name."""
+    """Writes a title in which each word has the colour of the curve that it names.
+
+    Args:
+        axes: The axes.
+        words: Pairs of word and colour.
+    """
     width, place = axes.get_position().width * axes.figure.get_size_inches()[0], 0.0
     for word, color in words:
         style = {"color": IN_PRINT.get(color, color), "weight": "bold", "annotation_clip": False}

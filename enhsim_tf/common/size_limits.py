@@ -1,7 +1,8 @@
-"""What a file says of its own size, compared with the file before memory is taken for it; nothing in a file is executed.
+"""Reads files safely: rejects files whose headers declare more data than they contain, and never executes their content.
 
-A header of a hundred bytes can declare a thousand gigabytes. Arrays have to be as long as they say; tables and archives
-may be compressed, but not beyond what telemetry ever is. A file that cannot be read at all is a `ValueError` in one line.
+A header of a hundred bytes can declare a thousand gigabytes, so sizes are checked before memory is allocated. An array file
+must have exactly the size that its header declares. Tables and archives may be compressed, but only up to a limit that real
+telemetry stays below. A file that cannot be read raises a `ValueError` with a message of one line.
 """
 
 import json
@@ -17,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-MAX_COLUMNS = 10_000  # of a table or an array; each becomes a channel
-_SMALL_TABLE_VALUES = 2_000_000  # that any table may hold, however small its file
-_MAX_VALUES_PER_BYTE = 100  # of the file, beyond that
-_SMALL_TEXT_BYTES = 2**28  # that any text column may become in memory
-READ_ERRORS = (  # what damaged headers and archives raise
+MAX_COLUMNS = 10_000  # of a table or an array; each column becomes a channel
+_SMALL_TABLE_VALUES = 2_000_000  # a table with fewer values is accepted, however small its file is
+_MAX_VALUES_PER_BYTE = 100  # a larger table may hold this many values for each byte of its file
+_SMALL_TEXT_BYTES = 2**28  # a text column that needs less memory is accepted, however small its file is
+READ_ERRORS = (  # exceptions raised for damaged headers and archives
     OSError,
     ValueError,
     TypeError,
@@ -43,46 +44,55 @@ READ_ERRORS = (  # what damaged headers and archives raise
 
 
 def load_npy(path: str | os.PathLike) -> np.ndarray:
-    """The array of a `.npy` file, without pickle; its file has to be as long as its header says.
+    """Loads a `.npy` file without pickle. The file must be as long as its header declares.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The array.
 
     Raises:
-        ValueError: If it cannot be read; the message says why.
+        ValueError: If the file cannot be read. The message says why.
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # that a header was written by Python 2
-            mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a map beyond the file's end is refused
+            warnings.simplefilter("ignore", UserWarning)  # NumPy warns of headers written by Python 2
+            mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # memory-mapping fails if the file is too short
     except READ_ERRORS as error:
         raise ValueError(short_reason(error)) from None
     if not isinstance(mapped, np.ndarray):
         mapped.close()
         raise ValueError("an archive")
     if mapped.dtype.itemsize == 0:
-        raise ValueError(f"dtype {mapped.dtype}, which holds nothing")
+        raise ValueError(f"dtype {mapped.dtype}, which has no size")
     array = np.array(mapped)
     if array.dtype.kind == "U":
         letters = np.ravel(array).view(np.dtype("u4").newbyteorder(array.dtype.byteorder))
         if (letters > 0x10FFFF).any() or ((letters >= 0xD800) & (letters < 0xE000)).any():
-            raise ValueError("text that is no Unicode")
+            raise ValueError("text that is not valid Unicode")
     return array
 
 
 def load_npz(path: str | os.PathLike, max_bytes: int) -> dict[str, np.ndarray]:
-    """The arrays of a `.npz` file, without pickle.
+    """Loads the arrays of a `.npz` file without pickle.
 
     Args:
         path: The file.
-        max_bytes: What all of them may have together.
+        max_bytes: Largest total size of the uncompressed arrays.
+
+    Returns:
+        The arrays by name.
 
     Raises:
-        ValueError: If it cannot be read, or is larger; the message says why.
+        ValueError: If the file cannot be read or is too large. The message says why.
     """
     try:
         with zipfile.ZipFile(path) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             members = archive.infolist()
             if sum(member.file_size for member in members) > max_bytes:
-                raise ValueError("larger than such a file is")
+                raise ValueError(f"more than {max_bytes:,} bytes of arrays")
             return {member.filename.removesuffix(".npy"): _array_of(archive, member) for member in members}
     except READ_ERRORS as error:
         raise ValueError(short_reason(error)) from None
@@ -99,10 +109,13 @@ def _array_of(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
 
 
 def check_parquet(path: str | os.PathLike) -> None:
-    """Refuses a Parquet file that would become far larger in memory than any telemetry of its size.
+    """Checks that a Parquet file does not become far larger in memory than real telemetry in a file of its size.
+
+    Args:
+        path: The file.
 
     Raises:
-        ValueError: If it would, or cannot be read; the message says why.
+        ValueError: If the file is too large in memory or cannot be read. The message says why.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -118,7 +131,7 @@ def check_parquet(path: str | os.PathLike) -> None:
                 for group in range(about.num_row_groups)
                 for column in range(about.num_columns)
             ]
-            # of a list a row has many values, and one of fixed width may be wide
+            # a row of a list column has many values, and a value of fixed width may be wide
             values = max(about.num_rows * max(1, about.num_columns), sum(chunk.num_values for chunk, _ in chunks))
             if values > max(_SMALL_TABLE_VALUES, _MAX_VALUES_PER_BYTE * size):
                 raise ValueError(f"{values:,} values in {size:,} bytes, more than a file of telemetry holds; save it as CSV")
@@ -131,7 +144,7 @@ def check_parquet(path: str | os.PathLike) -> None:
 
 
 def _check_text(file: Any, max_bytes: int) -> None:
-    """Refuses columns of text that repeat long words until they fill the memory; the others' size is known from the rows."""
+    """Raises a `ValueError` for text columns that expand far beyond the file's size; other columns are checked by their row count."""
     for column in range(file.metadata.num_columns):
         if file.metadata.schema.column(column).physical_type != "BYTE_ARRAY":
             continue
@@ -147,18 +160,21 @@ def _check_text(file: Any, max_bytes: int) -> None:
 
 
 def read_json(path: str | os.PathLike, max_bytes: int) -> Any:
-    """What a JSON file holds.
+    """Loads a JSON file.
 
     Args:
         path: The file.
-        max_bytes: Its largest size.
+        max_bytes: Largest allowed size of the file.
+
+    Returns:
+        The decoded content.
 
     Raises:
-        ValueError: If it is larger, nested too deeply, or no JSON; the message says why.
-        OSError: If it cannot be read.
+        ValueError: If the file is too large, nested too deeply, or not valid JSON. The message says why.
+        OSError: If the file cannot be read.
     """
-    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
-        raise ValueError("what is no file")
+    if Path(path).exists() and not Path(path).is_file():  # reading a pipe would block
+        raise ValueError("something that is not a regular file")
     with open(path, "rb") as file:
         size = os.fstat(file.fileno()).st_size
         if size > max_bytes:
@@ -171,5 +187,5 @@ def read_json(path: str | os.PathLike, max_bytes: int) -> Any:
 
 
 def short_reason(error: Exception) -> str:
-    """The first line of an error, or what it is called."""
+    """The first line of an error's message, or the name of its type if the message is empty."""
     return (getattr(error, "strerror", None) or str(error)).splitlines()[0] if str(error).splitlines() else type(error).__name__

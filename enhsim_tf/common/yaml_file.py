@@ -1,6 +1,7 @@
 """Settings in a YAML file: read with limits on size and depth, without aliases, tags or repeated keys, and checked by pydantic.
 
-Every mistake is one line that names its place in the file, such as `scenarios[2].severity`; entries count from 1.
+The size and depth of the file are limited, and aliases, tags and repeated keys are not allowed. Each error message is one line
+and names the position in the file, such as `scenarios[2].severity`. List entries are counted from 1.
 """
 
 import collections
@@ -107,8 +108,8 @@ def _shown(received: Any) -> str:
         return "nothing"
     try:
         text = repr(received)
-    except ValueError:  # Python writes no number of more than some thousand digits
-        return "a number that long"
+    except ValueError:  # Python does not format integers of more than 4,300 digits
+        return "a number with thousands of digits"
     return text if len(text) <= 80 else f"{text[:80]}..."
 
 
@@ -128,7 +129,7 @@ def _load(path: Path) -> Any:
     try:
         with open(path, "rb") as file:
             raw = file.read(_MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+    except (OSError, ValueError) as error:  # a path with a zero byte raises ValueError
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"Expected a settings file that can be read. Received: {str(path)!r} ({reason}).") from None
     if len(raw) > _MAX_BYTES:
@@ -140,12 +141,12 @@ def _load(path: Path) -> Any:
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             bad = isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) or getattr(event, "tag", None)
             if bad or depth > _MAX_DEPTH or number > _MAX_EVENTS:
-                problem = "an alias, anchor or tag" if bad else "more or deeper than settings are"
+                problem = "an alias, anchor or tag" if bad else "too many or too deeply nested entries"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
         return yaml.load(text, _Loader)
     except yaml.MarkedYAMLError as error:
         where = "" if error.problem_mark is None else f" in line {error.problem_mark.line + 1}"
         reason = f"{' '.join(str(error.problem or error.context).split())[:120]}{where}"
-    except (yaml.YAMLError, ValueError, OverflowError) as error:  # a date or a number that is none, bytes that are no text
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # an invalid date or number, or bytes that are not UTF-8
         reason = " ".join(str(error).split())[:120]
     raise InputError(f"Expected settings in plain YAML, as in docs/scenarios.md. Received: {path.name!r}, {reason}.")

@@ -1,4 +1,4 @@
-"""Parallel work: a function is called for many items by processes of this machine or by Ray.
+"""Parallel work: calls a function for many items, in processes of this machine or in Ray actors.
 
-This package knows neither telemetry nor files.
+This package depends on neither telemetry nor files.
 """

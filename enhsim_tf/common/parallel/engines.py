@@ -1,7 +1,7 @@
-"""Engines: they call a function for many items in many processes, and know neither telemetry nor files.
+"""Engines that call a function for many items in several processes.
 
-Each process computes in a fixed number of threads, so that its results do not depend on how many cores there are. A process
-that dies is replaced, and what it was at is done again. An engine gives up when processes die without end.
+Each process uses a fixed number of threads, so that results do not depend on the number of cores. A process that dies is
+replaced and its item is computed again. An engine gives up after more than five consecutive worker failures.
 """
 
 import functools
@@ -13,22 +13,25 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.local import run_local, start_worker
 from enhsim_tf.common.parallel.ray import run_ray
 
-ENGINES = {"local": 512, "ray": 10_000}  # and their most workers
+ENGINES = {"local": 512, "ray": 10_000}  # name: maximum number of workers
 
 
 def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: int | None = None, threads: int = 1) -> Iterator[Any]:
-    """Calls `work` for each item and yields what it returns, as it comes; the order is anyone's.
+    """Calls `work` for each item and yields the results in the order in which they are finished.
 
     Args:
         engine: `local` or `ray`.
-        work: What is called; it is pickled for each process.
-        items: What it is called with, not None; drawn and pickled as there is room, so that any number of them needs the same
-            memory.
-        workers: Processes; None: one a CPU.
-        threads: Of TensorFlow in each process; linear algebra beside it has one.
+        work: Function of one item. It is pickled for each process.
+        items: Arguments of `work`, none of which may be None. They are drawn and pickled only when a worker can take them, so
+            that memory does not grow with their number.
+        workers: Number of processes. None: one per CPU.
+        threads: Number of TensorFlow threads in each process. Linear algebra libraries use one thread.
+
+    Yields:
+        The result of `work` for each item.
 
     Raises:
-        InputError: That of `work`; or if the engine cannot be used, or its processes keep dying (`ProcessesDiedError`).
+        InputError: If `work` raises one, if the engine cannot be used, or if its processes keep dying (`ProcessesDiedError`).
     """
     if engine not in ENGINES:
         raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
@@ -39,10 +42,16 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
 
 
 def parse_workers(text: str | None) -> int | None:
-    """The number of `--workers auto|N`; None is one a CPU.
+    """Parses the option `--workers auto|N`.
+
+    Args:
+        text: The option's value.
+
+    Returns:
+        The number of workers, or None for one per CPU.
 
     Raises:
-        InputError: If it is neither.
+        InputError: If the value is neither `auto` nor a positive integer.
     """
     if text in (None, "auto"):
         return None

@@ -1,4 +1,4 @@
-"""The engine `local`: a pool of spawned processes; and what all engines share: how a process begins, and when too many die."""
+"""The engine `local`, a pool of spawned processes, and what all engines share: worker start-up and the count of failures."""
 
 import collections
 import concurrent.futures
@@ -16,17 +16,17 @@ from typing import Any
 
 from enhsim_tf.common.errors import InputError
 
-_MAX_FAILURES = 5  # in a row, without anything finished between them
+_MAX_FAILURES = 5  # consecutive, without a finished item between them
 
-_work: Callable[[Any], Any] | None = None  # of a process of the pool
+_work: Callable[[Any], Any] | None = None  # the function that a pool process calls for each item
 
 
 class ProcessesDiedError(InputError):
-    """Processes die without end.
+    """Raised when too many workers died in a row.
 
     Args:
-        message: What is said of it.
-        items: What they were at; the one that ends them is among these.
+        message: Description of the problem.
+        items: Items that were being computed. The item that kills the workers is among them.
     """
 
     def __init__(self, message: str, items: Iterable[Any]):
@@ -35,36 +35,47 @@ class ProcessesDiedError(InputError):
 
 
 class WorkerFailures:
-    """Counts processes that died in a row, each in the place of the one before it."""
+    """Counts consecutive worker failures."""
 
     def __init__(self):
         self.count = 0
 
     def add(self, items: Iterable[Any], reason: str = "") -> None:
-        """One more, which was at one of these items, for a reason that is known or not."""
+        """Counts one more failure.
+
+        Args:
+            items: Items that were being computed when the worker died.
+            reason: Why it died, if known.
+
+        Raises:
+            ProcessesDiedError: If there were too many failures in a row.
+        """
         self.count += 1
         if self.count > _MAX_FAILURES:
             raise ProcessesDiedError(
-                f"Expected processes that live. Received: {self.count} that died in a row{reason and f' ({reason})'}. "
-                "Is there memory enough? Take fewer --workers; what was finished is kept.",
+                f"Expected worker processes that stay alive. Received: {self.count} that died in a row{reason and f' ({reason})'}. "
+                "Memory may be too small: use fewer --workers. Finished work is kept.",
                 items,
             )
 
-    def end(self) -> None:
-        """Something was finished."""
+    def reset(self) -> None:
+        """Sets the count to zero, because an item was finished."""
         self.count = 0
 
 
 def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
-    """`engines.run` in processes of this machine.
+    """Implements `engines.run` with processes of this machine.
 
     Args:
-        initialize: What a process does first; returns what is called for each item.
-        items: What it is called with.
-        workers: Processes; None: one a CPU.
+        initialize: Called once in each process. Returns the function that is then called for each item.
+        items: Arguments of that function.
+        workers: Number of processes. None: one per CPU.
+
+    Yields:
+        The result for each item.
 
     Raises:
-        InputError: That of the work; or if the processes keep dying.
+        InputError: If the function raises one, or if the processes keep dying.
     """
     first = list(itertools.islice(items, workers or num_cpus()))
     num_processes, retry, items, failures = max(1, len(first)), collections.deque(), itertools.chain(first, items), WorkerFailures()
@@ -81,7 +92,7 @@ def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int 
                     for done in concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED).done:
                         result = done.result()
                         del running[done]
-                        failures.end()
+                        failures.reset()
                         yield result
             except BrokenProcessPool:
                 retry.extend(running.values())
@@ -89,12 +100,12 @@ def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int 
 
 
 def num_cpus() -> int:
-    """CPUs that this process may use."""
+    """Number of CPUs that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, again: collections.deque) -> concurrent.futures.Future:
-    """Hands an item to the pool; a process that is started with it does not hear the user's interrupt, which is ours."""
+def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, retry: collections.deque) -> concurrent.futures.Future:
+    """Submits an item to the pool. A process started by this call ignores SIGINT, which the parent process handles."""
     masked = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masked else None
     try:
@@ -109,7 +120,7 @@ def _submit(pool: concurrent.futures.ProcessPoolExecutor, item: Any, again: coll
 
 @contextlib.contextmanager
 def _pool(initialize: Callable[[], Any], workers: int) -> Iterator[concurrent.futures.ProcessPoolExecutor]:
-    """A pool of spawned processes (a forked TensorFlow hangs) that ends at once when the block ends in an error."""
+    """A pool of spawned processes that is terminated at once if the block raises. Forking is not used, since TensorFlow hangs."""
     others = set(multiprocessing.active_children())
     pool = concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _initialize_pool_worker, (initialize,))
     is_done = False
@@ -123,18 +134,23 @@ def _pool(initialize: Callable[[], Any], workers: int) -> Iterator[concurrent.fu
 
 
 def start_worker(work: bytes, threads: int) -> Callable[[Any], Any]:
-    """What a process of any engine does first: its threads are set before the work comes out and imports what reads them.
+    """Initializes a process of any engine.
+
+    The thread counts are set before `work` is unpickled, because unpickling imports the libraries that read them.
 
     Args:
-        work: What it is to call for each item, pickled.
-        threads: Of TensorFlow.
+        work: The pickled function to be called for each item.
+        threads: Number of TensorFlow threads.
+
+    Returns:
+        The unpickled function.
     """
     one = dict.fromkeys(("TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     os.environ |= one | {"TF_NUM_INTRAOP_THREADS": str(threads), "CUDA_VISIBLE_DEVICES": ""}
     work = pickle.loads(work)
     import threadpoolctl
 
-    threadpoolctl.threadpool_limits(1)  # Ray's own processes have imported NumPy before
+    threadpoolctl.threadpool_limits(1)  # a Ray process has already imported NumPy
     return work
 
 
@@ -145,7 +161,7 @@ def _initialize_pool_worker(initialize: Callable[[], Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Ends this process when the one that started it is gone: a killed one cannot say so, and its pool would wait for ever."""
+    """Ends this process when its parent has ended. A killed parent cannot shut the pool down, so its workers would wait forever."""
     multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
     os._exit(1)
 

@@ -1,4 +1,4 @@
-"""The engine `ray`: one Ray actor a process, on this machine or on the cluster of `RAY_ADDRESS`.
+"""The engine `ray`: each worker is a Ray actor, on this machine or on the cluster at `RAY_ADDRESS`.
 
 Plain actors and not Ray Data: what travels are items there and records back, which need no blocks, no plan and no read
 tasks that wait for a CPU which the actors hold; and a lost actor is replaced by the same few lines as a lost process.
@@ -21,35 +21,38 @@ from enhsim_tf.common.parallel.local import WorkerFailures
 
 _ANSWER_S = 10
 _REFUSALS = (ConnectionError, RuntimeError, OSError, ValueError)
-_ACTOR_CPUS = 0.4  # of a CPU each: after half of a cluster is lost, its actors still find room on the other half
+_ACTOR_CPUS = 0.4  # CPUs requested by each actor: if half of a cluster is lost, all actors still fit on the other half
 
 
 class _Actor:
-    """One process of the cluster."""
+    """A worker process of the cluster."""
 
     def __init__(self, initialize: Callable[[], Any]):
         self.work = initialize()
 
     def call(self, item: Any) -> tuple[str, Any]:
-        """The result for an item, or why there is none; without an item, that the actor stands."""
+        """Returns `("done", result)`, `("refused", message)` after an `InputError`, or, if `item` is None, `("ready", None)`."""
         if item is None:
             return "ready", None
         try:
             return "done", self.work(item)
-        except InputError as error:  # as itself it would come back inside an error of Ray's
+        except InputError as error:  # if it were raised, Ray would wrap it in an error of its own
             return "refused", str(error)
 
 
 def run_ray(initialize: Callable[[], Any], items: Iterator[Any], workers: int | None) -> Iterator[Any]:
-    """`engines.run` in actors of Ray.
+    """Implements `engines.run` with Ray actors.
 
     Args:
-        initialize: What a process does first; returns what is called for each item.
-        items: What it is called with.
-        workers: Actors; None: one a CPU of the cluster.
+        initialize: Called once in each actor. Returns the function that is then called for each item.
+        items: Arguments of that function.
+        workers: Number of actors. None: one per CPU of the cluster.
+
+    Yields:
+        The result for each item.
 
     Raises:
-        InputError: That of the work; or if there is no such cluster, or the actors keep dying.
+        InputError: If the function raises one, if there is no such cluster, or if the actors keep dying.
     """
     one = list(itertools.islice(items, 1))
     if not one:
@@ -67,9 +70,9 @@ def run_ray(initialize: Callable[[], Any], items: Iterator[Any], workers: int | 
         def ask(actor: Any, item: Any, failures: WorkerFailures) -> None:
             waiting[actor.call.remote(item)] = actor, item, failures
 
-        every = [WorkerFailures() for _ in first]  # of an actor and those in its place: a node that is lost ends many, each of them once
+        every = [WorkerFailures() for _ in first]  # one count per actor and its replacements: a lost node ends many actors once each
         for failures in every:
-            ask(make(initialize), None, failures)  # an actor that finds no room yet holds no item that another could do
+            ask(make(initialize), None, failures)  # an actor that is not scheduled yet gets no item, so that another actor can take it
         while waiting:
             (done,), _ = ray.wait(list(waiting), num_returns=1)
             actor, item, failures = waiting.pop(done)
@@ -84,20 +87,20 @@ def run_ray(initialize: Callable[[], Any], items: Iterator[Any], workers: int | 
                 raise InputError(result)
             if kind == "done":
                 for failures_of_one in every:
-                    failures_of_one.end()
+                    failures_of_one.reset()
             following = retry.popleft() if retry else next(items, None)
             if following is not None:
                 ask(actor, following, failures)
             elif not any(each is not None for _, each, _ in waiting.values()):
-                waiting.clear()  # what is left are actors that never found room
+                waiting.clear()  # only actors that were never scheduled are left
             if kind == "done":
                 yield result
 
 
 @contextlib.contextmanager
 def _cluster() -> Iterator[Any]:
-    """Ray, connected; one that was connected before stays so."""
-    # no reports on usage to its makers; no word on accelerators, which nothing here uses
+    """Yields the connected `ray` module. A connection that existed before is used and left open."""
+    # disable usage reports and the warning about accelerators, which are not used here
     os.environ |= {name: os.environ.get(name, "0") for name in ("RAY_USAGE_STATS_ENABLED", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO")}
     try:
         import ray
@@ -110,20 +113,23 @@ def _cluster() -> Iterator[Any]:
         return
     logging.getLogger("ray").setLevel(logging.ERROR)
     address = os.environ.get("RAY_ADDRESS")
-    local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # nothing large travels
+    local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # only small objects are exchanged
     _check_address(address)
     try:
         starting = _Starting(f"at {address}" if address else "that starts here", (*_REFUSALS, ray.exceptions.RayError))
         with starting, warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of a server that does not answer it warns, and then raises
+            warnings.simplefilter("ignore", UserWarning)  # Ray warns of a server that does not answer before it raises
             ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
         yield ray
     finally:
-        ray.shutdown()  # also of what did not start: Ray would go on asking the server that was not there
+        ray.shutdown()  # also after a failed start, since Ray would keep trying to reach the server
 
 
 class _Starting:
-    """Makes one line of what Ray raises where there is no cluster; of a node that does not come up in time, an Exception of no kind."""
+    """Turns the errors that Ray raises for a missing cluster into an `InputError`.
+
+    For a node that does not start in time, Ray raises a plain `Exception`.
+    """
 
     def __init__(self, where: str, kinds: tuple[type[Exception], ...]):
         self.where, self.kinds = where, kinds
@@ -137,9 +143,9 @@ class _Starting:
 
 
 def _check_address(address: str | None) -> None:
-    """Refuses an address where nobody answers, which Ray itself would ask for minutes."""
+    """Raises an `InputError` at once if nothing answers at the address. Ray itself would retry for minutes."""
     host, _, port = (address or "").rpartition(":")
-    if not host or not port.isdecimal() or "/" in host:  # none, or a form that Ray alone understands
+    if not host or not port.isdecimal() or "/" in host:  # no address, or a form that only Ray can parse
         return
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_ANSWER_S).close()
@@ -148,6 +154,6 @@ def _check_address(address: str | None) -> None:
 
 
 def _last_line(error: Exception) -> str:
-    """The end of an error, where Ray says what it was, in characters that a terminal shows as they are."""
+    """The printable part of the last line of an error's message, which is where Ray states the reason."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~")]
     return "".join(character for character in (lines or [type(error).__name__])[-1] if character.isprintable())[:160].rstrip(".")
