@@ -521,7 +521,7 @@ def test_the_report_says_everything_in_plain_words():
     lines = cleaned_of(series).report.lines()
     assert lines[0] == "volts: 401 rows, 399 used, 2 left out; 400 samples in 1 part, 1 of them filled in"
     assert "left out: rows that repeat the time and value of another: 2 (first: row 399, 2020-03-01T00:00:03+00:00, " in lines[2]
-    assert lines[3].startswith("repaired: gaps of up to 5 samples, filled by straight lines with 1 samples in all: 1 (first: row 6, ")
+    assert lines[3].startswith("repaired: gaps of up to 5 samples, filled by straight lines with 1 samples in total: 1 (first: row 6, ")
     assert Finding("gaps", 1, "a").action == "accepted"
 
 

@@ -1,1 +1,1 @@
-"""Cleaning: from raw times and values to telemetry at a regular interval, with a report of what was repaired."""
+"""Cleaning: turns raw times and values into telemetry at a regular interval, with a report of all repairs."""

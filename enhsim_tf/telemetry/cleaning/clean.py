@@ -1,7 +1,7 @@
-"""Dirty telemetry becomes regular telemetry, and a report of everything that was done to it.
+"""Turns raw telemetry into regularly sampled telemetry, and reports every change.
 
-Times are sorted, doubles taken out, jitter snapped to a regular grid, short gaps filled and long ones made the ends of
-parts. What cannot be understood is refused in one line; no row is lost without being reported.
+Rows are sorted by time, duplicates are dropped, jittered times are snapped to a regular grid, short gaps are filled, and the
+series is split at long gaps. Input that cannot be interpreted raises an `InputError`. Every row that is left out is reported.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ from enhsim_tf.telemetry.cleaning.resampling import (
 from enhsim_tf.telemetry.cleaning.times import UNITS_NS, localize_times, parse_times, refuse_repeated_local_hour
 from enhsim_tf.telemetry.series import Telemetry
 
-_MIN_REGULAR_FRACTION = 0.4  # share of steps; times drawn at random reach 0.25
+_MIN_REGULAR_FRACTION = 0.4  # of the steps between rows; random times reach 0.25
 _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
     "on_bad_values": ("refuse", "drop"),
@@ -36,25 +36,27 @@ _CHOICES = {
 
 @dataclasses.dataclass(frozen=True)
 class Cleaning:
-    """What to do with dirty telemetry.
+    """Options of `clean`.
 
     Args:
-        interval_s: Sampling interval in seconds; every row goes to the nearest place of this grid and rows that share one
-            are averaged. None: the interval that most rows have.
-        timezone: Zone of times without one, such as "Europe/Berlin". None: UTC, unless they show a local clock's change.
-        time_unit: Unit of times that are numbers: D, h, min, s, ms, us or ns. None: told by their size.
-        time_format: Format of times that are text, as `datetime.strptime` takes it. None: ISO 8601.
-        on_bad_times: What is no time: "refuse", or "drop" its row.
-        on_bad_values: What is no number: "refuse", or "drop" it like a missing value.
-        decimal: "," where commas part the decimals even where they look like thousands.
-        same_time: Which of different values of one time is taken: their "mean", the "first", the "last", or "refuse".
-        max_jitter: How far a time may lie off the regular grid, in intervals, at most 0.5; beyond it the series is parted.
-        max_fill: Longest gap that is filled by a straight line, in samples; longer ones part the series.
-        other_rates: Stretches of another sampling rate: "resample" or "leave out".
+        interval_s: Sampling interval in seconds. Every row is assigned to the nearest point of this grid, and rows that share
+            a point are averaged. None: the interval that most rows have.
+        timezone: Time zone of times without one, such as "Europe/Berlin". None: UTC; times that jump back by one hour, as a
+            local clock does, then raise an `InputError`.
+        time_unit: Unit of numeric times: D, h, min, s, ms, us or ns. None: inferred from their magnitude.
+        time_format: Format of times given as text, as for `datetime.strptime`. None: ISO 8601.
+        on_bad_times: Treatment of times that cannot be read: "refuse" raises an `InputError`, "drop" drops their rows.
+        on_bad_values: Treatment of values that cannot be read: "refuse" raises an `InputError`, "drop" treats them as missing.
+        decimal: "," if commas are decimal separators even where they could separate thousands.
+        same_time: Treatment of different values at the same time: take their "mean", the "first" or the "last", or "refuse".
+        max_jitter: Largest distance of a time from the regular grid, in intervals, at most 0.5. The series is split where the
+            distance is larger.
+        max_fill: Longest gap that is filled by linear interpolation, in samples. The series is split at longer gaps.
+        other_rates: Treatment of stretches with another sampling rate: "resample" or "leave out".
         min_part: Shortest part that is kept, in samples.
 
     Raises:
-        InputError: If an option is out of its range.
+        InputError: If an option is out of range.
     """
 
     interval_s: float | None = None
@@ -86,11 +88,11 @@ class Cleaning:
 
 @dataclasses.dataclass(frozen=True)
 class Cleaned:
-    """Regular telemetry and how it was come by.
+    """The result of `clean`.
 
     Args:
-        parts: Regular segments on one clock, in the order of time: one interval, one start, each with its own offset.
-        report: What was accepted, repaired and left out.
+        parts: Regularly sampled parts in chronological order. All share one interval and one start; each has its own offset.
+        report: The log of everything that was accepted, repaired or left out.
     """
 
     parts: list[Telemetry]
@@ -103,19 +105,19 @@ class Cleaned:
 
 
 def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cleaned:
-    """Makes regular telemetry of a raw channel.
+    """Turns one raw channel into regularly sampled telemetry.
 
     Args:
-        series: One channel: values of any kind that can be read as numbers, and as its index the times (date-times, ISO
-            8601 text, numbers since 1970). With a `RangeIndex`, or as an array, its samples are counted. The unit of its
-            values may stand in `series.attrs["unit"]`.
-        options: What to do with what is dirty.
+        series: The channel. Its values can be anything that can be parsed as numbers. Its index holds the times: date-times,
+            ISO 8601 text, or numbers since 1970. An array, or a series with a `RangeIndex`, has no times, and its samples are
+            counted instead. `series.attrs["unit"]` may give the unit of the values.
+        options: How problems are treated. None: the defaults of `Cleaning`.
 
     Returns:
-        The regular parts, and the report.
+        The regular parts and the cleaning report.
 
     Raises:
-        InputError: If it is no series of numbers, or nothing regular is in it.
+        InputError: If the input is not a series of numbers, or has no regularly sampled part.
     """
     options = options or Cleaning()
     is_series = isinstance(series, pd.Series)
@@ -132,7 +134,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     else:
         log = CleaningLog(None, map(finding_from_dict, about.get("findings", ())))
         numbers = np.arange(len(values))
-        begin = series.index.start if is_series and series.index.step == 1 else 0  # a piece of a longer series keeps its clock
+        begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
         rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers, np.ones(len(values), np.int64))
     log.findings += noted
 
@@ -149,11 +151,11 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         if regular_step_fraction(rows.times, interval) < _MIN_REGULAR_FRACTION:
             raise InputError(
                 f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
-                f"{np.diff(rows.times).max() / 1e9:g} s without a rate that most have, in {name}. Give interval_s to average over."
+                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. Give interval_s to average over."
             )
         rows = resample_to_common_interval(rows, interval, log, options.other_rates == "resample", options.max_fill)
     else:
-        raise InputError(f"Expected at least 2 rows to tell the interval. Received: 1 usable row from {name}. Give interval_s.")
+        raise InputError(f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s.")
     if options.interval_s is not None:
         segments = find_binned_segments(rows.times, interval, options.max_fill + 1)
     else:
@@ -171,7 +173,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
 
 
 def _timed_rows(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
-    """Rows with a time, in the order of time."""
+    """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
     stamps, bad, noted = parse_times(index, f"the times of {name}", options.on_bad_times == "drop", options.time_unit, options.time_format)
     had_time = stamps.notna()
     local = stamps.tz is None
@@ -185,7 +187,7 @@ def _timed_rows(index: pd.Index, values: np.ndarray, name: str, options: Cleanin
     log.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))
     log.add("missing times", missing, "rows without a time: {count}", rows_left_out=len(missing))
     lost = np.flatnonzero(changed)
-    log.add("clock change", lost, f"rows at times that {options.timezone} has twice or never: {{count}}", rows_left_out=len(lost))
+    log.add("clock change", lost, f"rows at ambiguous or nonexistent local times of {options.timezone}: {{count}}", rows_left_out=len(lost))
     if not len(kept):
         raise InputError(f"Expected rows with times. Received: none in {name}. Name another time column.")
     if local:
@@ -195,9 +197,9 @@ def _timed_rows(index: pd.Index, values: np.ndarray, name: str, options: Cleanin
             refuse_repeated_local_hour(times[kept], kept, log, name)
     steps = np.diff(times[kept])
     if len(steps) and (steps <= 0).all() and (steps < 0).any():
-        log.add("descending", (), "rows in falling order of time, turned round: {count}", count=len(kept))
+        log.add("descending", (), "rows in descending order of time, reversed: {count}", count=len(kept))
     else:
         early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
-        log.add("unsorted", early, "rows that stood after later ones, sorted: {count}")
+        log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
     return log, Rows(times[kept], values[kept], kept, np.ones(len(kept), np.int64))

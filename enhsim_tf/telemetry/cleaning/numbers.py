@@ -1,6 +1,7 @@
-"""A raw column becomes numbers: text, objects, decimal commas.
+"""Parses a raw column as numbers, including text, objects and decimal commas.
 
-A cell that says nothing is missing; one that cannot be understood is refused by its place, or left to the caller to count.
+An empty cell is a missing value. A cell that cannot be parsed either raises an `InputError` that names its row or is marked, so
+that the caller can count it.
 """
 
 import decimal as decimal_module
@@ -22,19 +23,20 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 def parse_numbers(values: Any, what: str, drop: bool = False, decimal: str | None = None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
-    """Reads a column of values.
+    """Parses a column of values.
 
     Args:
         values: One-dimensional array, pandas Series or list of numbers, text or objects.
-        what: Where they come from, for messages.
-        drop: Whether what is no number becomes missing (and is marked) instead of being refused.
-        decimal: "," where commas part the decimals even where they look like thousands; None: told by the text.
+        what: Description of the source, for messages.
+        drop: If True, a value that is not a number is marked and treated as missing. If False, it raises an `InputError`.
+        decimal: "," if commas are decimal separators even where they could separate thousands. None: inferred from the text.
 
     Returns:
-        `(values, bad, findings)`: float64 with NaN where missing; marks of what could not be read; what was noted.
+        `(values, bad, findings)`: float64 values with NaN where missing, the mask of values that could not be parsed, and
+        findings for the cleaning log.
 
     Raises:
-        InputError: If the values are not one column of numbers, or one of them is no number that float32 holds.
+        InputError: If the values are not a column of numbers, or one of them is not a number in the range of float32.
     """
     values = column(values, what)
     if pd.api.types.is_bool_dtype(values.dtype) or pd.api.types.is_complex_dtype(values.dtype):
@@ -58,37 +60,37 @@ def parse_numbers(values: Any, what: str, drop: bool = False, decimal: str | Non
         row = int(np.argmax(bad | beyond))
         expected = f"values that float32 holds, up to {_LARGEST:.1e}" if beyond[row] else "numbers"
         raise InputError(
-            f"Expected {expected}. Received: {shown(values.iloc[row])} at row {row} of {what}, and {int((bad | beyond).sum()) - 1:,} more. "
+            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at row {row} of {what}, and {int((bad | beyond).sum()) - 1:,} more. "
             "Correct them, or leave them out with on_bad_values='drop' (--drop-bad)."
         )
     return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
 
 
 def column(values: Any, what: str) -> pd.Series:
-    """One column with its rows counted from 0, or an `InputError`: anything of another shape."""
+    """Converts values to a Series with rows counted from 0; raises an `InputError` if they are not one-dimensional."""
     if isinstance(values, pd.DataFrame) or np.ndim(values) != 1:
         raise InputError(f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column.")
     try:
         cells = pd.Series(values).reset_index(drop=True)
         return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
-    except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not hold
+    except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not support
         reason = (str(error).splitlines() or [""])[0]
         raise InputError(f"Expected numbers. Received: {type(values).__name__} from {what} ({reason}). Give an array of numbers.") from None
 
 
 def is_text(values: pd.Series) -> bool:
-    """Whether cells are to be looked at one by one: text or objects."""
+    """Whether a column holds text or objects, which must be parsed cell by cell."""
     return values.dtype == object or pd.api.types.is_string_dtype(values.dtype)
 
 
-def shown(cell: Any) -> str:
-    """A cell as messages show it."""
+def format_cell(cell: Any) -> str:
+    """Formats a cell for a message, shortened to 60 characters."""
     text = repr(cell) if isinstance(cell, str) else str(cell)
     return " ".join(text.split())[:60]
 
 
 def is_missing(cells: pd.Series) -> np.ndarray:
-    """Marks of cells that say nothing: None, NaN, and the words for it."""
+    """Mask of missing cells: None, NaN, empty text and words such as "n/a"."""
     missing = cells.isna().to_numpy(bool, copy=True)
     of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
     missing[of_text] = cells[of_text].str.strip().str.casefold().isin(_MISSING).to_numpy(bool)
@@ -108,7 +110,7 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
     if commas.any():
         has_points = text[plain].str.contains(".", regex=False).any()
         maybe_thousands = text[commas].str.fullmatch(_THOUSANDS).all() and decimal != ","
-        if has_points or maybe_thousands:  # one column is written in one way, and 1,500 can be read in two
+        if has_points or maybe_thousands:  # commas and points are mixed, or 1,500 could mean 1500 or 1.5
             commas[:] = False
         else:
             findings.append(Finding("decimal comma", int(commas.sum()), f"numbers written with a decimal comma: {commas.sum():,}"))
@@ -116,7 +118,7 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
     parsed[rows[readable]] = text[readable].str.replace(",", ".", regex=False).astype(np.float64)
     written_finite = readable & ~text.str.contains("inf", case=False).to_numpy(bool)
     bad[rows[~readable]] = True
-    bad[rows[written_finite]] |= ~np.isfinite(parsed[rows[written_finite]])  # 1e999: a number, but none that can be held
+    bad[rows[written_finite]] |= ~np.isfinite(parsed[rows[written_finite]])  # 1e999 is a number but overflows float64
     return parsed, bad, findings
 
 
@@ -124,5 +126,5 @@ def _parse_object(cell: Any) -> tuple[float, bool]:
     is_number = isinstance(cell, numbers.Real | decimal_module.Decimal) and not isinstance(cell, bool | np.bool_)
     try:
         return (float(cell), False) if is_number else (np.nan, True)
-    except (OverflowError, ValueError):  # an integer beyond float64, a signalling NaN
+    except (OverflowError, ValueError):  # an integer beyond float64, or a signalling NaN
         return np.nan, True

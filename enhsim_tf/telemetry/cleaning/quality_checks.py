@@ -1,4 +1,4 @@
-"""What a cleaned channel is like, for its report: quantised, stuck, constant, drifting. Nothing is changed here."""
+"""Quality checks of a cleaned channel, for its report: quantised, stuck, constant or drifting values. The values are not changed."""
 
 from collections.abc import Sequence
 
@@ -7,17 +7,17 @@ import numpy as np
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
 from enhsim_tf.telemetry.cleaning.resampling import Part
 
-_NUM_STRETCHES = 10  # of which level and amplitude are compared
-_MAX_LEVELS = 4_096  # a quantised channel has at most
-_STUCK = 20  # samples of one value
+_NUM_STRETCHES = 10  # consecutive stretches whose level and amplitude are compared
+_MAX_LEVELS = 4_096  # a channel with more distinct values does not count as quantised
+_STUCK = 20  # a shorter run of one value, in samples, does not count as stuck
 
 
 def describe_values(parts: Sequence[Part], log: CleaningLog) -> None:
-    """Notes what the values are like.
+    """Adds findings about the values of a channel to the cleaning log.
 
     Args:
         parts: The regular parts of one channel.
-        log: Takes what is found.
+        log: The cleaning log.
     """
     values = np.concatenate([part.values for part in parts])
     numbers = np.concatenate([part.source_row for part in parts])
@@ -34,7 +34,7 @@ def _log_resolution(values: np.ndarray, log: CleaningLog) -> None:
     rounded = values.astype(np.float32).astype(np.float64)
     error, spread = float(np.abs(rounded - values).max()), float(values.std())
     if error > 1e-3 * spread:
-        text = f"float32 rounds the values by up to {error:.3g}, where their standard deviation is {spread:.3g}: subtract their level"
+        text = f"float32 rounds the values by up to {error:.3g}, while their standard deviation is {spread:.3g}: subtract their mean first"
         log.add("resolution", (), text, count=int((rounded != values).sum()), details={"error": error})
 
 
@@ -46,8 +46,8 @@ def _log_levels(values: np.ndarray, log: CleaningLog) -> None:
     step = float(steps.min())
     multiples = (levels - levels[0]) / step
     even = float(np.abs(multiples - np.round(multiples)).max()) < 0.05
-    how = f"in steps of {step:.4g}" if even else f"the closest {step:.4g} apart"
-    text = f"quantised values, {{count}} levels {how}: noise below a step cannot be learnt"
+    how = f"in steps of {step:.4g}" if even else f"at least {step:.4g} apart"
+    text = f"quantised values, {{count}} levels {how}: noise smaller than a step cannot be learnt"
     log.add("quantised", (), text, count=len(levels), details={"step": step, "is_even": even})
 
 
@@ -71,7 +71,7 @@ def _log_drift(values: np.ndarray, log: CleaningLog) -> None:
     moves, swells = np.ptp(middle) > 0.5 * usual, spans.max() > 1.5 * max(spans.min(), 1e-12)
     if moves or swells:
         text = (
-            f"level and amplitude change: over {_NUM_STRETCHES} stretches the median goes from {middle.min():.4g} to {middle.max():.4g}, "
-            f"the span of 90 % from {spans.min():.4g} to {spans.max():.4g}"
+            f"level or amplitude changes: over {_NUM_STRETCHES} consecutive stretches the median ranges from {middle.min():.4g} to "
+            f"{middle.max():.4g}, and the 5 % to 95 % range from {spans.min():.4g} to {spans.max():.4g}"
         )
         log.add("changing level", (), text, count=_NUM_STRETCHES, details={"low": low.tolist(), "high": high.tolist()})

@@ -1,21 +1,21 @@
-"""The sampling of a series, told from its times: the interval, stretches of another rate, and the regular grid.
+"""Infers the sampling of a series from its times: the interval, stretches with another rate, and the regular grid.
 
-Pure functions of arrays; times are int64 nanoseconds, sorted. What becomes of the rows is `cleaning`'s business.
+All functions are pure functions of arrays. Times are sorted int64 nanoseconds. `resampling` decides what happens to the rows.
 """
 
 import dataclasses
 
 import numpy as np
 
-_ALIKE = (0.8, 1.25)  # steps within these factors of each other are of one rate; jitter of a quarter keeps means of four inside
-_RUN = 4  # steps in a row that make a stretch of another rate
+_ALIKE = (0.8, 1.25)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
+_RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
 
 
 def find_interval(times: np.ndarray) -> float:
-    """The sampling interval that most rows have.
+    """Finds the sampling interval that most rows have.
 
     Args:
-        times: Different times of at least two rows.
+        times: Times of at least two rows, all different.
 
     Returns:
         The interval in nanoseconds.
@@ -28,12 +28,15 @@ def find_interval(times: np.ndarray) -> float:
 
 
 def _refined(times: np.ndarray, interval: float) -> float:
-    """The interval over the longest stretch without long gaps: the step that nearly all rows have, or else a line's slope."""
+    """Refines the interval on the longest run without long gaps.
+
+    The result is the step that at least 90 % of the rows have, or otherwise the slope of a line fitted to the times.
+    """
     steps = np.diff(times).astype(np.float64)
     numbers = np.round(steps / interval)
     near = (numbers >= 1) & (numbers <= 3)
     first, last = _longest_run(near)
-    sure = _longest_run(near & (np.abs(steps / interval - numbers) <= 0.25))  # leaves jumps of the clock out
+    sure = _longest_run(near & (np.abs(steps / interval - numbers) <= 0.25))  # excludes jumps of the clock
     if 2 * (sure[1] - sure[0]) >= last - first:
         first, last = sure
     places = np.concatenate([[0], np.cumsum(numbers[first:last])])
@@ -44,19 +47,19 @@ def _refined(times: np.ndarray, interval: float) -> float:
         return step
     centred = places - places.mean()
     slope = float(centred @ since / (centred @ centred))
-    plain = (float(f"{slope:.{digits}e}") for digits in range(15))  # the plainest number that does as well
+    plain = (float(f"{slope:.{digits}e}") for digits in range(15))  # fewest digits that fit as well
     return next((number for number in plain if abs(number - slope) * places[-1] <= 0.05 * slope), slope)
 
 
 def _longest_run(marks: np.ndarray) -> tuple[int, int]:
-    """First index of the longest run of marks, and the one after its last."""
+    """Start and end index (exclusive) of the longest run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], marks.view(np.int8), [0]]))).reshape(-1, 2)
     first, last = edges[np.argmax(edges[:, 1] - edges[:, 0])] if len(edges) else (0, 0)
     return int(first), int(last)
 
 
 def regular_step_fraction(times: np.ndarray, interval: float) -> float:
-    """Share of the steps that are about a whole number of intervals; a quarter or so where times fall at random."""
+    """Fraction of the steps that are close to a whole number of intervals; about a quarter for random times."""
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
     return float(np.mean((numbers >= 1) & (np.abs(ratios - numbers) <= 0.25)))
@@ -64,13 +67,13 @@ def regular_step_fraction(times: np.ndarray, interval: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class OtherRateSegment:
-    """A stretch of rows of another rate than the rest, from row `first` to row `last`, both in it.
+    """A segment of rows whose sampling rate differs from the common one.
 
     Args:
-        first: Its first row.
-        last: Its last row.
-        ratio: Its median step, in intervals of the rest.
-        longest: Its longest step, in intervals of the rest.
+        first: First row of the segment.
+        last: Last row of the segment (inclusive).
+        ratio: Median step of the segment, in common intervals.
+        longest: Longest step of the segment, in common intervals.
     """
 
     first: int
@@ -80,7 +83,7 @@ class OtherRateSegment:
 
 
 def find_other_rates(times: np.ndarray, interval: float) -> list[OtherRateSegment]:
-    """Stretches whose steps are all shorter, or all longer and alike, than the interval."""
+    """Finds segments whose steps are all shorter than the interval, or all longer and similar to each other."""
     ratios = np.diff(times) / interval
     if len(ratios) < _RUN:
         return []
@@ -98,13 +101,13 @@ def find_other_rates(times: np.ndarray, interval: float) -> list[OtherRateSegmen
 
 @dataclasses.dataclass(frozen=True)
 class Segment:
-    """Rows on one regular grid.
+    """A segment of rows that lie on one regular grid.
 
     Args:
-        rows: The rows, from the first to before the last.
-        places: Place of each row on the grid, from 0; never falling, and equal where rows share a place.
-        begin: Time of the grid's place 0, nanoseconds (a float: grids need not fall on whole ones).
-        off: Distance of each row from its place, nanoseconds.
+        rows: Slice of the rows.
+        places: Index of the grid point of each row, from 0, in ascending order. Rows may share a grid point.
+        begin: Time of grid point 0 in nanoseconds, a float because the grid need not lie on whole nanoseconds.
+        off: Distance of each row from its grid point in nanoseconds.
     """
 
     rows: slice
@@ -114,13 +117,16 @@ class Segment:
 
 
 def find_regular_segments(times: np.ndarray, interval: float, max_jitter: float, max_step: int) -> list[Segment]:
-    """Parts a series into stretches whose rows lie on regular grids of one interval, each with its own beginning.
+    """Splits a series into segments whose rows lie on regular grids with the same interval and individual start times.
 
     Args:
         times: Times of the rows.
         interval: The interval in nanoseconds.
-        max_jitter: How far a row may lie off its place, in intervals, at most 0.5.
+        max_jitter: Largest distance of a row from its grid point, in intervals, at most 0.5.
         max_step: Longest step inside a segment, in intervals.
+
+    Returns:
+        The segments in chronological order.
     """
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
@@ -143,7 +149,7 @@ def find_regular_segments(times: np.ndarray, interval: float, max_jitter: float,
 
 
 def _end_of_spread(values: np.ndarray, spread: float) -> int:
-    """How many of the first values lie within `spread` of each other."""
+    """Length of the longest prefix of `values` whose range is at most `spread`."""
     low = high = values[0]
     size, begin = 1_024, 0
     while begin < len(values):
@@ -158,12 +164,15 @@ def _end_of_spread(values: np.ndarray, spread: float) -> int:
 
 
 def find_binned_segments(times: np.ndarray, interval: float, max_step: int) -> list[Segment]:
-    """Parts a series at its long gaps and puts every row on the nearest place of the one grid that begins with the first row.
+    """Splits a series at its long gaps and assigns every row to the nearest point of one grid that starts at the first row.
 
     Args:
         times: Times of the rows.
         interval: The interval in nanoseconds.
         max_step: Longest step inside a segment, in intervals.
+
+    Returns:
+        The segments in chronological order.
     """
     places = np.round((times - times[0]) / interval).astype(np.int64)
     breaks = [0, *(np.flatnonzero(np.diff(places) > max_step) + 1).tolist(), len(times)]

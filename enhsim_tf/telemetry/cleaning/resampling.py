@@ -1,6 +1,6 @@
-"""The rows of a raw channel on their way to regular samples: one a time, one rate, parts without gaps.
+"""The steps from the rows of a raw channel to regular samples: unique times, one sampling rate, parts without gaps.
 
-Each step takes rows out, merges or adds them, and writes into the log what it did.
+Each step drops, merges or adds rows and records what it did in the `CleaningLog`.
 """
 
 import dataclasses
@@ -16,13 +16,13 @@ from enhsim_tf.telemetry.cleaning.report import CleaningLog
 
 @dataclasses.dataclass
 class Rows:
-    """Rows that are still in use, in the order of time.
+    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`.
 
     Args:
-        times: int64 nanoseconds.
-        values: float64, NaN or infinite where there is none.
-        source_row: Row of the source.
-        from_source: 1, or 0 for a sample that was interpolated.
+        times: Times in nanoseconds, int64.
+        values: Values, float64; a missing value is NaN or infinite.
+        source_row: Number of the row in the source.
+        from_source: 1 for a row of the source, 0 for an interpolated row.
     """
 
     times: np.ndarray
@@ -34,7 +34,7 @@ class Rows:
         return len(self.times)
 
     def take(self, which: np.ndarray | slice) -> "Rows":
-        """Some of the rows."""
+        """Selects rows by index, mask or slice."""
         return Rows(self.times[which], self.values[which], self.source_row[which], self.from_source[which])
 
 
@@ -43,9 +43,9 @@ class Part:
     """Regular samples without a gap.
 
     Args:
-        begin: Time of the first sample in nanoseconds, a float: grids need not fall on whole ones.
+        begin: Time of the first sample in nanoseconds, a float because the grid need not lie on whole nanoseconds.
         values: float64 array of shape `(samples,)`.
-        source_row: Row of the source that each sample is, or lies behind.
+        source_row: For each sample, its row in the source. A filled sample has the number of the last row before it.
     """
 
     begin: float
@@ -54,16 +54,22 @@ class Part:
 
 
 def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, same_time: str) -> Rows:
-    """One row for each time.
+    """Keeps one row for each time.
 
     Args:
         rows: The rows.
-        bad: Marks of the source's rows whose value cannot be read.
-        log: Takes what is found.
+        bad: Mask of the source rows whose value cannot be read.
+        log: The cleaning log, to which findings are added.
         name: Channel name, for messages.
-        same_time: Which of different values is taken: mean, first, last or refuse.
+        same_time: Which of several values is kept: mean, first, last or refuse.
+
+    Returns:
+        Rows with unique times.
+
+    Raises:
+        InputError: If a time has several values and `same_time` is "refuse".
     """
-    values = np.where(bad[rows.source_row], np.inf, rows.values)  # what cannot be read is no copy of what is missing
+    values = np.where(bad[rows.source_row], np.inf, rows.values)  # an unreadable value is not a duplicate of a missing one
     is_copy = pd.DataFrame({"time": rows.times, "value": values}).duplicated().to_numpy()
     copies = rows.source_row[is_copy]
     log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
@@ -74,18 +80,21 @@ def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, nam
             f"Expected one value for each time. Received: {len(left):,} more in {name}, the first at {log.place(left[0])}. Give same_time='mean'."
         )
     log.add(
-        "same time", left, f"rows with another value for a time, of which the {same_time} was taken: {{count}}", rows_left_out=len(left)
+        "same time",
+        left,
+        f"rows with another value at the same time, of which the {same_time} was taken: {{count}}",
+        rows_left_out=len(left),
     )
     return kept
 
 
 def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.ndarray]:
-    """One row for each group of neighbours, and the numbers of the rows it replaces."""
+    """Merges each group of neighbouring rows into one row; also returns the source rows that were merged into others."""
     if not np.any(groups[1:] == groups[:-1]):
         return rows, rows.source_row[:0]
     has_value, real = np.isfinite(rows.values), rows.from_source > 0
     order = np.arange(len(rows)) * (-1 if how == "last" else 1)
-    ranked = np.lexsort((order, ~real, ~has_value, groups))  # in each group: rows with a value first
+    ranked = np.lexsort((order, ~real, ~has_value, groups))  # within each group, rows with a value come first
     chosen = ranked[np.flatnonzero(np.diff(groups[ranked], prepend=groups[ranked[0]] - 1))]
     kept = rows.take(chosen)
     if how not in ("first", "last"):
@@ -97,13 +106,19 @@ def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.nd
 
 
 def drop_missing_values(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str) -> Rows:
-    """The rows that have a value.
+    """Drops rows without a value.
 
     Args:
         rows: The rows.
-        bad: Marks of the source's rows whose value cannot be read.
-        log: Takes what is found.
+        bad: Mask of the source rows whose value cannot be read.
+        log: The cleaning log, to which findings are added.
         name: Channel name, for messages.
+
+    Returns:
+        The rows with finite values.
+
+    Raises:
+        InputError: If no row has a value.
     """
     has_value = np.isfinite(rows.values)
     unread, missing = rows.source_row[~has_value & bad[rows.source_row]], rows.source_row[~has_value & ~bad[rows.source_row]]
@@ -115,44 +130,49 @@ def drop_missing_values(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str
 
 
 def resample_to_common_interval(rows: Rows, interval: float, log: CleaningLog, resample: bool, max_fill: int) -> Rows:
-    """The rows with stretches of other sampling rates resampled, or left out.
+    """Resamples stretches with another sampling rate to the common interval, or leaves them out.
 
     Args:
         rows: The rows.
-        interval: The sampling interval in nanoseconds.
-        log: Takes what is found.
-        resample: Whether to resample them. Slower ones than `max_fill` allows are left out in any case.
-        max_fill: Most samples that are interpolated between two rows.
+        interval: The common sampling interval in nanoseconds.
+        log: The cleaning log, to which findings are added.
+        resample: Whether to resample such stretches. Stretches that are slower than `max_fill` allows are left out in any case.
+        max_fill: Largest number of samples that are interpolated between two rows.
+
+    Returns:
+        Rows of one sampling rate.
     """
     pieces, done, left = [], 0, []
     finer, coarser, merged = [], [], 0
     for segment in find_other_rates(rows.times, interval):
         first, last = max(segment.first, done), segment.last
-        if first >= last:  # stretches of two kinds share a row at most
+        if first >= last:  # a faster and a slower stretch share at most one row
             continue
         pieces.append(rows.take(slice(done, first)))
         inside, done = rows.take(slice(first, last + 1)), last + 1
         if not resample or segment.longest - 1 > max_fill:
-            ends = np.array([0] * (first > 0) + [-1] * (last < len(rows) - 1), np.int64)  # they belong to the neighbours too
+            ends = np.array(
+                [0] * (first > 0) + [-1] * (last < len(rows) - 1), np.int64
+            )  # the end rows also belong to the neighbouring stretches
             pieces.append(inside.take(ends))
             left.append(np.delete(inside.source_row, ends))
             continue
         (finer if segment.ratio < 1 else coarser).append((inside.source_row[0], segment.ratio))
         pieces.append(_resample_segment(inside, interval, segment, from_last=first == 0))
         merged += int(inside.from_source.sum() - pieces[-1].from_source.sum())
-    for kind, found, how in (("finer stretches", finer, "averaged down"), ("coarser stretches", coarser, "interpolated")):
+    for kind, found, how in (("finer stretches", finer, "averaged"), ("coarser stretches", coarser, "interpolated")):
         steps = " or ".join(dict.fromkeys(f"{ratio * interval / 1e9:.4g}" for _, ratio in found[:3]))
         text = f"stretches with a row every {steps} s instead of {interval / 1e9:.6g} s, {how}: {{count}}"
         log.add(kind, [number for number, _ in found], text, rows_left_out=merged if found is finer else 0)
     if left:
         numbers = np.concatenate(left)
-        log.add("other rates", numbers, f"rows in stretches of another rate ({len(left):,}): {{count}}", rows_left_out=len(numbers))
+        log.add("other rates", numbers, f"rows in {len(left):,} stretches of another rate: {{count}}", rows_left_out=len(numbers))
     pieces.append(rows.take(slice(done, None)))
     return Rows(*(np.concatenate([getattr(piece, field.name) for piece in pieces]) for field in dataclasses.fields(Rows)))
 
 
 def _resample_segment(rows: Rows, interval: float, segment: OtherRateSegment, from_last: bool) -> Rows:
-    """A stretch on the grid of its neighbour: means of finer rows, straight lines between coarser ones."""
+    """Resamples a stretch to the grid of its neighbour: averages faster rows, interpolates linearly between slower ones."""
     anchor = int(rows.times[-1 if from_last else 0])
     places = (rows.times - anchor) / interval
     if segment.ratio < 1:
@@ -217,15 +237,15 @@ def build_parts(
     _log_breaks(rows, segments, interval, log, max_fill)
     _log_jitter(rows, off, interval, log)
     for kind, found, text in (
-        ("averaged", merged, f"rows that share an interval with another, of which the {same_place} was taken: {{count}}"),
+        ("averaged", merged, f"rows that share an interval with another row, of which the {same_place} was taken: {{count}}"),
         ("short parts", short, f"rows in parts of fewer than {min_part:,} samples ({len(short):,} such parts): {{count}}"),
     ):
         numbers = np.concatenate([*found, rows.source_row[:0]])
         log.add(kind, numbers, text, rows_left_out=len(numbers))
     begins = np.concatenate(gaps)
-    text = f"gaps of up to {max_fill} samples, filled by straight lines with {num_filled:,} samples in all: {{count}}"
+    text = f"gaps of up to {max_fill} samples, filled by straight lines with {num_filled:,} samples in total: {{count}}"
     log.add("gaps filled", begins, text, samples_filled=num_filled)
-    log.fill("coarser stretches", num_coarse)
+    log.set_samples_filled("coarser stretches", num_coarse)
     return parts, used
 
 
@@ -235,14 +255,14 @@ def _log_breaks(rows: Rows, segments: Sequence[Segment], interval: float, log: C
     is_gap = np.round(steps) > max_fill + 1
     unit = 1.0 if log.times is None else interval / 1e9
     longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
-    text = f"gaps of more than {max_fill} samples, the longest {longest:.6g} {what}, that part the series: {{count}}"
+    text = f"gaps of more than {max_fill} samples, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
     log.add("gaps", rows.source_row[before[is_gap]], text, details={"longest": float(longest)})
-    log.add("clock steps", rows.source_row[before[~is_gap]], "jumps of the clock that part the series: {count}")
+    log.add("clock steps", rows.source_row[before[~is_gap]], "jumps of the clock, at which the series is split: {count}")
 
 
 def _log_jitter(rows: Rows, off: np.ndarray, interval: float, log: CleaningLog) -> None:
     share = np.abs(off) / interval
-    snapped = np.flatnonzero(share > 1e-3)  # below it, times that were rounded when they were written
+    snapped = np.flatnonzero(share > 1e-3)  # smaller deviations come from rounded times
     largest = float(share.max()) * interval / 1e9
     worst = rows.source_row[snapped[np.argsort(-share[snapped], kind="stable")]]
     text = f"times off the regular grid, by up to {largest:.4g} s ({share.max():.0%} of an interval), snapped to it: {{count}}"

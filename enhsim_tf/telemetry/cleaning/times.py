@@ -1,6 +1,7 @@
-"""A raw column becomes times: date-times, ISO 8601 text, formats, epochs of any unit, zones and their clock changes.
+"""Parses a raw column as times: date-times, ISO 8601 text, other formats, numbers since 1970, time zones and clock changes.
 
-A cell that says nothing is missing; one that cannot be understood is refused by its place, or left to the caller to count.
+An empty cell is a missing time. A cell that cannot be parsed either raises an `InputError` that names its row or is marked, so
+that the caller can count it.
 """
 
 import datetime
@@ -11,33 +12,33 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import column, is_missing, is_text, parse_numbers, shown
+from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import CleaningLog, Finding, iso_time
 
 UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _EPOCHS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-_YEARS_S = (3.1e8, 4.2e9)  # 1979 to 2103: numbers of this size count seconds since 1970
-_LARGEST_NS = 9.2e18  # what int64 nanoseconds since 1970 hold: years 1678 to 2262
+_YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
+_LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
 
 
 def parse_times(
     times: Any, what: str, drop: bool = False, unit: str | None = None, form: str | None = None
 ) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
-    """Reads a column of times.
+    """Parses a column of times.
 
     Args:
-        times: Date-times, ISO 8601 text, objects, time spans, or numbers counted from 1970 (or from any zero).
-        what: Where they come from, for messages.
-        drop: Whether what is no time becomes missing (and is marked) instead of being refused.
-        unit: Unit of numbers, one of `UNITS_NS`; None: told by their size.
-        form: Format of text, as `datetime.strptime` takes it; None: ISO 8601.
+        times: Date-times, ISO 8601 text, objects, time spans, or numbers counted from 1970 or from any other zero.
+        what: Description of the source, for messages.
+        drop: If True, a time that cannot be parsed is marked and treated as missing. If False, it raises an `InputError`.
+        unit: Unit of numeric times, one of `UNITS_NS`. None: inferred from their magnitude.
+        form: Format of text, as for `datetime.strptime`. None: ISO 8601.
 
     Returns:
-        `(stamps, bad, findings)`: times with NaT where missing, in UTC where the source knows its zone, without a zone
-        where not; marks of what could not be read; what was noted.
+        `(stamps, bad, findings)`: times with NaT where missing, in UTC if the source gives a time zone and without a zone
+        otherwise; the mask of times that could not be parsed; and findings for the cleaning log.
 
     Raises:
-        InputError: If the times cannot be read, or their unit cannot be told.
+        InputError: If the times cannot be parsed, or their unit cannot be inferred.
     """
     if unit is not None and unit not in UNITS_NS:
         raise InputError(f"Expected time_unit, one of: {', '.join(UNITS_NS)}. Received: time_unit={unit!r}.")
@@ -62,14 +63,14 @@ def parse_times(
     cells = times.astype(object)
     missing = is_missing(cells)
     given = cells[~missing]
-    if given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # a datetime is a date
+    if given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # datetime is a subclass of date
         aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
         dates = pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")
         return _times_from_dates(pd.Series(dates), what, drop)
-    if form is None and not parse_numbers(given.iloc[:1], what, drop=True)[1].any():  # the first cell is a number: all may be
+    if form is None and not parse_numbers(given.iloc[:1], what, drop=True)[1].any():  # if the first cell is a number, all may be
         values, bad, _ = parse_numbers(cells, what, drop=True)
         if not bad.any():
-            exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # keeps integers of nanoseconds whole
+            exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
             is_exact = pd.api.types.is_integer_dtype(exact.dtype)
             return _times_from_numbers(exact if is_exact else pd.Series(values), what, drop, unit)
     return _times_from_text(cells, missing, what, drop, form)
@@ -78,9 +79,9 @@ def parse_times(
 def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> None:
     row = int(np.argmax(bad))
     try:
-        received = shown(cells.iloc[row])
-    except (NotImplementedError, OverflowError, ValueError):  # a time so far off that its zone cannot tell it
-        received = "a time that is far off"
+        received = format_cell(cells.iloc[row])
+    except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
+        received = "a time out of range"
     raise InputError(
         f"Expected times as ISO 8601 date-times or seconds. Received: {received} at row {row} of {what}, and "
         f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
@@ -91,7 +92,7 @@ def _times_from_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.Datet
     stamps, findings = pd.DatetimeIndex(times), []
     if stamps.tz is not None:
         if str(stamps.tz) != "UTC":
-            findings.append(Finding("time zone", len(stamps), f"times of the zone {stamps.tz}, turned into UTC: {len(stamps):,}"))
+            findings.append(Finding("time zone", len(stamps), f"times of the zone {stamps.tz}, converted to UTC: {len(stamps):,}"))
         stamps = stamps.tz_convert("UTC")
     coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
     bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
@@ -103,28 +104,28 @@ def _times_from_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.Datet
 def _times_from_numbers(times: pd.Series, what: str, drop: bool, unit: str | None) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
     values = times.to_numpy(np.float64, na_value=np.nan)
     finite = np.isfinite(values)
-    told = unit or _unit_of(values[finite], what)
-    factor = UNITS_NS[told]
+    unit = unit or _infer_unit(values[finite], what)
+    factor = UNITS_NS[unit]
     bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
     if bad.any() and not drop:
         _refuse_time(times, bad, what, "Correct them or name another time column")
     usable = finite & ~bad
     since = np.full(len(values), pd.NaT.value, np.int64)
     if pd.api.types.is_integer_dtype(times.dtype):
-        since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # whole numbers stay whole
+        since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # integers keep their precision
     else:
         whole = np.floor(values[usable])
         since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
     findings = []
     if usable.any():
         is_epoch = np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9
-        name = _EPOCHS.get(told, told)
+        name = _EPOCHS.get(unit, unit)
         text = f"times are numbers: {name} since 1970, the first is {iso_time(since[usable][0])}" if is_epoch else f"times count {name}"
-        findings.append(Finding("time unit", int(usable.sum()), text, details={"unit": told}))
+        findings.append(Finding("time unit", int(usable.sum()), text, details={"unit": unit}))
     return pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC"), bad, findings
 
 
-def _unit_of(values: np.ndarray, what: str) -> str:
+def _infer_unit(values: np.ndarray, what: str) -> str:
     size = float(np.median(np.abs(values))) if len(values) else 0.0
     if len(values) and (values == np.floor(values)).all():
         for digits, form in ((8, "%Y%m%d"), (14, "%Y%m%d%H%M%S")):
@@ -140,7 +141,7 @@ def _unit_of(values: np.ndarray, what: str) -> str:
         if (unit == "s" and size < low) or low <= size <= high:
             return unit
     raise InputError(
-        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:g} in {what}, which are none of them from 1980 to 2100. "
+        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:g} in {what}, which are not from 1980 to 2100 in any of these units. "
         "Give time_unit."
     )
 
@@ -158,7 +159,7 @@ def _times_from_text(
     text[of_text] = words.str.replace(r"(:\d\d):60", r"\1:59", regex=True)
     try:
         stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
-    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # a format that is none
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
     bad = (stamps.isna() & ~missing).to_numpy(bool)
     if bad.any() and not drop:
@@ -167,7 +168,7 @@ def _times_from_text(
     stamps = stamps + pd.to_timedelta(leap.astype(np.int64), unit="s").as_unit("ns")
     if leap.any():
         rows = tuple(f"row {row}" for row in np.flatnonzero(leap)[:3])
-        findings.append(Finding("leap seconds", int(leap.sum()), f"leap seconds, taken as the second after them: {leap.sum():,}", rows))
+        findings.append(Finding("leap seconds", int(leap.sum()), f"leap seconds, taken as the following second: {leap.sum():,}", rows))
     given = zoned[~missing & ~bad]
     aware = given.any()
     if aware and not given.all():
@@ -180,27 +181,43 @@ def _times_from_text(
 
 
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
-    """Times of a local clock, in its zone; NaT where a clock change gives none, or two that the order cannot part."""
+    """Assigns a time zone to local times.
+
+    Local times that do not exist because of a clock change become NaT. So do times that occur twice, if the order of the rows does
+    not show which one is meant.
+
+    Args:
+        stamps: Times without a zone.
+        zone: Name of the time zone.
+
+    Returns:
+        Times with the zone.
+
+    Raises:
+        InputError: If the time zone is unknown.
+    """
     try:
         try:
             return stamps.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
-        except ValueError:  # the order does not tell which of two equal hours it is
+        except ValueError:  # the order of the rows does not resolve the repeated hour
             return stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
     except (KeyError, ValueError, TypeError, OSError):
         raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
 
 
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
-    """Refuses times that a local clock, set back by an hour, gives twice: merged by time they would mix two hours into one.
+    """Checks for times that a local clock repeats when it is set back by one hour.
+
+    Without a time zone, sorting by time would mix the two hours.
 
     Args:
-        times: int64 nanoseconds, in the order of the source.
-        numbers: Row of the source of each.
-        log: Knows the places.
+        times: Times in nanoseconds, int64, in the order of the source.
+        numbers: Source row of each time.
+        log: The cleaning log, which describes the place for the message.
         name: Channel name, for the message.
 
     Raises:
-        InputError: If the only steps back are of one hour.
+        InputError: If times step back, and every step back is about one hour.
     """
     steps = np.diff(times)
     usual = np.median(np.abs(steps)) if len(steps) else 0
@@ -209,6 +226,6 @@ def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: Clea
     if len(back) and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
         place = log.place(numbers[back[0] + 1])
         raise InputError(
-            f"Expected times that rise, or their zone. Received: times without a zone, set back by an hour at {place} of {name}, as local clocks "
-            "are. Give timezone (such as 'Europe/Berlin', or 'UTC' to take them as they are)."
+            f"Expected ascending times, or their time zone. Received: times without a zone that step back by one hour at {place} of {name}, "
+            "as local clocks do. Give timezone (such as 'Europe/Berlin', or 'UTC' to take them as they are)."
         )
