@@ -1,4 +1,4 @@
-"""Telemetry: a series with its times and unit, where it is read from and kept, its cleaning, and its windows.
+"""Telemetry: series with times and units, sources and stores, cleaning, and windows.
 
-This package knows nothing of simulators, networks or detectors.
+This package does not depend on simulators, networks or detectors.
 """

@@ -1,7 +1,7 @@
-"""Telemetry at rest: the "storage and retrieval system" of the paper's section 2.
+"""Storage of telemetry: the "storage and retrieval system" of the paper's section 2.
 
-One interface, `TelemetryStore`; a folder of Parquet files is the default behind it. A store keeps values, times,
-unit and name as they are and interprets none of them.
+`TelemetryStore` is the interface of all stores, and `ParquetStore`, a folder of Parquet files, is the default implementation. A
+store keeps values, times, unit and name unchanged.
 """
 
 import os
@@ -21,33 +21,34 @@ _DAY_NS = 86_400 * 10**9
 
 
 class TelemetryStore(Protocol):
-    """What every store does."""
+    """The interface of all stores."""
 
     def write(self, telemetry: Telemetry) -> None:
-        """Keeps the series under its name, in place of what stood there."""
+        """Stores a series under its name. An existing series of that name is replaced."""
 
     def read(self, name: str) -> Telemetry:
-        """The series kept under `name`; `InputError` if there is none."""
+        """Reads the series stored under `name`. Raises an `InputError` if there is none."""
 
     def names(self) -> list[str]:
-        """The names of the series kept here, sorted."""
+        """The sorted names of the stored series."""
 
 
 def write_windows(path: str | os.PathLike, chunks: Iterable[np.ndarray], window: int) -> None:
-    """Writes windows to one Parquet file as they come: column `window`, lists of `window` float32 numbers.
+    """Writes windows chunk by chunk to one Parquet file, with one column `window` of fixed-size float32 lists.
 
-    The file appears when it is complete. Read it with any tool: `np.stack(pandas.read_parquet(path)["window"])`.
+    The file appears under its name when it is complete. Read it, for example, with
+    `np.stack(pandas.read_parquet(path)["window"])`.
 
     Args:
         path: The file.
-        chunks: Windows, float32 arrays of shape `(windows, window)`; each becomes a row group.
-        window: Samples of a window.
+        chunks: Chunks of windows, float32 arrays of shape `(windows, window)`. Each chunk becomes a row group.
+        window: Window length in samples.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     schema = pa.schema([("window", pa.list_(pa.float32(), window))])
-    # the bytes of equal significance side by side: signs and exponents compress, the mantissas' noise does not
+    # stores bytes of equal significance together: signs and exponents compress well, noisy mantissas do not
     options = {"compression": "zstd", "use_dictionary": False, "column_encoding": "BYTE_STREAM_SPLIT", "write_statistics": False}
     make_folder(Path(path).parent)
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
@@ -57,19 +58,26 @@ def write_windows(path: str | os.PathLike, chunks: Iterable[np.ndarray], window:
 
 
 class ParquetStore:
-    """A folder with one folder a channel and in it one Parquet file a day (columns `time` and `value`).
+    """A store with one folder per channel, which holds one Parquet file per day with the columns `time` and `value`.
 
-    Any tool that reads Parquet reads it: `pandas.read_parquet("store/attitude")`.
+    Any tool that reads Parquet can read it, for example `pandas.read_parquet("store/attitude")`.
 
     Args:
-        folder: Where the store lives; made when it does not exist.
+        folder: Folder of the store. It is created by the first `write`.
     """
 
     def __init__(self, folder: str | os.PathLike):
         self.folder = Path(folder)
 
     def write(self, telemetry: Telemetry) -> None:
-        """Keeps the series under its name, in place of what stood there, whole or not at all."""
+        """Stores a series atomically under its name. An existing series of that name is replaced.
+
+        Args:
+            telemetry: The series.
+
+        Raises:
+            InputError: If the series has no name or no samples, or its folder holds other files.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -99,10 +107,16 @@ class ParquetStore:
                 pq.write_table(table.slice(first, stop - first), file, compression="zstd")
 
     def read(self, name: str) -> Telemetry:
-        """The series kept under `name`.
+        """Reads the series stored under `name`.
+
+        Args:
+            name: Name of the series.
+
+        Returns:
+            The series.
 
         Raises:
-            InputError: If there is none, or if samples are missing from it.
+            InputError: If there is no such series, or if samples are missing from it.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -118,7 +132,7 @@ class ParquetStore:
             name, unit, start = about["name"], about["unit"], about["start"]
             interval_s, offset_s = float(about["interval_s"]), float(about["offset_s"])
             if not (len(table) and 0 < interval_s < np.inf and np.isfinite(offset_s)):
-                raise ValueError("an offset or an interval that no series has")
+                raise ValueError("no samples, or an invalid offset or interval")
             values = table["value"].to_numpy().astype(np.float32)
             times = table["time"].cast(pa.int64()).to_numpy()
         except (pa.ArrowException, OSError, KeyError, AttributeError, ValueError) as error:
@@ -128,11 +142,11 @@ class ParquetStore:
         if len(times) > 1 and np.abs(np.diff(times) - interval_s * 1e9).max() > 1e-3 * interval_s * 1e9:
             raise InputError(f"Expected a sample every {interval_s:g} s. Received: a gap in {name!r}. Write the series again.")
         telemetry = Telemetry(values, interval_s, offset_s, start or None, name, unit)
-        nanoseconds(telemetry)  # refuses a start that is none
+        nanoseconds(telemetry)  # raises if the start is not a time
         return telemetry
 
     def names(self) -> list[str]:
-        """The names of the series kept here, sorted."""
+        """The sorted names of the stored series."""
         folders = self.folder.glob("[!.]*") if self.folder.is_dir() else ()
         return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
 

@@ -1,7 +1,6 @@
-"""A telemetry series: values with their time and unit, read from a file, checked, split by time, cut into windows.
+"""The telemetry series, which all other packages work on: values with their times and unit.
 
-Step 4 of the paper's pipeline (the data source) and what every other room works on. It draws no random number
-that its caller does not own, and it never interprets values: a series is what its file says or it is refused.
+This is the data source, step 4 of the paper's pipeline. Values are checked but never changed or interpreted.
 """
 
 import dataclasses
@@ -10,7 +9,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-_MAX_S = 9_223_372_036  # seconds before and after 1970 that nanoseconds in 64 bits reach
+_MAX_S = 9_223_372_036  # largest number of seconds from 1970 that fits into 64-bit nanoseconds
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -19,9 +18,9 @@ class Telemetry:
 
     Args:
         values: float32 array of shape `(samples,)`.
-        interval_s: Sampling interval in seconds (in samples, that is 1, where `has_time` is False).
-        offset_s: Time of the first sample on the clock that all parts of one series share, in seconds.
-        start: ISO 8601 time (UTC) of that clock's zero, or None where the source has no time.
+        interval_s: Sampling interval in seconds. It is 1 (one sample) if `has_time` is False.
+        offset_s: Time of the first sample after `start`, in seconds. All parts of one series share the same `start`.
+        start: Zero of the time axis as ISO 8601 text in UTC, or None if the source has no times.
         name: Channel name.
         unit: Unit of the values.
     """
@@ -38,43 +37,43 @@ class Telemetry:
 
     @property
     def has_time(self) -> bool:
-        """Whether the source said when its samples were taken."""
+        """Whether the source has times."""
         return self.start is not None
 
     @property
     def time_unit(self) -> str:
-        """What the time axis counts: seconds, or samples where the source has no time."""
+        """Unit of the time axis: "s", or "samples" if the source has no times."""
         return "s" if self.has_time else "samples"
 
     @property
     def time_s(self) -> np.ndarray:
-        """Time of each sample on the series' clock, float64 of shape `(samples,)`."""
+        """Time of each sample after `start` in seconds, float64 of shape `(samples,)`."""
         return self.offset_s + self.interval_s * np.arange(len(self))
 
     def part(self, start: int, stop: int) -> "Telemetry":
-        """The samples from `start` to before `stop`, on the same clock."""
+        """The samples from `start` up to, but not including, `stop`, with their times unchanged."""
         return dataclasses.replace(self, values=self.values[start:stop], offset_s=self.offset_s + self.interval_s * start)
 
 
 def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -> np.ndarray:
-    """When each sample was taken.
+    """Computes the time of each sample in integer nanoseconds.
 
     Args:
-        telemetry: The series, or one of another length on its clock.
-        first: The first sample that is asked for.
-        stop: The one behind the last; None: behind the series' last.
+        telemetry: The series.
+        first: First sample to compute.
+        stop: End of the samples to compute (exclusive), which may lie beyond the series. None: the end of the series.
 
     Returns:
-        Nanoseconds since 1970 (UTC), int64 array of shape `(samples,)`; since the clock's zero where the source has no time.
+        Nanoseconds since 1970 in UTC, int64 array of shape `(samples,)`. If the source has no times, nanoseconds since sample 0.
 
     Raises:
-        InputError: If its start is no time, or its samples do not lie from 1678 to 2261, the years that such numbers can hold.
+        InputError: If `start` is not a time, or a sample lies outside the years 1678 to 2261, the range of int64 nanoseconds.
     """
-    import pandas as pd  # it reads every form of ISO 8601, with any zone
+    import pandas as pd  # it parses every form of ISO 8601, with any zone
 
     try:
         text = telemetry.start or "1970-01-01"
-        start = pd.Timestamp(text if text[0].isdigit() else None)  # "now" is no start
+        start = pd.Timestamp(text if text[0].isdigit() else None)  # pandas would accept "now"
         start = start.tz_localize("UTC") if start.tz is None else start.tz_convert("UTC")
         samples = np.arange(first, len(telemetry) if stop is None else stop)
         start_s, since_s = start.timestamp(), telemetry.offset_s + telemetry.interval_s * samples
@@ -88,10 +87,13 @@ def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -
 
 
 def check_telemetry(telemetry: Telemetry) -> None:
-    """Says in one line that something else than a series was given.
+    """Checks the type of an argument.
+
+    Args:
+        telemetry: The argument.
 
     Raises:
-        InputError: If it is no `Telemetry`.
+        InputError: If it is not a `Telemetry`.
     """
     if not isinstance(telemetry, Telemetry):
         raise InputError(
@@ -100,16 +102,19 @@ def check_telemetry(telemetry: Telemetry) -> None:
 
 
 def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndarray:
-    """Returns `values` as a float32 series, or says in one line why it cannot be one.
+    """Checks the values of a series and converts them to float32.
 
     Args:
         values: Array of shape `(samples,)`.
-        what: Where the values come from, for the message.
-        min_samples: Fewest samples that can be used.
+        what: Description of the source, for messages.
+        min_samples: Smallest number of samples allowed.
+
+    Returns:
+        float32 array of shape `(samples,)`.
 
     Raises:
-        InputError: If the values are not numeric (true and false are no numbers), not one-dimensional, empty, NaN, infinite,
-            beyond float32, too short or constant.
+        InputError: If the values are not numeric (booleans do not count as numbers), not one-dimensional, empty, too few,
+            constant, not finite, or beyond the range of float32.
     """
     given = values = np.asarray(values)
     if values.ndim != 1:
@@ -118,7 +123,7 @@ def check_values(values: np.ndarray, what: str, min_samples: int = 2) -> np.ndar
         raise InputError(f"Expected samples. Received: none from {what}. Give a file that holds a series.")
     if values.dtype.kind not in "fiu":
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Name a numeric --column.")
-    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is refused below
+    with np.errstate(over="ignore"):  # values beyond float32 become infinite and are rejected below
         values = values.astype(np.float32)
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad) and np.isfinite(given[bad]).all():

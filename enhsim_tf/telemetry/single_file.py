@@ -15,13 +15,16 @@ if TYPE_CHECKING:
 
 
 def load_array(path: str | os.PathLike) -> np.ndarray:
-    """Reads a `.npy` file of one or two dimensions; nothing in it can run code.
+    """Reads a `.npy` file of one or two dimensions, without pickle, so that its content cannot run code.
 
     Args:
         path: The file.
 
+    Returns:
+        The array.
+
     Raises:
-        InputError: If it cannot be read, or is something else.
+        InputError: If the file cannot be read or is not such an array.
     """
     path = Path(path)
     try:
@@ -41,19 +44,19 @@ def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str
 
     Args:
         path: A `.npy` array of shape `(samples,)` or `(samples, columns)`, a `.csv` or a `.parquet` table.
-        column: Which column holds the values: a number for `.npy`, a name for tables. Needed when there are several.
-        time: Name of a table's time column (date-times or seconds), regularly sampled. None: samples are counted.
-        min_samples: Fewest samples that can be used.
+        column: Column that holds the values: a number for `.npy`, a name for tables. Required if there are several columns.
+        time: Name of a table's time column, with regular date-times or seconds. None: the samples are counted.
+        min_samples: Smallest number of samples allowed.
 
     Returns:
-        The checked `Telemetry`.
+        The telemetry.
 
     Raises:
-        InputError: If the file cannot be read, the column is not there, or the values or times cannot be used.
+        InputError: If the file cannot be read, the column does not exist, or the values or times cannot be used.
     """
     path, column = Path(path), None if column is None else str(column)
     if not _is_file(path):
-        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is no file. Check the path.")
+        raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is not a file. Check the path.")
     readers = {".npy": _read_array, ".csv": _read_table, ".parquet": _read_table}
     if path.suffix.lower() not in readers:
         raise InputError(f"Expected a .npy, .csv or .parquet file. Received: {path.name}. Convert it to one of these.")
@@ -66,14 +69,14 @@ def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name that no file system takes
+    except OSError:  # a name that the file system does not allow
         return False
 
 
 def _read_array(path: Path, column: str | None, time: str | None):
     if time is not None:
         raise InputError(
-            f"Expected --time with a table only. Received: --time {time} with {path.name}, an array has no named columns. Leave it out."
+            f"Expected --time with a table only. Received: --time {time} with the array {path.name}, which has no named columns. Leave it out."
         )
     array = load_array(path)
     if array.ndim == 1 and column is None:
@@ -94,7 +97,7 @@ def _read_table(path: Path, column: str | None, time: str | None):
 
     try:
         if path.suffix.lower() == ".csv":
-            header = pd.read_csv(path, header=None, nrows=1, dtype=str, keep_default_na=False)  # before pandas makes names differ
+            header = pd.read_csv(path, header=None, nrows=1, dtype=str, keep_default_na=False)  # since pandas renames repeated columns
             table, names = pd.read_csv(path), header.iloc[0].tolist()
         else:
             check_parquet(path)
@@ -139,12 +142,12 @@ def _regular_interval(times: "pd.Series", what: str) -> tuple[float, str]:
     if interval <= 0 or uneven.any():
         where = _first(uneven if interval > 0 else steps <= 0)
         raise InputError(
-            f"Expected regular, rising times. Received: steps from {steps.min(initial=interval):g} s to {steps.max(initial=interval):g} s "
+            f"Expected regular, ascending times. Received: steps from {steps.min(initial=interval):g} s to {steps.max(initial=interval):g} s "
             f"in {what}, the first bad one before sample {where + 1}. Resample it first."
         )
     return interval, stamps.iloc[0].isoformat()
 
 
 def _first(marks: "pd.Series | np.ndarray") -> int:
-    """Number of the first mark that is set; 0 where none is."""
+    """Index of the first True, or 0 if there is none."""
     return int(np.argmax(np.asarray(marks, bool)))

@@ -1,7 +1,7 @@
-"""Telemetry of one's own from any source: tables, arrays, a store's folder, InfluxDB; as raw pandas Series by channel.
+"""Reads telemetry from tables, arrays, the folder of a store, or InfluxDB, as one raw pandas Series per channel.
 
-Values stay as the source has them, dirty or not, and times are read but neither sorted nor dropped: that is `cleaning`'s
-business. What reading itself noticed stands in `series.attrs["findings"]` and becomes part of the cleaning report.
+Values are returned as they are in the source, and times are parsed but neither sorted nor dropped; that is done by `cleaning`.
+Findings made while reading are stored in `series.attrs["findings"]` and become part of the cleaning report.
 """
 
 import os
@@ -33,18 +33,18 @@ def read_source(
     Args:
         source: A `.csv`, `.parquet` or `.npy` file, the folder of a `ParquetStore`, `folder#channel`, or
             `influxdb://bucket/measurement/field?tag=value`.
-        columns: Which channels: columns of a table, column numbers of an array, series of a store. None: all that hold
-            numbers.
-        time: Name of a table's time column. None: the one that holds times, if there is one. `NO_TIME` ("none"): samples
+        columns: Names of the channels: columns of a table, column numbers of an array, or series of a store. None: all
+            channels that hold numbers.
+        time: Name of a table's time column. None: the column is detected, if there is one. `NO_TIME` ("none"): the samples
             are counted.
-        options: How times are read (`time_unit`, `time_format`, `on_bad_times`); the rest is for `clean`.
+        options: Options for parsing times: `time_unit`, `time_format` and `on_bad_times`. Other options are ignored here.
 
     Returns:
-        Raw channels by name, in the order of the source: with a `DatetimeIndex` where there is time (NaT where it is
-        missing), with a `RangeIndex` where samples are counted. `series.attrs` holds the unit, where it is known.
+        Raw channels by name, in the order of the source. A channel with times has a `DatetimeIndex`, with NaT where a time is
+        missing; a channel without times has a `RangeIndex`. `series.attrs["unit"]` holds the unit, if it is known.
 
     Raises:
-        InputError: If the source cannot be read, or a column is not there.
+        InputError: If the source cannot be read, or a column does not exist.
     """
     source, options = os.fspath(source), options or Cleaning()
     if isinstance(columns, str):
@@ -73,12 +73,12 @@ def read_source(
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except (OSError, ValueError):  # a name that no file system takes
+    except (OSError, ValueError):  # a name that the file system does not allow
         return False
 
 
 def _read_influx(source: str, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:
-    """Series that an `InfluxStore` wrote there, or the one that somebody else did, by its field."""
+    """Reads the series written by an `InfluxStore`, or otherwise the one series at the address, named after its field."""
     from enhsim_tf.telemetry.influx_store import InfluxStore  # the client is an optional extra
 
     if time is not None:
@@ -163,7 +163,15 @@ def _read_table(path: Path, columns: list[str] | None, time: str | None, options
 
 
 def to_series(telemetry: Telemetry) -> pd.Series:
-    """A pandas Series of telemetry: a `DatetimeIndex` in UTC where there is time, a `RangeIndex` of samples where not."""
+    """Converts telemetry to a pandas Series.
+
+    Args:
+        telemetry: The telemetry.
+
+    Returns:
+        The series, with a `DatetimeIndex` in UTC, or with a `RangeIndex` of sample numbers if the telemetry has no times. The
+        unit is in `series.attrs["unit"]`.
+    """
     check_telemetry(telemetry)
     if telemetry.has_time:
         index = pd.DatetimeIndex(nanoseconds(telemetry).astype("datetime64[ns]"), tz="UTC", name="time")
@@ -176,14 +184,17 @@ def to_series(telemetry: Telemetry) -> pd.Series:
 
 
 def from_series(series: pd.Series, unit: str | None = None) -> Telemetry:
-    """Telemetry of a regular pandas Series; one that needs repairs is refused.
+    """Converts a regular pandas Series to telemetry.
 
     Args:
-        series: Numbers, with a regular `DatetimeIndex` or a `RangeIndex`.
-        unit: Unit of the values; None: `series.attrs["unit"]`, or "1".
+        series: Numbers with a regular `DatetimeIndex` or a `RangeIndex`.
+        unit: Unit of the values. None: `series.attrs["unit"]`, or "1".
+
+    Returns:
+        The telemetry.
 
     Raises:
-        InputError: If the series is not regular as it is. `clean` makes it so.
+        InputError: If the series would need repairs. Use `clean` for such a series.
     """
     cleaned = clean(series, Cleaning(max_fill=0, min_part=1, same_time="refuse"))
     touched = [finding for finding in cleaned.report.findings if finding.action != "accepted"]

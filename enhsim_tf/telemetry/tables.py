@@ -1,6 +1,6 @@
-"""Tables as people keep them: CSV in any dialect, Parquet; their time column and their columns of numbers.
+"""Reads tables, as CSV in common dialects or Parquet, and finds their time column and numeric columns.
 
-Every line is a row: blank ones are kept as missing values. A line that does not fit the header is refused.
+Every line of a text file is a row. Blank lines are kept as missing values, and a line that does not match the header is an error.
 """
 
 import io
@@ -16,21 +16,24 @@ from enhsim_tf.common.size_limits import MAX_COLUMNS, READ_ERRORS, check_parquet
 from enhsim_tf.telemetry.cleaning.numbers import is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import Finding
 
-NO_TIME = "none"  # in place of a time column's name: samples are counted
+NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIME_NAMES = ("time", "times", "timestamp", "datetime", "date", "date_time", "utc", "_time", "t", "epoch", "time_s", "time_ms")
-_SEPARATORS = ";\t|,"  # the comma last: it may part decimals
-_HEAD = 100_000  # characters in which the header is looked for
-_LOOK = 200  # rows that are looked at to tell what a column of text holds
+_SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal separator
+_HEAD = 100_000  # number of characters that are searched for the header
+_LOOK = 200  # number of rows that are inspected to infer what a text column holds
 
 
 def read_table(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
-    """A table with text for column names, and what was noticed about it.
+    """Reads a table.
 
     Args:
         path: A `.parquet` file, or a text file with a header line.
 
+    Returns:
+        The table, whose column names are text, and findings for the cleaning log.
+
     Raises:
-        InputError: If it cannot be read, or has no header.
+        InputError: If the table cannot be read or has no header.
     """
     findings: list[Finding] = []
     try:
@@ -45,7 +48,7 @@ def read_table(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
         reason = short_reason(error)
         raise InputError(f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Save it again.") from None
     if not isinstance(table.index, pd.RangeIndex) and (any(table.index.names) or _holds_dates(table.index.to_series())):
-        table = table.reset_index()  # what it is indexed by is a column like the others
+        table = table.reset_index()  # the index becomes an ordinary column
     if table.columns.nlevels > 1:
         raise InputError(f"Expected one line of column names. Received: {table.columns.nlevels} levels in {path.name}. Join them.")
     table.columns = [str(name).strip() for name in table.columns]
@@ -62,11 +65,11 @@ def _read_text(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
         text = content.decode(encoding)
     except UnicodeDecodeError:
         if b"\x00" in content:
-            raise ValueError("it is no text") from None
+            raise ValueError("it is not text") from None
         text, encoding = content.decode("latin-1"), "Latin-1"
         findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Latin-1"))
     if "\x00" in text or not text.strip():
-        raise ValueError("it is no text" if text.strip() else "it is empty")
+        raise ValueError("it is not text" if text.strip() else "it is empty")
     lines = text[:_HEAD].split("\n")
     comments = next((number for number, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
     if comments == len(lines):
@@ -78,7 +81,7 @@ def _read_text(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
         raise ValueError(f"more than {MAX_COLUMNS:,} columns")
     options = {"sep": separator, "skiprows": comments, "index_col": False, "skip_blank_lines": False, "low_memory": False}
     with warnings.catch_warnings():
-        warnings.simplefilter("error", pd.errors.ParserWarning)  # lines longer than the header would lose their ends
+        warnings.simplefilter("error", pd.errors.ParserWarning)  # otherwise lines longer than the header are cut
         names = pd.read_csv(io.StringIO(text), header=None, nrows=1, dtype=str, keep_default_na=False, **options).iloc[0].str.strip()
         table = pd.read_csv(io.StringIO(text), **options)
     if not parse_numbers(names, path.name, drop=True)[1].any():
@@ -86,12 +89,12 @@ def _read_text(path: Path) -> tuple[pd.DataFrame, list[Finding]]:
             f"Expected a header line with the columns' names. Received: {', '.join(names[:4])} in {path.name}. Add a line of names on top."
         )
     unnamed = [f"column {number}" if name == "" else name for number, name in enumerate(names)]
-    table.columns = unnamed  # as they stand in the file: pandas makes names that stand twice differ
+    table.columns = unnamed  # the names of the file, since pandas renames repeated ones
     return table, findings
 
 
 def _separator(lines: list[str]) -> str:
-    """The separator that the first lines have equally often, and most often."""
+    """The separator that occurs equally often in each of the first lines, and most often among such separators."""
     counts = {mark: {line.count(mark) for line in lines if line.strip()} for mark in _SEPARATORS}
     equal = {mark: min(count) for mark, count in counts.items() if len(count) == 1}
     best = max(equal, key=equal.get, default=",")
@@ -101,11 +104,14 @@ def _separator(lines: list[str]) -> str:
 
 
 def time_column(table: pd.DataFrame, what: str) -> str | None:
-    """Name of the column that holds times, or None.
+    """Finds the column that holds times.
 
     Args:
         table: The table.
-        what: Where it comes from, for the message.
+        what: Description of the source, for messages.
+
+    Returns:
+        Name of the column, or None if there is none.
 
     Raises:
         InputError: If several columns hold times.
@@ -130,13 +136,20 @@ def _holds_dates(values: pd.Series) -> bool:
         return False
     cells = values.astype(object)
     given = cells[~is_missing(cells)].iloc[:_LOOK]
-    if not len(given) or not parse_numbers(given, "", drop=True)[1].all():  # a number is no date
+    if not len(given) or not parse_numbers(given, "", drop=True)[1].all():  # a column with numbers is not a date column
         return False
     return bool(pd.to_datetime(given.astype(str), format="ISO8601", utc=True, errors="coerce").notna().mean() > 0.5)
 
 
 def numeric_columns(table: pd.DataFrame) -> tuple[list[str], list[str]]:
-    """Columns that hold numbers, be it as text and among other words, and the names of the others."""
+    """Splits the columns of a table into numeric and other columns. Text columns that hold at least some numbers are numeric.
+
+    Args:
+        table: The table.
+
+    Returns:
+        Names of the numeric columns, and names of the others.
+    """
     numeric, others = [], []
     for name in table.columns:
         values = table[name]
@@ -145,7 +158,7 @@ def numeric_columns(table: pd.DataFrame) -> tuple[list[str], list[str]]:
             parsed, _, _ = parse_numbers(cells[~is_missing(cells)].iloc[:_LOOK], str(name), drop=True)
             is_number = bool(np.isfinite(parsed).any())
         elif name == "column 0" and np.array_equal(values, np.arange(len(values))):
-            is_number = False  # the row numbers that pandas writes without a name
+            is_number = False  # unnamed row numbers, as pandas writes them
         else:
             is_number = pd.api.types.is_numeric_dtype(values.dtype) and not pd.api.types.is_bool_dtype(values.dtype)
         (numeric if is_number else others).append(name)

@@ -1,7 +1,7 @@
-"""Labelled telemetry in the layout that telemanom published for SMAP and MSL: `train/`, `test/`, `labeled_anomalies.csv`.
+"""Loads labelled telemetry in the layout of telemanom's SMAP and MSL data: `train/`, `test/` and `labeled_anomalies.csv`.
 
-Each array holds one channel: column 0 is the telemetry value, the others are commands. There are no times: samples are
-counted. The file's anomalous sequences include their ends; here they are half-open.
+Each array holds one channel: column 0 is the telemetry value, and the other columns are commands. There are no times, so
+samples are counted. Anomalous sequences include their last sample in the file; here they are half-open ranges.
 """
 
 import ast
@@ -18,18 +18,18 @@ from enhsim_tf.common.size_limits import load_npy
 from enhsim_tf.telemetry.series import Telemetry
 
 LABELS = "labeled_anomalies.csv"
-_COLUMNS = ("chan_id", "anomaly_sequences")  # those without which nothing can be loaded
+_COLUMNS = ("chan_id", "anomaly_sequences")  # required columns
 
 
 @dataclasses.dataclass(frozen=True)
 class Labels:
-    """What the label file says of one channel.
+    """The labels of one channel.
 
     Args:
-        channel: Its name.
-        sequences: Anomalous samples of the test part, half-open ranges in the order of time that do not overlap.
-        classes: Class of each sequence, such as "point" or "contextual"; "" where the file has none.
-        spacecraft: Whose channel it is; "" where the file does not say.
+        channel: Name of the channel.
+        sequences: Anomalous samples of the test part, as half-open ranges in chronological order that do not overlap.
+        classes: Class of each sequence, such as "point" or "contextual", or "" if the file has no classes.
+        spacecraft: Name of the spacecraft, or "" if the file does not name it.
     """
 
     channel: str
@@ -43,9 +43,9 @@ class LabelledChannel:
     """One channel with its labels.
 
     Args:
-        labels: What the label file says of it; sequences that reach beyond the test part end with it.
+        labels: The labels of the channel. Sequences that reach beyond the test part are cut at its end.
         train: Nominal telemetry.
-        test: Telemetry that holds the labelled sequences, on a clock of its own.
+        test: Telemetry with the labelled sequences. Its samples are counted from 0 again.
         train_commands: float32 array of shape `(samples, commands)`.
         test_commands: float32 array of shape `(samples, commands)`.
     """
@@ -58,7 +58,7 @@ class LabelledChannel:
 
     @property
     def is_anomalous(self) -> np.ndarray:
-        """Marks of the labelled samples of the test part, bool of shape `(samples,)`."""
+        """Mask of the anomalous samples of the test part, bool of shape `(samples,)`."""
         marks = np.zeros(len(self.test), bool)
         for start, stop in self.labels.sequences:
             marks[start:stop] = True
@@ -66,22 +66,22 @@ class LabelledChannel:
 
 
 def is_labelled(folder: str | os.PathLike) -> bool:
-    """Whether a folder has this layout."""
+    """Whether a folder holds a label file of this layout."""
     return (Path(folder) / LABELS).is_file()
 
 
 def read_labels(folder: str | os.PathLike, spacecraft: str | None = None) -> dict[str, Labels]:
-    """Reads the label file; a channel that stands in it more than once gets all its sequences, joined where they overlap.
+    """Reads the label file. If a channel has several rows, their sequences are combined, and overlapping sequences are joined.
 
     Args:
         folder: The folder with `labeled_anomalies.csv`.
-        spacecraft: Only channels of this one, such as "SMAP" or "MSL". None: all.
+        spacecraft: Name of a spacecraft, such as "SMAP" or "MSL", whose channels are selected. None: all channels.
 
     Returns:
         Labels by channel, in the order of the file.
 
     Raises:
-        InputError: If the file is missing or a row cannot be read, which is named.
+        InputError: If the file is missing or a row cannot be read. The message names the row.
     """
     path = Path(folder) / LABELS
     try:
@@ -140,7 +140,7 @@ def _sequences_of(row: dict[str, str], where: str) -> list[tuple[tuple[int, int]
 
 
 def _joined(sequences: list[tuple[tuple[int, int], str]]) -> tuple[tuple[tuple[int, int], ...], tuple[str, ...]]:
-    """Sequences in the order of time, those that overlap as one, of the first one's class."""
+    """Sorts sequences by time and joins overlapping ones, which get the class of the first."""
     joined: list[tuple[tuple[int, int], str]] = []
     for (start, stop), name in sorted(sequences, key=lambda sequence: sequence[0]):
         if joined and start < joined[-1][0][1]:
@@ -156,10 +156,13 @@ def load_channel(folder: str | os.PathLike, channel: str) -> LabelledChannel:
 
     Args:
         folder: The folder with `train/`, `test/` and `labeled_anomalies.csv`.
-        channel: Its name.
+        channel: Name of the channel.
+
+    Returns:
+        The channel.
 
     Raises:
-        InputError: If it is not labelled, an array is missing or cannot be used, or a label lies beyond the test part.
+        InputError: If the channel has no labels, an array is missing or cannot be used, or a label lies beyond the test part.
     """
     labels = read_labels(folder)
     if channel not in labels:
@@ -170,15 +173,18 @@ def load_channel(folder: str | os.PathLike, channel: str) -> LabelledChannel:
 def load_labelled(
     folder: str | os.PathLike, channels: Sequence[str] | None = None, spacecraft: str | None = None
 ) -> Iterator[LabelledChannel]:
-    """Loads labelled channels in turn, in the order of the label file.
+    """Loads labelled channels one after another, in the order of the label file.
 
     Args:
         folder: The folder with `train/`, `test/` and `labeled_anomalies.csv`.
-        channels: Their names. None: all.
-        spacecraft: Only channels of this one. None: of all.
+        channels: Names of the channels. None: all.
+        spacecraft: Name of a spacecraft whose channels are selected. None: all.
+
+    Returns:
+        Iterator over the channels, each of which is loaded when it is requested.
 
     Raises:
-        InputError: As `load_channel`; unknown names at once, a bad array when its turn comes.
+        InputError: As for `load_channel`. Unknown names raise at once, a bad array when its channel is requested.
     """
     labels = read_labels(folder, spacecraft)
     unknown = [channel for channel in channels or () if channel not in labels]

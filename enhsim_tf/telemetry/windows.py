@@ -1,4 +1,4 @@
-"""Windows of a series: splits by time, offsets, and the windows that begin there."""
+"""Windows of a series: splitting by time, window offsets, and cutting windows."""
 
 from collections.abc import Sequence
 
@@ -9,12 +9,18 @@ from enhsim_tf.telemetry.series import Telemetry
 
 
 def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) -> list[Telemetry]:
-    """Splits a series into consecutive parts with a gap between them, so that no window of one part touches another.
+    """Splits a series into consecutive parts with gaps between them, so that windows of different parts do not overlap.
 
     Args:
         telemetry: The series.
-        fractions: Share of each part; they add up to 1.
-        gap: Samples left out between two parts, at least a window.
+        fractions: Fraction of the samples in each part. They add up to 1.
+        gap: Number of samples left out between two parts, at least one window.
+
+    Returns:
+        The parts in chronological order.
+
+    Raises:
+        InputError: If the fractions are not positive or do not add up to 1, or the series is too short.
     """
     if abs(sum(fractions) - 1) > 1e-9 or min(fractions) <= 0:
         raise InputError(f"Expected positive fractions that add up to 1. Received: fractions={tuple(fractions)}. Correct them.")
@@ -29,13 +35,13 @@ def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) ->
 
 
 def random_offsets(num_samples: int, window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
-    """First samples of windows "whose beginning and end are offset by a random amount" (paper, section 2.2).
+    """Draws random window offsets: windows "whose beginning and end are offset by a random amount" (paper, section 2.2).
 
     Args:
         num_samples: Length of the series.
-        window: Samples of a window.
+        window: Window length in samples.
         num_windows: Number of windows.
-        rng: Draws the offsets.
+        rng: Random number generator.
 
     Returns:
         Integer array of shape `(num_windows,)`.
@@ -49,16 +55,24 @@ def random_offsets(num_samples: int, window: int, num_windows: int, rng: np.rand
 
 
 def disjoint_offsets(num_samples: int, window: int) -> np.ndarray:
-    """First samples of windows that share no sample: the independent units of a test."""
+    """Offsets of consecutive windows that do not overlap, which are used as the independent units of statistical tests.
+
+    Args:
+        num_samples: Length of the series.
+        window: Window length in samples.
+
+    Returns:
+        Integer array of shape `(windows,)`.
+    """
     return np.arange(num_samples // window) * window
 
 
 def even_offsets(num_samples: int, window: int, num_windows: int) -> np.ndarray:
-    """First samples of windows spread evenly over a series, in the order of time.
+    """Offsets of windows that are spread evenly over a series, in chronological order.
 
     Args:
         num_samples: Length of the series.
-        window: Samples of a window.
+        window: Window length in samples.
         num_windows: Number of windows.
 
     Returns:
@@ -73,9 +87,9 @@ def cut_windows(values: np.ndarray, offsets: np.ndarray, window: int) -> np.ndar
     Args:
         values: Series of shape `(samples,)`.
         offsets: First sample of each window, shape `(windows,)`.
-        window: Samples of a window.
+        window: Window length in samples.
 
     Returns:
-        Array of shape `(windows, window)`, of the type of `values`.
+        Array of shape `(windows, window)` with the dtype of `values`.
     """
     return np.lib.stride_tricks.sliding_window_view(values, window)[offsets]
