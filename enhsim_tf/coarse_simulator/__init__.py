@@ -1,4 +1,4 @@
-"""The coarse simulator (section 2.1): square waves, their fit to telemetry, and degraded modes.
+"""The coarse simulator (section 2.1 of the paper): square waves, their fit to telemetry, and degraded modes.
 
-This package knows telemetry, and nothing of networks, noise or detectors.
+This package depends on telemetry, but not on networks, noise or detectors.
 """

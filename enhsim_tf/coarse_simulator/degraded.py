@@ -1,4 +1,4 @@
-"""Degraded modes of the coarse simulator (sections 1 and 3): what is simulated when a component fails or ages."""
+"""Degraded modes of the coarse simulator (sections 1 and 3 of the paper): simulates components that fail or age."""
 
 import dataclasses
 from collections.abc import Callable
@@ -8,32 +8,32 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 
 MODES = {
-    "stuck": "the mechanism stands still from the onset, for the share `severity` of the time that is left",
-    "drift": "a ramp is added that reaches `severity` times the span of the levels at the end",
-    "gain_loss": "the amplitude about the middle level falls to 1 - `severity` of itself",
-    "friction": "motion comes late by a random lag of up to `severity` times a quarter of the shortest period",
-    "dropout": "runs of 10 samples, half of all at severity 1, read the lowest level",
-    "period_change": "every period grows to 1 + `severity` times itself",
+    "stuck": "the mechanism stands still from the onset, for the fraction `severity` of the remaining time",
+    "drift": "adds a ramp that reaches `severity` times the difference between highest and lowest level at the end",
+    "gain_loss": "the amplitude around the middle level is multiplied by 1 - `severity`",
+    "friction": "motion is delayed by a random lag of up to `severity` times a quarter of the shortest period",
+    "dropout": "random runs of 10 samples, half of all runs at severity 1, read the lowest level",
+    "period_change": "every period is multiplied by 1 + `severity`",
 }
 
 
 _DROPOUT_RUN = 10  # samples
 
 
-_NUM_SHIFTS = 100  # tried to each side when a clock is set: steps of half a per cent of a period
+_NUM_SHIFTS = 100  # time shifts tried in each direction by `synchronise`, in steps of 0.5 % of a period
 
 
 @dataclasses.dataclass(frozen=True)
 class Degraded:
-    """A degraded mode of the target vehicle (paper, sections 1 and 3), to be simulated.
+    """A degraded mode of the target vehicle (paper, sections 1 and 3).
 
     Args:
         mode: One of `MODES`: stuck, drift, gain_loss, friction, dropout, period_change.
-        severity: From 0 (nominal to the bit) to 1.
-        onset: When it sets in, as a share of the window or series, from 0 to before 1.
+        severity: Severity from 0 to 1. At 0 the signal is bit-identical to the nominal one.
+        onset: Start of the degradation, as a fraction of the window or series: at least 0 and less than 1.
 
     Raises:
-        InputError: If the mode is unknown or a number is out of its range.
+        InputError: If the mode is unknown or a number is out of range.
     """
 
     mode: str
@@ -44,10 +44,16 @@ class Degraded:
         if self.mode not in MODES:
             raise InputError(f"Expected a mode, one of: {', '.join(MODES)}. Received: mode={self.mode!r}.")
         if not (0 <= self.severity <= 1 and 0 <= self.onset < 1):
-            raise InputError(f"Expected severity from 0 to 1 and onset from 0 to before 1. Received: {self}.")
+            raise InputError(f"Expected 0 <= severity <= 1 and 0 <= onset < 1. Received: {self}.")
 
     def first_sample(self, num_samples: int) -> int:
-        """The sample of a window or series at which it sets in; rounded first, since 0.29 times 100 is 28.999999999999996."""
+        """Sample of a window or series at which the degradation starts.
+
+        The product is rounded before it is truncated, since 0.29 * 100 is 28.999999999999996.
+
+        Args:
+            num_samples: Length of the window or series.
+        """
         return int(round(self.onset * num_samples, 6))
 
 
@@ -59,18 +65,18 @@ def degrade(
     shortest_period_s: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Plays a signal through a degraded mode.
+    """Applies a degraded mode to a signal.
 
-    The mode acts on the signal as a function of time, so the same scenario and the same state of `rng` degrade the
-    coarse simulator and, where it is known in closed form, the true vehicle alike.
+    The signal is given as a function of time. The coarse simulator and, if it is known in closed form, the true vehicle are
+    therefore degraded in the same way by the same scenario and the same state of `rng`.
 
     Args:
-        signal: The nominal signal, from times in seconds to values of the same shape.
-        time_s: Times, shape `(windows, samples)`.
-        scenario: The mode, or None for the nominal signal.
+        signal: The nominal signal, a function from times in seconds to values of the same shape.
+        time_s: Times in seconds, shape `(windows, samples)`.
+        scenario: The degraded mode, or None for the nominal signal.
         levels: Lowest and highest nominal level.
-        shortest_period_s: The shortest period of the signal in seconds.
-        rng: Draws the lags of `friction` and the gaps of `dropout`.
+        shortest_period_s: Shortest period of the signal in seconds.
+        rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
 
     Returns:
         float64 array of shape `(windows, samples)`.
@@ -83,7 +89,7 @@ def degrade(
     time_s, late = time_s.copy(), time_s[:, onset:]
     begin = late[:, :1]
 
-    # what happens to the mechanism: its own time runs differently after the onset
+    # modes of the mechanism change the time at which the signal is evaluated
     if scenario.mode == "stuck":
         until = begin + severity * (late[:, -1:] - begin)
         time_s[:, onset:] = np.where(late <= until, begin, late)
@@ -97,7 +103,7 @@ def degrade(
         time_s[:, onset:] = late - np.stack([np.interp(elapsed, knots, lag) for lag in lags])
     values = signal(time_s)
 
-    # what happens to the reading
+    # modes of the sensor change the values
     after = values[:, onset:]
     if scenario.mode == "drift":
         after += severity * (high - low) * np.linspace(0, 1, after.shape[1])

@@ -1,6 +1,6 @@
-"""The square wave that is in a series: box least squares (Kovacs, Zucker and Mazeh 2002).
+"""Finds the square wave in a series by box least squares (Kovacs, Zucker and Mazeh 2002).
 
-For each trial frequency the series is folded, and the box that explains most variance is read off cumulative sums.
+The series is folded at each trial frequency, and the box that explains the most variance is found from cumulative sums.
 """
 
 import dataclasses
@@ -9,22 +9,22 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-_NUM_BINS = 200  # of a folded period
-_NUM_PEAKS = 12  # of the periodogram, followed up
-_OVERSAMPLING = 4  # of the periodogram
+_NUM_BINS = 200  # bins of a folded period
+_NUM_PEAKS = 12  # highest peaks of the periodogram that are used as trial frequencies
+_OVERSAMPLING = 4  # frequency oversampling of the periodogram
 
 
 @dataclasses.dataclass(frozen=True)
 class Box:
-    """A square wave in units of samples.
+    """A fitted square wave: one box per cycle, in units of samples.
 
     Args:
-        frequency: Cycles a sample.
-        begin: Where in the cycle of sample 0 the box begins, from 0 to 1.
-        duty: Share of the cycle inside the box.
-        low: Mean outside the box.
-        high: Mean inside the box.
-        explained: Variance that the wave explains.
+        frequency: Frequency in cycles per sample.
+        begin: Phase at which the box begins, from 0 to 1, where sample 0 has phase 0.
+        duty: Fraction of the cycle inside the box.
+        low: Mean of the series outside the box.
+        high: Mean of the series inside the box.
+        explained: Variance explained by the wave, in squared units of the series.
     """
 
     frequency: float
@@ -36,30 +36,35 @@ class Box:
 
 
 def fit_box(values: np.ndarray, name: str = "the series") -> Box:
-    """Fits the square wave that explains most of a series in the least-squares sense.
+    """Fits a square wave to a series by least squares.
 
     Args:
         values: Series of shape `(samples,)`.
-        name: What the series is called, for the message.
+        name: Name of the series, for the message.
+
+    Returns:
+        The fitted wave.
 
     Raises:
-        InputError: If nothing periodic is found.
+        InputError: If the series has no period that can be found.
     """
     centred, num_samples = values - values.mean(), len(values)
     index = np.arange(num_samples, dtype=np.float64)
 
-    # trial frequencies: peaks of the periodogram, and their halves and thirds for a wave whose harmonics are stronger
-    # than its fundamental
+    # trial frequencies: peaks of the periodogram, and one half and one third of each, since harmonics may be stronger than the
+    # fundamental
     power = np.abs(np.fft.rfft(centred, _OVERSAMPLING * num_samples)) ** 2
-    power[: 2 * _OVERSAMPLING] = 0  # below two cycles nothing is periodic
+    power[: 2 * _OVERSAMPLING] = 0  # a period must occur at least twice
     peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
     peaks = peaks[np.argsort(power[peaks])[::-1][:_NUM_PEAKS]]
     trials = {peak / (_OVERSAMPLING * num_samples) / divisor for peak in peaks for divisor in (1, 2, 3)}
     trials = sorted(trial for trial in trials if 2 / num_samples <= trial <= 0.25)
     if not trials:
-        raise InputError(f"Expected something periodic, at least two periods of at least four samples. Received: {name}, which is not.")
+        raise InputError(
+            f"Expected something periodic, at least two periods of at least four samples. Received: {name}, in which no period was found."
+        )
 
-    # refine until the last cycle moves by less than a thousandth of a period
+    # refine the frequency until a step moves the last cycle by less than a thousandth of a period
     best = max(trials, key=lambda trial: _best_box(index * trial, centred)[0])
     step = 1 / (_OVERSAMPLING * num_samples)
     while step * num_samples > 1e-3:
@@ -71,7 +76,7 @@ def fit_box(values: np.ndarray, name: str = "the series") -> Box:
 
 
 def _best_box(cycles: np.ndarray, centred: np.ndarray) -> tuple[float, float, float]:
-    """The best high box of a series folded on `cycles`: (variance explained, where it begins, its duty)."""
+    """Finds the best box of the series folded at `cycles`; returns (explained variance, begin, duty) of the box."""
     bins = (np.mod(cycles, 1.0) * _NUM_BINS).astype(np.int64)
     counts = np.bincount(bins, minlength=_NUM_BINS)
     sums = np.bincount(bins, centred, minlength=_NUM_BINS)

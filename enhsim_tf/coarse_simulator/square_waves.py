@@ -1,7 +1,7 @@
-"""The coarse simulator, steps 1 and 2 of the paper's pipeline, and its degraded modes.
+"""The coarse simulator, steps 1 and 2 of the paper's pipeline.
 
-"A square wave can be used for nearly any periodic waveform" (paper, section 1): the simulator is a sum of square
-waves, configured by hand or fitted to telemetry. It needs no network and knows none.
+"A square wave can be used for nearly any periodic waveform" (paper, section 1): the simulator is a sum of square waves, which
+are configured by hand or fitted to telemetry. It does not use a neural network.
 """
 
 import dataclasses
@@ -17,20 +17,20 @@ from enhsim_tf.telemetry.series import Telemetry, check_telemetry
 
 @dataclasses.dataclass(frozen=True)
 class SquareWave:
-    """One square wave: `high` for the share `duty` of each period, `low` for the rest.
+    """One square wave: `high` for the fraction `duty` of each period, `low` for the rest.
 
-    With more than two levels it becomes the staircase that a quantised sine of the same period, phase and duty makes.
+    With more than two levels, the wave is a quantised sine of the same period, phase and duty.
 
     Args:
         period_s: Period in seconds.
-        phase: Share of a period by which the wave is ahead at time 0, from 0 to 1.
-        duty: Share of each period spent above the middle, between 0 and 1.
+        phase: Phase at time 0 as a fraction of a period, from 0 to 1.
+        duty: Fraction of each period spent above the middle level, between 0 and 1.
         low: Lowest level, in the telemetry's unit.
         high: Highest level, in the telemetry's unit.
         num_levels: Number of levels, at least 2.
 
     Raises:
-        InputError: If an argument is out of its range.
+        InputError: If an argument is out of range.
     """
 
     period_s: float
@@ -46,7 +46,7 @@ class SquareWave:
             raise InputError(f"Expected period_s > 0, 0 < duty < 1, num_levels >= 2 and finite numbers. Received: {self}.")
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
-        """The wave at the given times, float64 of the same shape."""
+        """Evaluates the wave at times in seconds; returns a float64 array of the same shape."""
         cycle = np.mod(np.asarray(time_s, np.float64) / self.period_s + self.phase, 1.0)
         above = cycle < self.duty
         if self.num_levels == 2:
@@ -59,10 +59,13 @@ class SquareWave:
 
 
 class SquareWaveSimulator:
-    """A sum of square waves: the coarse simulator.
+    """The coarse simulator: a sum of square waves.
 
     Args:
-        waves: Its square waves.
+        waves: The square waves, at least one.
+
+    Raises:
+        InputError: If `waves` is empty.
 
     Example:
     >>> orbit = SquareWave(period_s=480, low=-0.5, high=0.5)
@@ -78,7 +81,7 @@ class SquareWaveSimulator:
 
     @property
     def levels(self) -> tuple[float, float]:
-        """Lowest and highest level of the sum."""
+        """Lowest and highest level that the sum can reach."""
         return sum(min(wave.low, wave.high) for wave in self.waves), sum(max(wave.low, wave.high) for wave in self.waves)
 
     @property
@@ -87,7 +90,7 @@ class SquareWaveSimulator:
         return min(wave.period_s for wave in self.waves)
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
-        """The nominal sum at the given times, float64 of the same shape."""
+        """Evaluates the nominal sum at times in seconds; returns a float64 array of the same shape."""
         return sum(wave(time_s) for wave in self.waves)
 
     def simulate(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
@@ -95,8 +98,8 @@ class SquareWaveSimulator:
 
         Args:
             time_s: Times in seconds, shape `(windows, samples)`.
-            scenario: A degraded mode, or None for nominal.
-            rng: Draws what the mode leaves to chance; needed for `friction` and `dropout`.
+            scenario: A degraded mode, or None for nominal behaviour.
+            rng: Random number generator, used by `friction` and `dropout`. None: a generator with seed 0.
 
         Returns:
             float32 array of shape `(windows, samples)`.
@@ -106,19 +109,20 @@ class SquareWaveSimulator:
 
     @classmethod
     def fit(cls, telemetry: Telemetry, max_waves: int = 1, min_explained: float = 0.05, num_levels: int = 2) -> "SquareWaveSimulator":
-        """Fits square waves to telemetry by least squares, one after another, each to what the ones before left.
+        """Fits square waves to telemetry by least squares, one after another, each to the residual of the previous ones.
 
         Args:
             telemetry: The series, at least two periods long.
-            max_waves: Most square waves. One suits most channels; more follow harmonics, not mechanisms.
-            min_explained: A further wave must explain this share of the series' variance.
-            num_levels: Levels of each wave; the search itself uses two.
+            max_waves: Largest number of square waves. One suits most channels; further waves usually fit harmonics rather than
+                further mechanisms.
+            min_explained: Smallest fraction of the series' variance that each wave after the first must explain.
+            num_levels: Number of levels of each wave. The fit itself uses two levels.
 
         Returns:
             The fitted simulator.
 
         Raises:
-            InputError: If it is no telemetry, or nothing periodic is found.
+            InputError: If `telemetry` is not a `Telemetry`, or no period is found.
         """
         check_telemetry(telemetry)
         residual = telemetry.values.astype(np.float64)
@@ -135,20 +139,20 @@ class SquareWaveSimulator:
     @staticmethod
     def _wave_of(box: Box, telemetry: Telemetry) -> SquareWave:
         period_s = telemetry.interval_s / box.frequency
-        phase = np.mod(-box.begin - telemetry.offset_s / period_s, 1.0)  # on the series' own clock
+        phase = np.mod(-box.begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
         return SquareWave(period_s, float(phase), box.duty, box.low, box.high)
 
     def synchronise(self, time_s: np.ndarray, windows: np.ndarray) -> np.ndarray:
-        """Sets the simulator's clock for each window, so that its phase is the window's; nothing else is adapted.
+        """Shifts the simulator's time for each window so that its phase matches the telemetry. Only the time is changed.
 
-        A simulator that runs beside a vehicle is set to the vehicle's clock; one that runs free drifts away from it.
+        A simulator that runs in parallel with a vehicle is synchronised to the vehicle's clock; a free-running one drifts away.
 
         Args:
-            time_s: Times of the windows, shape `(windows, samples)`.
-            windows: The telemetry of those times, same shape.
+            time_s: Times of the windows in seconds, shape `(windows, samples)`.
+            windows: Telemetry at these times, same shape.
 
         Returns:
-            The shifted times at which `simulate` correlates best with each window.
+            Shifted times, same shape, at which the nominal signal correlates best with each window.
         """
         time_s, centred = np.asarray(time_s, np.float64), windows - windows.mean(axis=1, keepdims=True)
         longest_s = max(wave.period_s for wave in self.waves)
@@ -157,16 +161,23 @@ class SquareWaveSimulator:
         return time_s + shifts[np.argmax(agreement, axis=0)][:, None]
 
     def get_config(self) -> dict:
-        """The settings as plain JSON types; `from_config` takes them back."""
+        """The settings as plain JSON types, from which `from_config` restores the simulator."""
         return {"waves": [dataclasses.asdict(wave) for wave in self.waves]}
 
     @classmethod
     def from_config(cls, config: dict) -> "SquareWaveSimulator":
-        """The simulator that `get_config` described."""
+        """Restores a simulator from the output of `get_config`."""
         return cls([SquareWave(**wave) for wave in config["waves"]])
 
 
 def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
-    """`(offset, scale)` that put the coarse simulator's lowest and highest level at -1 and 1."""
+    """Computes the normalisation of a coarse simulator.
+
+    Args:
+        coarse: The simulator.
+
+    Returns:
+        `(offset, scale)`, so that `(values - offset) / scale` maps the lowest level to -1 and the highest to 1.
+    """
     low, high = coarse.levels
     return (low + high) / 2, (high - low) / 2 or 1.0

@@ -120,10 +120,10 @@ MISTAKES = {
     "a harmless tag": ("seed: !!int 3\n", ["tag"]),
     "a date that is none": ("seed: 2001-99-99\n", ["month"]),
     "a number without end": ("seed: " + "9" * 5_000 + "\n", ["Received"]),
-    "a hexadecimal number without end": ("seed: 0x" + "f" * 5_000 + "\n", ["that long"]),
+    "a hexadecimal number without end": ("seed: 0x" + "f" * 5_000 + "\n", ["thousands of digits"]),
     "zero bytes": ("seed: \x00\n", ["mix.yaml"]),
-    "too deep": ("[" * 50, ["deeper"]),
-    "too many": ("[" + "1," * 30_000 + "]", ["more or deeper"]),
+    "too deep": ("[" * 50, ["too deeply nested"]),
+    "too many": ("[" + "1," * 30_000 + "]", ["too many or too deeply nested"]),
 }
 
 
