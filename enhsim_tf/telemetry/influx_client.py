@@ -1,6 +1,7 @@
-"""What is asked of an InfluxDB 2 server, through its official client, and how: what may pass is tried again, the rest is one line.
+"""Requests to an InfluxDB 2 server through its official client.
 
-Knows nothing of telemetry. The token is kept by the client alone: no message, log or copy of these objects holds it.
+Temporary failures are retried; every other failure raises an `InputError` of one line. The module does not depend on telemetry.
+Only the client holds the token: no message, log or pickled copy of these objects contains it.
 """
 
 import contextlib
@@ -20,14 +21,14 @@ from enhsim_tf.common.errors import InputError
 if TYPE_CHECKING:
     from influxdb_client import InfluxDBClient
 
-FIRST_NS, LAST_NS = -9_223_372_036 * 10**9, 2**63 - 2  # the times that InfluxDB holds, nanoseconds since 1970, from a whole second on
+FIRST_NS, LAST_NS = -9_223_372_036 * 10**9, 2**63 - 2  # range of times in InfluxDB, nanoseconds since 1970, starting at a whole second
 VARIABLES = ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG")
 
 _Answer = TypeVar("_Answer")
 _ALL_TIME = "1677-09-21T00:12:44Z", "2262-04-11T23:47:16.854775806Z"
-_BLOCK = 1 << 20  # bytes of an answer that are worked on at once
-_MAY_PASS = (408, 429, 500, 502, 503, 504)  # answers of a server that is busy, or not up yet
-_TIMEOUT_MS = 60_000  # of a request, where INFLUXDB_V2_TIMEOUT says nothing; a disk may be slow
+_BLOCK = 1 << 20  # bytes of a response that are parsed at once
+_MAY_PASS = (408, 429, 500, 502, 503, 504)  # HTTP status codes of a server that is busy or still starting
+_TIMEOUT_MS = 60_000  # timeout of a request if INFLUXDB_V2_TIMEOUT is not set; a disk may be slow
 _NUMERIC = {"double": "float64", "long": "int64", "unsignedLong": "uint64"}
 
 
@@ -36,8 +37,8 @@ class InfluxServer:
 
     Args:
         bucket: Name of the bucket.
-        max_retry_s: How long a server that has answered before may be away until it is given up, in seconds. One that never
-            answered is given up at once.
+        max_retry_s: How long to retry if a server that has answered before stops answering, in seconds. If a server has never
+            answered, there are no retries.
 
     Raises:
         InputError: If a variable is missing or cannot be used, or if the client is not installed.
@@ -47,7 +48,7 @@ class InfluxServer:
         self.bucket, self.max_retry_s = bucket, max_retry_s
         self.url, self.organisation = _variables()
         try:
-            import influxdb_client  # noqa: F401 - only to see whether it is there
+            import influxdb_client  # noqa: F401 - checks that it is installed
         except ImportError:
             raise InputError(
                 "Expected the package influxdb-client. Received: it is not installed. Run python -m pip install influxdb-client."
@@ -56,21 +57,21 @@ class InfluxServer:
         self._has_answered = False
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_opened": None}  # another process opens its own: no token travels
+        return self.__dict__ | {"_opened": None}  # another process opens its own connection, so the token is not pickled
 
     def close(self) -> None:
-        """Closes the connections; the next use opens new ones."""
+        """Closes the connections. The next request opens new ones."""
         if self._opened is not None:
             self._opened.close()
             self._opened = None
 
-    # -- what is asked -------------------------------------------------------------------------------------------------
+    # -- requests ------------------------------------------------------------------------------------------------------
 
     def send(self, lines: str) -> None:
-        """Writes points, once, however often it takes: a point that is already there is the same point.
+        """Writes points. The request can be repeated safely, because writing a point twice stores it once.
 
         Args:
-            lines: Line protocol with times in nanoseconds.
+            lines: Points in line protocol, with times in nanoseconds.
         """
         from influxdb_client.client.write_api import SYNCHRONOUS
 
@@ -78,25 +79,28 @@ class InfluxServer:
         self._repeat(lambda client: client.write_api(SYNCHRONOUS).write(self.bucket, record=record, write_precision="ns"))
 
     def delete(self, predicate: str) -> None:
-        """Deletes the points of all times that a predicate describes."""
+        """Deletes all points that match a predicate, at any time."""
         self._repeat(lambda client: client.delete_api().delete(*_ALL_TIME, predicate, self.bucket, self.organisation))
 
     def ask(self, query: str, limit: int | None = None) -> list[Mapping[str, Any]]:
-        """The rows that a Flux query answers, which are few, or the first `limit` of them."""
+        """Runs a Flux query with a small result; returns its rows, or the first `limit` of them."""
         return self._repeat(lambda client: [record.values for record in itertools.islice(client.query_api().query_stream(query), limit)])
 
     def stream(self, steps: str, start_ns: int, stop_ns: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """The points of one series in the order of time, a block at a time, however many there are.
+        """Streams the points of one series in chronological order, block by block, so that memory does not grow with their number.
 
-        A connection that breaks is opened anew behind the last point.
+        If the connection breaks, the query is repeated from the point after the last one received.
 
         Args:
-            steps: What chooses the series among the points of the bucket: Flux, `|> filter(...)`.
-            start_ns: Nanoseconds since 1970 from which on.
-            stop_ns: Nanoseconds since 1970 before which.
+            steps: Flux that selects the series among the points of the bucket, `|> filter(...)`.
+            start_ns: Start of the time range in nanoseconds since 1970 (inclusive).
+            stop_ns: End of the time range in nanoseconds since 1970 (exclusive).
 
         Yields:
-            Times in nanoseconds since 1970 (int64) and values (float64), of the same length.
+            Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
+
+        Raises:
+            InputError: If the server does not answer, or the connection keeps breaking.
         """
         from influxdb_client import Dialect
         from urllib3.exceptions import HTTPError
@@ -122,19 +126,21 @@ class InfluxServer:
                 return
             time.sleep(0.1)
             if time.monotonic() - moved > self.max_retry_s:
-                raise InputError(f"Expected an answer of {self.url}. Received: a part of it, again and again. See the server's log.")
+                raise InputError(
+                    f"Expected a complete answer of {self.url}. Received: only a part of it, repeatedly. See the server's log."
+                )
 
     def points(self, start_ns: int = FIRST_NS, stop_ns: int = LAST_NS) -> str:
-        """The Flux for all points of the bucket from one time to before another."""
+        """The Flux expression for all points of the bucket from `start_ns` (inclusive) to `stop_ns` (exclusive)."""
         return f"from(bucket: {quote(self.bucket)}) |> range(start: time(v: {start_ns}), stop: time(v: {stop_ns}))"
 
-    # -- how it is asked -----------------------------------------------------------------------------------------------
+    # -- connection and retries ----------------------------------------------------------------------------------------
 
     def _client(self) -> "InfluxDBClient":
         if self._opened is None:
             from influxdb_client import InfluxDBClient
 
-            _variables()  # they may have changed since
+            _variables()  # check again: they may have changed
             try:
                 self._opened = InfluxDBClient.from_env_properties()
             except ValueError:
@@ -148,7 +154,7 @@ class InfluxServer:
         return self._opened
 
     def _repeat(self, request: Callable[["InfluxDBClient"], _Answer]) -> _Answer:
-        """Does a request until it is answered, or says in one line why it will not be."""
+        """Repeats a request until it succeeds; raises an `InputError` if it cannot succeed or takes longer than `max_retry_s`."""
         from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
         from influxdb_client.rest import ApiException
         from urllib3.exceptions import HTTPError
@@ -166,7 +172,9 @@ class InfluxServer:
                 self._has_answered = True
                 return answer
             if is_final or not self._has_answered or time.monotonic() - began + pause_s > self.max_retry_s:
-                raise InputError(words)  # here, where no other error is at hand: the client's own may hold more than is to be shown
+                raise InputError(
+                    words
+                )  # raised outside the except block: the client's own error, which may contain the token, is not chained
             time.sleep(pause_s)
             pause_s = min(2 * pause_s, 5.0)
 
@@ -197,7 +205,7 @@ class InfluxServer:
 
 
 def _variables() -> tuple[str, str]:
-    """Address and organisation, once all that the client reads can be used: its own errors would show the token."""
+    """Checks the environment variables that the client reads, whose own errors would show the token; returns URL and organisation."""
     missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
     if missing:
         raise InputError(f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them.")
@@ -217,17 +225,17 @@ def _variables() -> tuple[str, str]:
 
 
 def quote(text: str) -> str:
-    """A text as a Flux string: what could end it, or begin an expression in it, is written as a number."""
+    """Quotes a text as a Flux string. Characters that could end it or start an interpolated expression are escaped as hex codes."""
     return '"' + re.sub(r'[\\"$\x00-\x1f\x7f]', lambda found: f"\\x{ord(found[0]):02x}", text) + '"'
 
 
 def escape(text: str, characters: str = ",= ") -> str:
-    """A name in line protocol, with a backslash before what would end it."""
+    """Escapes a name for line protocol with backslashes before `characters`."""
     return re.sub(f"[{characters}]", lambda found: f"\\{found[0]}", text)
 
 
 def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Times and values from an answer in annotated CSV, as much at once as a block of it holds."""
+    """Parses a response in annotated CSV block by block; yields times and values."""
     left, kind = b"", None
     while True:
         data = answer.read(_BLOCK)
@@ -236,20 +244,20 @@ def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         block, left = block[:cut], block[cut:]
         if left and not data:
             raise ConnectionError("the answer ends within a line")
-        if kind is None and block.strip() and (block.count(b"\n") < 2 and data):  # not all of the head yet
+        if kind is None and block.strip() and (block.count(b"\n") < 2 and data):  # the header is not complete yet
             left = block + left
             continue
         try:
             if kind is None and block.strip():
                 head, kind, block = _head(block)
-            if block.startswith(b"#") or b"\n#" in block:  # a table of its own, behind the points that were found before
+            if block.startswith(b"#") or b"\n#" in block:  # an error, which InfluxDB appends as a second table after the points
                 said = (block + left + answer.read(_BLOCK)).split(b"reference", 1)[-1]
                 said = " ".join(said.decode(errors="replace").split()).strip(" ,")
-                raise InputError(f"Expected the points of a series. Received: an error of InfluxDB behind some: {said[:300]}.")
+                raise InputError(f"Expected the points of a series. Received: some points and then an error of InfluxDB: {said[:300]}.")
             found = _parse(block, head, kind) if block.strip() else None
         except InputError:
             raise
-        except (ValueError, KeyError, TypeError) as error:  # Arrow's errors among them
+        except (ValueError, KeyError, TypeError) as error:  # includes Arrow's errors
             reason = " ".join(str(error).split())[:120]
             raise InputError(
                 f"Expected points as InfluxDB writes them. Received: another answer ({reason}). See the server's log."
@@ -261,7 +269,7 @@ def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def _head(block: bytes) -> tuple[list[str], str, bytes]:
-    """Names of the columns, the type of the values, and the rows behind them."""
+    """Parses the header of a response: the names of the columns, the type of the values, and the remaining bytes."""
     kinds, names, rows = block.split(b"\n", 2)
     kinds, names = (line.decode().strip().split(",") for line in (kinds, names))
     kind = dict(zip(names, kinds, strict=False)).get("_value", "none")
@@ -274,7 +282,7 @@ def _parse(block: bytes, names: list[str], kind: str) -> tuple[np.ndarray, np.nd
     import pyarrow as pa
     import pyarrow.csv
 
-    # not through the client's own parser: it cuts times to microseconds
+    # the client's own parser would truncate times to microseconds
     types = {"_time": pa.timestamp("ns", "UTC"), "_value": pa.type_for_alias(_NUMERIC[kind])}
     table = pyarrow.csv.read_csv(
         io.BytesIO(block),

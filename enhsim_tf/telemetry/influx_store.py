@@ -1,8 +1,8 @@
-"""Telemetry at rest in InfluxDB 2, behind the interface of `store`: the database that the paper's pipeline ends in.
+"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline. Implements `TelemetryStore`.
 
-Every series is written under a version, the hash of its content, and a description written last makes that version the
-series. So what is interrupted is never half a series, what is written twice is there once, and the old stands until the new
-is whole. The series of others are read as they are stored.
+Each series is written under a version tag, the hash of its content. A description that is written last makes this version the
+current one. An interrupted write therefore never leaves a partial series, a repeated write stores the series once, and the old
+version remains valid until the new one is complete. Series written by other programs are read as they are stored.
 """
 
 import dataclasses
@@ -20,22 +20,22 @@ from enhsim_tf.telemetry.influx_client import FIRST_NS, LAST_NS, InfluxServer, e
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 
 SCHEME = "influxdb://"
-_ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions stand in the year 2100, where no bucket's retention ends
-_CHANNEL, _VERSION = "channel", "version"  # the tags of a series of ours
+_ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions have a time in the year 2100, beyond any retention period
+_CHANNEL, _VERSION = "channel", "version"  # tags of the series written by this class
 _IS_VERSION = re.compile(r"[0-9a-f]{16}")
 _DESCRIBED = [field.name for field in dataclasses.fields(Telemetry) if field.name != "values"]
-_SHOWN = 8  # names that a message lists
+_SHOWN = 8  # number of names listed in a message
 
 
 @dataclasses.dataclass(frozen=True)
 class InfluxLocation:
-    """Where a series, or a store of several, lives in InfluxDB.
+    """Location of a series, or of a store with several series, in InfluxDB.
 
     Args:
         bucket: Name of the bucket.
         measurement: Name of the measurement.
         field: Name of the field.
-        tags: Pairs of tag and value that its points carry.
+        tags: Pairs of tag and value that all points of the location have.
     """
 
     bucket: str
@@ -50,10 +50,16 @@ class InfluxLocation:
 
 
 def parse_location(text: str) -> InfluxLocation:
-    """Reads `influxdb://bucket/measurement/field?tag=value&...`, with `/`, `?`, `&`, `=` and `%` percent-encoded in names.
+    """Parses `influxdb://bucket/measurement/field?tag=value&...`, with `/`, `?`, `&`, `=` and `%` percent-encoded in names.
+
+    Args:
+        text: The location as text.
+
+    Returns:
+        The location.
 
     Raises:
-        InputError: If a part is missing or it is no such location.
+        InputError: If the text does not have this form.
     """
 
     def refuse(why: str) -> NoReturn:
@@ -87,16 +93,17 @@ def parse_location(text: str) -> InfluxLocation:
 
 
 class InfluxStore:
-    """Series of one measurement and field of InfluxDB 2, told apart by the tag `channel`.
+    """A store in one measurement and field of InfluxDB 2. The tag `channel` distinguishes its series.
 
-    The server is the one that the official client's variables name: `INFLUXDB_V2_URL`, `INFLUXDB_V2_TOKEN`, `INFLUXDB_V2_ORG`; its
-    further ones (`INFLUXDB_V2_TIMEOUT`, `INFLUXDB_V2_SSL_CA_CERT` and so on) hold too. Values are finite, times whole nanoseconds.
-    One process at a time writes a series.
+    The server is set by the environment variables of the official client: `INFLUXDB_V2_URL`, `INFLUXDB_V2_TOKEN` and
+    `INFLUXDB_V2_ORG`, and optional ones such as `INFLUXDB_V2_TIMEOUT` and `INFLUXDB_V2_SSL_CA_CERT`. Values must be finite, and
+    times are whole nanoseconds. Only one process at a time may write a series.
 
     Args:
-        location: Where, as `influxdb://bucket/measurement/field?tag=value` or an `InfluxLocation`; each point gets its tags.
-        batch_size: Points sent at once.
-        max_retry_s: How long a server that has answered before may be away until it is given up, in seconds.
+        location: The location, as `influxdb://bucket/measurement/field?tag=value` or as an `InfluxLocation`. Every point gets its
+            tags.
+        batch_size: Number of points in one request.
+        max_retry_s: How long to retry if a server that has answered before stops answering, in seconds.
 
     Raises:
         InputError: If the location or a variable cannot be used, or if the client is not installed.
@@ -112,14 +119,17 @@ class InfluxStore:
     def __repr__(self) -> str:
         return f"InfluxStore({str(self.location)!r})"
 
-    # -- the interface of every store ----------------------------------------------------------------------------------
+    # -- the interface of all stores -----------------------------------------------------------------------------------
 
     def write(self, telemetry: Telemetry) -> None:
-        """Keeps the series under its name, in place of what stood there, whole or not at all.
+        """Stores a series atomically under its name. An existing series of that name is replaced.
+
+        Args:
+            telemetry: The series.
 
         Raises:
-            InputError: If it has no name or no samples, values that are not finite, or times that nanoseconds do not tell apart,
-                or if the server cannot take it.
+            InputError: If the series has no name, no samples, values that are not finite, or samples less than a nanosecond apart,
+                or if the server does not accept it.
         """
         times, values = _points(telemetry)
         self._check_names(telemetry.name)
@@ -127,7 +137,7 @@ class InfluxStore:
         tags = dict(self.location.tags) | {_CHANNEL: _as_tag(telemetry.name), _VERSION: version}
         begin = f"{escape(self.location.measurement, ', ')}{_tag_set(tags)} {escape(self.location.field)}="
         for first in range(0, len(values), self.batch_size):
-            # the float64 of a float32 is exact, and so is its shortest decimal form
+            # float32 to float64 is exact, and so is the shortest decimal form of the float64
             batch = zip(*(array[first : first + self.batch_size].tolist() for array in (values, times)), strict=True)
             self.server.send("\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch]))
         text = about.replace("\\", "\\\\").replace('"', '\\"')
@@ -135,22 +145,28 @@ class InfluxStore:
         self.server.send(f'{_ABOUT}{_tag_set(key)} about="{text}" {_ABOUT_NS}')
         rows = self.server.ask(f"{self.server.points()} {self._filter({_CHANNEL: tags[_CHANNEL]})} |> first()")
         for old in {row[_VERSION] for row in rows if _VERSION in row and _tags_of(row) == tags | {_VERSION: row[_VERSION]}} - {version}:
-            if _IS_VERSION.fullmatch(old):  # not the tag of somebody else that happens to have this name
+            if _IS_VERSION.fullmatch(old):  # otherwise it is a tag of another program with the same name
                 self.server.delete(f'{_VERSION}="{old}"')
 
     def read(self, name: str) -> Telemetry:
-        """The series kept under `name`.
+        """Reads the series stored under `name`.
+
+        Args:
+            name: Name of the series.
+
+        Returns:
+            The series.
 
         Raises:
-            InputError: If there is none, or if samples are missing from it, or if the server cannot be asked.
+            InputError: If there is no such series, if samples are missing from it, or if the server does not answer.
         """
         about = self._about(name)
         described = Telemetry(np.empty(0, np.float32), **{key: about[key] for key in _DESCRIBED})
         found, pieces, num_samples = 0, [described.values], about["num_samples"]
         for times, values in self.server.stream(self._of_series(name, about), FIRST_NS, LAST_NS):
             as_expected = nanoseconds(described, found, min(found + len(times), num_samples))
-            agree = np.append(times[: len(as_expected)] == as_expected, False).argmin()  # how many at the beginning
-            with np.errstate(over="ignore"):  # those of others may be beyond float32
+            agree = np.append(times[: len(as_expected)] == as_expected, False).argmin()  # number of leading points with the expected times
+            with np.errstate(over="ignore"):  # points of other programs may be beyond float32
                 pieces.append(values[:agree].astype(np.float32))
             found += agree
             if agree < len(times):
@@ -162,38 +178,38 @@ class InfluxStore:
         return dataclasses.replace(described, values=np.concatenate(pieces))
 
     def names(self) -> list[str]:
-        """The names of the series kept here, sorted."""
+        """The sorted names of the stored series."""
         return sorted(self._abouts())
 
-    # -- what a database can do besides --------------------------------------------------------------------------------
+    # -- further methods of this store ---------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Asks for nothing, to see whether the server can be asked.
+        """Checks the connection to the server with an empty query.
 
         Raises:
-            InputError: If it does not answer, does not know the token, or has no such organisation or bucket.
+            InputError: If the server does not answer, does not accept the token, or has no such organisation or bucket.
         """
         self.server.ask(f"{self.server.points(0, 1)} |> limit(n: 1)")
 
     def versions(self) -> dict[str, str]:
-        """The hash of each series kept here by its name: the same for the same series."""
+        """The content hash of each stored series, by name. Equal series have equal hashes."""
         return {name: about[_VERSION] for name, about in sorted(self._abouts().items())}
 
     def chunks(
         self, name: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """The points of a series as they are stored, in the order of time, some ten thousand at once, however many there are.
+        """Streams the stored points of a series in chronological order, in blocks of some ten thousand points.
 
         Args:
-            name: A series that `write` kept; None for the one, of whoever wrote it, that the location describes.
-            start_ns: Nanoseconds since 1970 from which on; None for the first.
-            stop_ns: Nanoseconds since 1970 before which; None for behind the last.
+            name: Name of a series stored by `write`. None: the only series at the location, whichever program wrote it.
+            start_ns: Start of the time range in nanoseconds since 1970 (inclusive). None: the first point.
+            stop_ns: End of the time range in nanoseconds since 1970 (exclusive). None: after the last point.
 
         Yields:
-            Times in nanoseconds since 1970 (int64) and values (float64), of the same length.
+            Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
 
         Raises:
-            InputError: If there is no such series, or more than one, or none of numbers, or if the server cannot be asked.
+            InputError: If there is no such series, more than one, or one without numbers, or if the server does not answer.
         """
         start = FIRST_NS if start_ns is None else max(int(start_ns), FIRST_NS)
         stop = LAST_NS if stop_ns is None else min(int(stop_ns), LAST_NS)
@@ -204,10 +220,10 @@ class InfluxStore:
             chosen = self._filter()
         yield from self.server.stream(chosen, start, stop)
 
-    # -- what stands where ---------------------------------------------------------------------------------------------
+    # -- names, descriptions and queries -------------------------------------------------------------------------------
 
     def _check_names(self, name: str) -> None:
-        """Refuses what line protocol cannot say, and the tags that are ours."""
+        """Raises an `InputError` for names that line protocol cannot express, and for tags that the store uses itself."""
         pairs = self.location.tags
         names = (self.location.measurement, self.location.field, *(part for pair in pairs for part in pair))
         bad = [part for part in names if not part.isprintable() or part.endswith("\\") or part.startswith(("_", "#"))]
@@ -232,7 +248,7 @@ class InfluxStore:
         return hashlib.sha256(json.dumps([str(self.location), *names]).encode()).hexdigest()[:16]
 
     def _abouts(self, *names: str) -> dict[str, dict[str, Any]]:
-        """Descriptions by name: of all series, or of the one that is named."""
+        """Descriptions by name: of all series, or of the series `names` only."""
         which = f'r.key == "{self._hash(*names)}"' if names else f'r.store == "{self._hash()}"'
         steps = f'|> filter(fn: (r) => r._measurement == "{_ABOUT}" and r._field == "about" and {which}) |> keep(columns: ["_value"])'
         rows = self.server.ask(f"{self.server.points(_ABOUT_NS, _ABOUT_NS + 1)} {steps}")
@@ -280,7 +296,7 @@ class InfluxStore:
 
 
 def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of a series that can be kept."""
+    """Checks that a series can be stored; returns its times in nanoseconds and its values."""
     check_telemetry(telemetry)
     if not telemetry.name or not len(telemetry):
         raise InputError(f"Expected a series with a name and samples. Received: {len(telemetry)} samples, name={telemetry.name!r}.")
@@ -288,7 +304,7 @@ def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
         raise InputError(
-            f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which InfluxDB cannot keep. Fill or cut it."
+            f"Expected finite values. Received: {values[bad[0]]} at sample {bad[0]}, which InfluxDB cannot store. Fill or cut it."
         )
     times = nanoseconds(telemetry)
     if (np.diff(times) <= 0).any():
@@ -297,10 +313,10 @@ def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _description(text: Any) -> dict[str, Any]:
-    """What `write` said of a series.
+    """Parses a description written by `write`.
 
     Raises:
-        InputError: If it is something else: somebody else can write there too.
+        InputError: If it is something else, since other programs can write there too.
     """
     try:
         about = json.loads(text)
@@ -315,7 +331,7 @@ def _description(text: Any) -> dict[str, Any]:
 
 
 def _tags_of(row: Mapping[str, Any]) -> dict[str, str]:
-    """The tags of a row of an answer: what is neither its time, its value nor where it stands."""
+    """The tags of a row of a query result: all columns except the time, the value and those that InfluxDB adds."""
     return {key: value for key, value in row.items() if not key.startswith("_") and key not in ("result", "table")}
 
 
@@ -324,7 +340,7 @@ def _encode(part: str) -> str:
 
 
 def _as_tag(name: str) -> str:
-    """A name as the value of a tag: what InfluxDB does not take there is percent-encoded."""
+    """Encodes a name as a tag value. Characters that InfluxDB does not allow there are percent-encoded."""
     return "".join(sign if sign.isprintable() and sign not in "%\\" else urllib.parse.quote(sign) for sign in name)
 
 

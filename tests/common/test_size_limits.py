@@ -108,7 +108,9 @@ def test_a_table_that_would_fill_the_memory_is_refused(tmp_path):
         check_parquet(path)
     wide = pa.array([b"w" * 1_000_000] * 2, pa.binary(1_000_000)).dictionary_encode()
     wide = pa.DictionaryArray.from_arrays(pa.array(np.zeros(4_000, np.int32)), wide.dictionary)
-    pq.write_table(pa.table({"x": wide}), path, row_group_size=50, compression="zstd")  # 4 GB, of which the writer holds one row group at a time
+    pq.write_table(
+        pa.table({"x": wide}), path, row_group_size=50, compression="zstd"
+    )  # 4 GB, of which the writer holds one row group at a time
     assert path.stat().st_size < 150_000
     with pytest.raises(ValueError, match="fixed width|text that becomes"):
         check_parquet(path)
