@@ -146,7 +146,7 @@ def test_fit_finds_two_waves_and_stops_there():
     assert np.mean((plain(times) - true(times)) ** 2) < 0.02 * np.var(true(times))
 
 
-def test_fit_refuses_what_has_no_period(refused):
+def test_fit_refuses_a_series_without_a_period(refused):
     for values in (np.ones(300), np.array([1.0, -1, 1, -1, 1, -1])):  # no wave; not four samples a period
         with refused("wheel"):
             SquareWaveSimulator.fit(Telemetry(values.astype(np.float32), name="wheel"))
@@ -182,7 +182,7 @@ def test_box_finds_the_fundamental_under_a_stronger_harmonic():
     )
 
 
-def test_clock_is_set_to_the_window():
+def test_synchronise_matches_the_phase_of_each_window():
     rng = np.random.default_rng(0)
     late_s = rng.uniform(-200, 200, 5)
     simulator = SquareWaveSimulator([SquareWave(480, duty=0.4), SquareWave(120, low=-0.4, high=0.4)])
@@ -228,7 +228,7 @@ def test_onset_is_the_sample_asked_for(onset):
     assert np.argmax(values[0] != 5) == round(100 * onset)
 
 
-def test_stuck_stands_still_for_its_share_and_then_catches_up():
+def test_stuck_stands_still_for_its_fraction_and_then_catches_up():
     clock = by_time("stuck", 0.5)
     begin, late = TIMES[:, ONSET : ONSET + 1], TIMES[:, ONSET:]
     still = late <= begin + 0.5 * 299  # half of the 299 s that are left
@@ -244,7 +244,7 @@ def test_period_grows(severity):
 
 
 @pytest.mark.parametrize("severity", [0.2, 1.0])
-def test_friction_comes_late_by_a_bounded_lag_and_never_turns_back(severity):
+def test_friction_delays_by_a_bounded_lag_and_never_reverses(severity):
     clock = by_time("friction", severity)
     lag = TIMES - clock
     assert (lag[:, ONSET] == 0).all() and lag.min() >= 0
@@ -254,7 +254,7 @@ def test_friction_comes_late_by_a_bounded_lag_and_never_turns_back(severity):
     assert len({tuple(np.round(row, 6)) for row in lag[:, ONSET:]}) == 3  # each window has its own
 
 
-def test_drift_is_a_ramp_to_its_share_of_the_span():
+def test_drift_is_a_ramp_to_severity_times_the_level_range():
     added = (by_time("drift", 0.3) - TIMES)[:, ONSET:]
     assert added == pytest.approx(np.tile(0.3 * 4.0 * np.arange(300) / 299, (3, 1)), abs=1e-9)
 
@@ -300,7 +300,7 @@ def test_coarse_and_true_vehicle_degrade_alike(mode):
 
 
 @pytest.mark.parametrize("mode", ["friction", "dropout"])
-def test_chance_belongs_to_the_generator_given(mode):
+def test_random_modes_use_the_given_generator(mode):
     first, again, other = (TWO.simulate(TIMES, Degraded(mode), np.random.default_rng(seed)) for seed in (5, 5, 6))
     assert (first == again).all() and (first != other).any()
 

@@ -30,13 +30,13 @@ def content_of(folder):
     return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_make_folder_makes_the_parents_and_leaves_nothing_in_it(tmp_path):
+def test_make_folder_creates_parents_and_leaves_the_folder_empty(tmp_path):
     folder = files.make_folder(tmp_path / "a" / "b")
     assert folder == tmp_path / "a" / "b" and folder.is_dir() and not list(folder.iterdir())
     assert files.make_folder(folder) == folder  # again is no error
 
 
-def test_make_folder_refuses_where_a_file_stands(tmp_path, refused):
+def test_make_folder_refuses_an_existing_file(tmp_path, refused):
     (tmp_path / "taken").write_text("x")
     with refused("taken"):
         files.make_folder(tmp_path / "taken")
@@ -45,7 +45,7 @@ def test_make_folder_refuses_where_a_file_stands(tmp_path, refused):
     assert content_of(tmp_path) == {"taken": "x"}
 
 
-def test_replace_file_takes_the_name_at_the_end_only(tmp_path):
+def test_replace_file_renames_only_at_the_end(tmp_path):
     path = tmp_path / "values.json"
     path.write_text("old")
     with files.replace_file(path) as temporary:
@@ -56,7 +56,7 @@ def test_replace_file_takes_the_name_at_the_end_only(tmp_path):
 
 
 @pytest.mark.parametrize("before", [{}, {"values.json": "old"}])
-def test_interrupted_replace_file_leaves_what_was(tmp_path, before):
+def test_interrupted_replace_file_keeps_the_old_content(tmp_path, before):
     for name, text in before.items():
         (tmp_path / name).write_text(text)
     with pytest.raises(KeyboardInterrupt), files.replace_file(tmp_path / "values.json") as temporary:
@@ -66,7 +66,7 @@ def test_interrupted_replace_file_leaves_what_was(tmp_path, before):
 
 
 @each_way
-def test_replace_folder_takes_the_place_of_all_that_stood_there(can_exchange, tmp_path):
+def test_replace_folder_replaces_the_whole_old_folder(can_exchange, tmp_path):
     path = tmp_path / "above" / "model"
     for number in (1, 2):
         with files.replace_folder(path) as temporary:
@@ -75,7 +75,7 @@ def test_replace_folder_takes_the_place_of_all_that_stood_there(can_exchange, tm
 
 
 @each_way
-def test_replace_folder_takes_the_place_of_a_file_and_leaves_no_temporary(can_exchange, tmp_path):
+def test_replace_folder_replaces_a_file_and_leaves_no_temporary(can_exchange, tmp_path):
     path = tmp_path / "model"
     path.write_text("a file")
     with files.replace_folder(path) as temporary:
@@ -84,7 +84,7 @@ def test_replace_folder_takes_the_place_of_a_file_and_leaves_no_temporary(can_ex
 
 
 @pytest.mark.parametrize("before", [{}, {"model/inside": "old"}])
-def test_interrupted_replace_folder_leaves_what_was(tmp_path, before):
+def test_interrupted_replace_folder_keeps_the_old_content(tmp_path, before):
     for name, text in before.items():
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).write_text(text)
@@ -96,7 +96,7 @@ def test_interrupted_replace_folder_leaves_what_was(tmp_path, before):
 
 
 @pytest.mark.parametrize("can_exchange", [False], indirect=True)
-def test_replace_folder_keeps_the_old_when_the_new_cannot_take_the_name(can_exchange, tmp_path, monkeypatch):
+def test_replace_folder_keeps_the_old_content_when_the_rename_fails(can_exchange, tmp_path, monkeypatch):
     path = tmp_path / "model"
     path.mkdir()
     (path / "inside").write_text("old")
@@ -135,7 +135,7 @@ with replace_{kind}(sys.argv[1]) as temporary:
 
 @pytest.mark.parametrize("kind", ["file", "folder"])
 @pytest.mark.parametrize("then", ["remove_leftovers", "replace_folder"])
-def test_killed_between_the_two_renames_the_old_content_comes_back(tmp_path, kind, then):
+def test_old_content_is_restored_after_a_kill_between_the_two_renames(tmp_path, kind, then):
     path = tmp_path / "model.v2"
     if kind == "folder":
         path.mkdir()
@@ -165,7 +165,7 @@ with files.replace_folder(sys.argv[1]) as temporary:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a folder takes two renames")
-def test_a_reader_finds_one_of_both_at_every_moment(tmp_path):
+def test_a_reader_always_finds_the_old_or_the_new_content(tmp_path):
     path = tmp_path / "model"
     with files.replace_folder(path) as temporary:
         (temporary / "number").write_text("0")
@@ -185,7 +185,7 @@ for number in range(1, 301):
 
 
 @each_way
-def test_replace_folder_keeps_what_it_is_told_to(can_exchange, tmp_path):
+def test_replace_folder_keeps_the_old_content_if_keep_says_so(can_exchange, tmp_path):
     path, asked = tmp_path / "stage", []
 
     def keep(found):
@@ -200,7 +200,7 @@ def test_replace_folder_keeps_what_it_is_told_to(can_exchange, tmp_path):
 
 
 @pytest.mark.parametrize("can_exchange", [False], indirect=True)
-def test_replace_folder_replaces_what_another_process_put_there_meanwhile(can_exchange, tmp_path, monkeypatch):
+def test_replace_folder_replaces_a_folder_written_by_another_process_in_the_meantime(can_exchange, tmp_path, monkeypatch):
     path, rename = tmp_path / "model", os.replace
     path.mkdir()
 
@@ -219,7 +219,7 @@ def test_replace_folder_replaces_what_another_process_put_there_meanwhile(can_ex
 
 
 @each_way
-def test_replace_folder_takes_the_place_of_a_link_and_not_of_what_it_names(can_exchange, tmp_path):
+def test_replace_folder_replaces_a_link_and_not_its_target(can_exchange, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "model").symlink_to("elsewhere")
     with files.replace_folder(tmp_path / "model") as temporary:
@@ -242,7 +242,7 @@ def test_files_that_a_killed_process_left_are_removed(tmp_path):
 
 
 @pytest.mark.parametrize("days", [-400, 400])
-def test_a_clock_that_is_wrong_takes_nothing_from_a_process_at_work(tmp_path, monkeypatch, days):
+def test_a_wrong_clock_does_not_remove_files_of_a_running_process(tmp_path, monkeypatch, days):
     alive = left_by(os.getppid(), tmp_path)
     other = left_by(dead_process(), tmp_path, "another-machine")
     grow_old(alive, days)  # the clock was changed since
@@ -252,7 +252,7 @@ def test_a_clock_that_is_wrong_takes_nothing_from_a_process_at_work(tmp_path, mo
     assert alive.is_dir() and other.is_dir()
 
 
-def test_write_json_round_trip_and_refusal_of_what_json_has_no_word_for(tmp_path):
+def test_write_json_round_trip_and_refusal_of_nan_and_infinity(tmp_path):
     path = tmp_path / "results.json"
     files.write_json(path, {"a": [1, 2.5, None, "é"]})
     assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]}
@@ -301,7 +301,7 @@ def test_leftovers_of_a_killed_process_are_removed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_leftovers_that_may_be_at_work_stay_for_a_day(tmp_path):
+def test_leftovers_of_unknown_processes_stay_for_a_day(tmp_path):
     others = [left_by(os.getpid(), tmp_path), left_by(dead_process(), tmp_path, "another-machine")]
     for days in (0, 0.9):
         for left in others:
@@ -315,7 +315,7 @@ def test_leftovers_that_may_be_at_work_stay_for_a_day(tmp_path):
     assert [left.is_dir() for left in others] == [True, False]
 
 
-def test_what_only_looks_like_a_leftover_stays(tmp_path):
+def test_files_that_only_look_like_leftovers_stay(tmp_path):
     mine = [".photos.20240101.tmp", ".model.20240101.old", ".notes.20240101.old", ".notes.2024.20240101.old"]
     for name in mine:
         (tmp_path / name).mkdir()
@@ -326,7 +326,7 @@ def test_what_only_looks_like_a_leftover_stays(tmp_path):
     assert sorted(path.parent.name for path in tmp_path.glob("*/kept")) == sorted(mine)
 
 
-def test_what_an_exchange_left_of_a_file_or_a_link_is_removed(tmp_path):
+def test_leftovers_of_exchanged_files_and_links_are_removed(tmp_path):
     script = """
 import os, signal, sys
 from enhsim_tf.common import atomic_files as files
@@ -360,7 +360,7 @@ def test_interrupted_between_the_two_renames_the_old_content_stays(can_exchange,
     assert content_of(tmp_path) == {"model/inside": "old"} and [each.name for each in tmp_path.iterdir()] == ["model"]
 
 
-def test_machines_of_nearly_the_same_name_are_told_apart(monkeypatch):
+def test_machines_with_similar_names_are_distinguished(monkeypatch):
     seen = []
     for name in ("gke-prod-cluster-default-pool-aaaa", "gke-prod-cluster-default-pool-bbbb", "x", ""):
         monkeypatch.setattr(files.socket, "gethostname", lambda name=name: name)
@@ -368,7 +368,7 @@ def test_machines_of_nearly_the_same_name_are_told_apart(monkeypatch):
     assert len(set(seen)) == 4 and max(map(len, seen)) <= 17 and not any("." in each for each in seen)
 
 
-def test_the_longest_name_has_room_for_two_temporary_ones(tmp_path):
+def test_the_longest_name_still_allows_two_temporary_suffixes(tmp_path):
     path = tmp_path / files.encode_name("a" * 160)
     with (
         files.replace_folder(path) as outer,
@@ -379,7 +379,7 @@ def test_the_longest_name_has_room_for_two_temporary_ones(tmp_path):
     assert (path / "settings.json").read_text() == "{}"
 
 
-def test_nothing_else_is_taken_for_a_leftover(tmp_path):
+def test_no_other_name_counts_as_a_leftover(tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "kept").write_text("x")
     (tmp_path / "stage-0123").mkdir()

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def test_a_line_is_told_at_once():
+def test_a_line_is_printed_at_once():
     script = (
         "import os\nfrom enhsim_tf.common.console import tell\ntell('a line')\nos._exit(0)"  # which throws away what is not yet written
     )
@@ -19,7 +19,7 @@ def test_a_line_is_told_at_once():
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
-def test_a_narrow_terminal_shows_what_it_can(encoding):
+def test_characters_outside_the_encoding_are_replaced(encoding):
     script = "from enhsim_tf.common.console import tell\ntell('Größe 漢')"
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding})
     assert (ended.stdout.decode(encoding), ended.stderr) == (
@@ -28,7 +28,7 @@ def test_a_narrow_terminal_shows_what_it_can(encoding):
     )
 
 
-def test_a_bar_of_a_process_that_is_ended_leaves_no_word_of_semaphores():
+def test_a_progress_bar_of_a_terminated_process_causes_no_semaphore_warning():
     script = "import os\nfrom enhsim_tf.common.console import progress\nfor _ in progress(range(3), disable=True): pass\nos._exit(0)"
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
     assert (ended.stdout, ended.stderr) == ("", "")

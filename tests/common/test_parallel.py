@@ -19,7 +19,7 @@ from tests.faults.small_data_set import PlainMaker, die_at_thirteen, meet, plan,
 with_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
 
 
-def test_every_number_is_done_once_in_processes_of_one_thread():
+def test_every_item_is_computed_once_in_single_threaded_processes():
     found = list(engines.run("local", threads_and_square, range(20), 2))
     assert sorted(square for square, *_ in found) == [number**2 for number in range(20)]
     assert {(threads, tensorflow) for *_, threads, tensorflow in found} == {("1", False)}
@@ -30,7 +30,7 @@ def test_threads_are_set_before_the_work_imports_anything():
     assert list(engines.run("local", threads_of, [1], 1, threads=2)) == [("2", {1})]
 
 
-def test_numbers_are_drawn_as_there_is_room():
+def test_items_are_drawn_only_when_workers_can_take_them():
     drawn = []
     endless = (drawn.append(number) or number for number in itertools.count())
     running = engines.run("local", threads_and_square, endless, 1)
@@ -42,7 +42,7 @@ def test_numbers_are_drawn_as_there_is_room():
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_killed_process_is_replaced_and_nothing_is_lost_or_doubled(seed):
+def test_a_killed_process_is_replaced_and_no_item_is_lost_or_repeated(seed):
     running, found, killed = engines.run("local", threads_and_square, range(200), 2), [], 0
     for done in running:
         found.append(done[0])
@@ -52,7 +52,7 @@ def test_a_killed_process_is_replaced_and_nothing_is_lost_or_doubled(seed):
     assert killed == 2 and sorted(found) == [number**2 for number in range(200)]
 
 
-def test_processes_that_die_without_end_are_given_up(refused):
+def test_repeated_worker_failures_end_the_run(refused):
     with refused("died in a row", "--workers"):
         try:
             list(engines.run("local", die_at_thirteen, [13], 1))
@@ -61,32 +61,32 @@ def test_processes_that_die_without_end_are_given_up(refused):
             raise
 
 
-def test_a_mistake_found_by_the_work_comes_back_as_it_is(refused):
+def test_an_input_error_of_the_work_is_raised_unchanged(refused):
     with refused("another number"):
         list(engines.run("local", refuse, range(5), 1))
     assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize(("engine", "workers"), [("local", 0), ("local", 513), ("ray", -1), ("ray", 10**6), ("slurm", 1)])
-def test_engines_and_workers_that_cannot_be(engine, workers, refused):
+def test_invalid_engines_and_worker_counts_are_refused(engine, workers, refused):
     with refused():
         engines.run(engine, threads_and_square, range(3), workers)
 
 
-def test_nothing_to_do_starts_nothing(monkeypatch):
+def test_without_items_no_process_is_started(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     assert list(engines.run("local", refuse, [], 2)) == list(engines.run("ray", refuse, [], 2)) == []
     assert not multiprocessing.active_children()
 
 
-def test_without_ray_there_is_one_line(monkeypatch, refused):
+def test_a_missing_ray_package_raises_one_line(monkeypatch, refused):
     monkeypatch.setitem(sys.modules, "ray", None)
     with refused("pip install"):
         list(engines.run("ray", refuse, [1], 2))
 
 
 @with_ray
-def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, refused):
+def test_ray_gives_the_same_results_and_replaces_killed_actors(tmp_path, monkeypatch, refused):
     import ray
 
     from enhsim_tf.common.parallel.ray import _cluster
@@ -121,7 +121,7 @@ def test_ray_does_the_same_and_replaces_what_is_killed(tmp_path, monkeypatch, re
 
 @with_ray
 @pytest.mark.parametrize("error", [Exception("The current node\ntimed out"), RuntimeError("timed out"), OSError(28, "timed out")])
-def test_a_cluster_that_does_not_start_is_one_line(error, monkeypatch, refused):
+def test_a_cluster_that_does_not_start_raises_one_line(error, monkeypatch, refused):
     import ray
 
     def init(*arguments, **options):
@@ -137,7 +137,7 @@ def test_a_cluster_that_does_not_start_is_one_line(error, monkeypatch, refused):
 
 
 @with_ray
-def test_after_a_server_that_is_not_there_a_cluster_of_this_machine_starts(monkeypatch, refused):
+def test_a_local_cluster_starts_after_a_failed_connection(monkeypatch, refused):
     from enhsim_tf.common.parallel.ray import _cluster
 
     monkeypatch.setenv("RAY_ADDRESS", "ray://127.0.0.1:9")
@@ -149,7 +149,7 @@ def test_after_a_server_that_is_not_there_a_cluster_of_this_machine_starts(monke
 
 
 @with_ray
-def test_a_cluster_that_is_not_there_is_one_line(monkeypatch, refused):
+def test_a_missing_cluster_raises_one_line(monkeypatch, refused):
     monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")
     with refused("127.0.0.1:1"):
         list(engines.run("ray", refuse, [1], 1))

@@ -53,7 +53,7 @@ def walk(clock, loop, steps, seconds):
         loop(done)
 
 
-def test_a_loop_of_known_pace_tells_these_lines(clock):
+def test_the_lines_of_a_loop_of_known_speed(clock):
     told = []
     loop = Progress(told.append, "noise GAN    ", clock).loop("iteration", 1_200)
     walk(clock, loop, range(1, 1_201), 0.0625)  # 75 s in all; fifteen of them end with 240 iterations
@@ -65,7 +65,7 @@ def test_a_loop_of_known_pace_tells_these_lines(clock):
     ]
 
 
-def test_the_unit_under_way_is_the_one_that_is_named(clock):
+def test_the_unit_in_progress_is_named(clock):
     told = []
     loop = Progress(told.append, "enhancer     ", clock).loop("epoch", 40)
     walk(clock, loop, [6.2, 7.0, 39.99, 40.0], 20)
@@ -76,7 +76,7 @@ def test_the_unit_under_way_is_the_one_that_is_named(clock):
     ], "and what is done says no more"
 
 
-def test_a_slow_first_step_says_nothing_of_the_others(clock):
+def test_a_slow_first_step_is_excluded_from_the_estimate(clock):
     told = []
     loop = Progress(told.append, "", clock).loop("iteration", 1_000)
     walk(clock, loop, [1], 16)  # it builds the graph
@@ -84,13 +84,13 @@ def test_a_slow_first_step_says_nothing_of_the_others(clock):
     assert told == ["iteration 1 of 1,000, 0 %", "iteration 121 of 1,000, 12 %, about 110 s left"]
 
 
-def test_a_loop_shorter_than_the_interval_says_nothing(clock):
+def test_a_loop_shorter_than_the_interval_prints_nothing(clock):
     told = []
     walk(clock, Progress(told.append, "", clock).loop("epoch", 15), range(1, 16), 0.99)
     assert told == []
 
 
-def test_the_interval_is_that_of_the_work_and_not_of_each_loop(clock):
+def test_the_interval_between_lines_spans_several_loops(clock):
     told = []
     progress = Progress(told.append, "second       ", clock)
     clock.now += 12  # before the first loop begins
@@ -102,14 +102,14 @@ def test_the_interval_is_that_of_the_work_and_not_of_each_loop(clock):
     ]
 
 
-def test_a_step_of_several_to_a_unit(clock):
+def test_a_unit_of_several_steps(clock):
     told = []
     loop = Progress(told.append, "", clock).loop("arm", 5)
     walk(clock, loop.within(2, 3), [1, 2], 15)
     assert told == ["arm 3 of 5, 46 %", "arm 3 of 5, 53 %, about 105 s left"]
 
 
-def test_the_silent_one_says_nothing(at_once, capsys):
+def test_silent_progress_prints_nothing(at_once, capsys):
     SILENT.loop("epoch", 3)(1)
     assert capsys.readouterr() == ("", "")
 
@@ -125,14 +125,14 @@ def test_the_silent_one_says_nothing(at_once, capsys):
         (9_000.0, "about 2.5 h left"),
     ],
 )
-def test_the_time_that_is_left_in_words(seconds, words):
+def test_the_remaining_time_as_text(seconds, words):
     assert time_left(seconds) == words
 
 
 # -- what the loops of the library say of themselves -----------------------------------------------------------------------
 
 
-def test_the_enhancer_says_how_many_epochs_are_done():
+def test_the_enhancer_reports_finished_epochs():
     from enhsim_tf.enhancer.network import build_enhancer
     from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
 
@@ -141,7 +141,7 @@ def test_the_enhancer_says_how_many_epochs_are_done():
     assert done == pytest.approx([1 / 3, 2 / 3, 1, 4 / 3, 5 / 3, 2])
 
 
-def test_the_adversarial_loop_says_how_many_iterations_are_done():
+def test_the_adversarial_loop_reports_finished_iterations():
     from tests.noise.test_gan import fit, small
 
     done = []
@@ -150,7 +150,7 @@ def test_the_adversarial_loop_says_how_many_iterations_are_done():
 
 
 @pytest.mark.parametrize("follow", [False, True])
-def test_a_whole_fit_counts_the_epochs_of_all_its_rounds(at_once, follow, monkeypatch, capsys):
+def test_a_fit_counts_the_epochs_of_all_training_rounds(at_once, follow, monkeypatch, capsys):
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.enhancer import network as enhancer
     from enhsim_tf.telemetry.series import Telemetry
@@ -194,7 +194,7 @@ def test_false_alarms_are_counted_by_arm_and_detector(clock, monkeypatch):
 
 
 @pytest.mark.parametrize("speaks", [False, True])
-def test_a_stage_speaks_under_its_name_where_it_is_asked_to(tmp_path, at_once, speaks):
+def test_a_stage_reports_progress_under_its_name_if_asked_to(tmp_path, at_once, speaks):
     told = []
     stages = Stages(tmp_path, tell=told.append, speaks=speaks)
 
@@ -206,7 +206,7 @@ def test_a_stage_speaks_under_its_name_where_it_is_asked_to(tmp_path, at_once, s
     assert stages.progress is SILENT, "nothing speaks in the name of a stage that is done"
 
 
-def test_a_stage_that_fails_speaks_no_longer(tmp_path):
+def test_a_failed_stage_stops_reporting(tmp_path):
     stages = Stages(tmp_path, tell=lambda line: None, speaks=True)
 
     def fails(folder):
@@ -229,7 +229,7 @@ def stages_of(*found_done):
     return SimpleNamespace(cached=dict(enumerate(found_done)))
 
 
-def test_replicates_in_turn_say_how_long_the_others_take(clock):
+def test_consecutive_replicates_report_the_remaining_time(clock):
     told = []
     turns = Turns("replicate", 4, told.append, clock)
     for name, seconds, found_done in (("a", 2, True), ("b", 600, False), ("c", 200, False), ("d", 400, False)):
@@ -287,7 +287,7 @@ def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
-def test_a_terminal_has_its_bars_and_none_of_the_lines(tmp_path, environment):
+def test_a_terminal_shows_bars_and_no_lines(tmp_path, environment):
     import fcntl
     import pty
     import struct
@@ -323,7 +323,7 @@ def table(folder):
 FIT = ("--num-windows", "30", "--epochs", "3", "--iterations", "3", "--noise", "paper")
 
 
-def test_processes_that_fit_name_their_channel(tmp_path, environment):
+def test_fitting_processes_name_their_channel(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--out", tmp_path / "models", "--workers", "2", *FIT]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=600)
     assert (done.returncode, done.stderr) == (0, "")
@@ -332,7 +332,7 @@ def test_processes_that_fit_name_their_channel(tmp_path, environment):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="exit code 141 is POSIX")
-def test_whoever_stops_reading_stops_no_fit(tmp_path, environment):
+def test_a_closed_output_pipe_does_not_stop_the_fits(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--column", "volts", "--out", tmp_path / "models", *FIT]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True)
     assert process.stdout.readline().startswith("volts: enhancer, epoch 1 of 3")

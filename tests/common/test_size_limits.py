@@ -91,7 +91,7 @@ def repeated(num_rows, word=None):
     return sink.getvalue()
 
 
-def test_a_table_that_would_fill_the_memory_is_refused(tmp_path):
+def test_a_table_that_expands_in_memory_is_refused(tmp_path):
     path = tmp_path / "x.parquet"
     path.write_bytes(repeated(30_000_000))
     assert path.stat().st_size < 150_000

@@ -113,7 +113,7 @@ FOUND = [
 
 
 @pytest.mark.parametrize(("name", "data"), FOUND)
-def test_what_was_found_stays_mended(name, data, tmp_path):
+def test_fixed_failures_stay_fixed(name, data, tmp_path):
     outcome = judge(TARGETS[name].run, data, tmp_path / "work")
     assert outcome.verdict in ("accepted", "refused"), outcome.why
 
@@ -146,7 +146,7 @@ def _loops(data, folder):
         (_loops, "failed"),
     ],
 )
-def test_the_judge_sees_each_kind(monkeypatch, tmp_path, run, verdict):
+def test_the_judge_recognises_each_verdict(monkeypatch, tmp_path, run, verdict):
     monkeypatch.setattr(judge_room, "MOST_SECONDS", 0.2)
     assert judge(run, b"", tmp_path / "work").verdict == verdict
 
@@ -167,7 +167,7 @@ def test_every_refusal_is_one_printable_line(text):
     assert line.isprintable() and len(line) <= MOST_LETTERS and line.startswith("Expected a.") and line.endswith("Do c.")
 
 
-def test_memory_that_the_limit_did_not_give_is_a_failure(tmp_path):
+def test_an_allocation_beyond_the_limit_is_a_failure(tmp_path):
     def refuses_late(data, folder):
         try:
             raise MemoryError
@@ -195,7 +195,7 @@ def test_every_target_gets_its_share():
     assert all(isinstance(target, Target) for target in TARGETS.values()) and len(TARGETS) >= 30
 
 
-def test_the_command_is_led_by_what_inputs_reach(tmp_path):
+def test_the_command_is_guided_by_coverage(tmp_path):
     if importlib.util.find_spec("atheris") is None:
         pytest.skip("atheris is not installed: it has wheels for Python 3.11 and Linux only")
     words = ["--inputs", "600", "--only", "scenario file", "--out", tmp_path / "found.json", "--failures", tmp_path / "failures"]
@@ -209,7 +209,7 @@ def test_the_command_is_led_by_what_inputs_reach(tmp_path):
 # the record
 
 
-def test_the_record_holds_what_is_promised():
+def test_the_record_covers_the_stated_number_of_inputs():
     record = json.loads((ROOT / "docs" / "fuzzing.json").read_text())
     assert record["targets"].keys() == TARGETS.keys()
     total = record["all"]
@@ -222,7 +222,7 @@ def test_the_record_holds_what_is_promised():
     assert total["slowest_s"] < MOST_SECONDS == record["most_seconds"] and total["more_than_at_first_mib"] < MOST_MIB == record["most_mib"]
 
 
-def test_the_numbers_of_the_promise_are_those_of_the_record():
+def test_the_stated_numbers_match_the_record():
     record, text = json.loads((ROOT / "docs" / "fuzzing.json").read_text()), (ROOT / "SECURITY.md").read_text()
     (said,) = re.findall(
         r"([\d,]+) inputs on (\d+) targets: ([\d,]+) accepted, ([\d,]+) refused, no traceback; the slowest took ([\d.]+) s, "
@@ -243,7 +243,7 @@ def test_the_numbers_of_the_promise_are_those_of_the_record():
         assert f"def {test or 'test_'}" in (ROOT / file).read_text(), (file, test)
 
 
-def test_a_time_so_far_off_that_its_zone_cannot_tell_it_is_refused(tmp_path, refused):
+def test_a_time_too_far_off_for_its_zone_is_refused(tmp_path, refused):
     import pandas as pd
 
     from enhsim_tf.telemetry.sources import read_source

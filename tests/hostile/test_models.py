@@ -117,7 +117,7 @@ def test_other_classes_and_functions_are_refused(refused_without_running, module
     refused_without_running(enhancer_keras=with_layer(layer(kind, module, registered, filepath="../../ran", vocabulary="/etc/passwd")))
 
 
-def test_a_class_that_was_registered_is_not_made(tmp_path, refused_without_running):
+def test_a_registered_class_is_not_instantiated(tmp_path, refused_without_running):
     @keras.saving.register_keras_serializable("hostile")
     class Opens(keras.layers.Layer):
         def __init__(self, path, **options):
@@ -212,7 +212,7 @@ def test_layers_of_more_weights_than_the_file_holds_are_refused(refused_without_
     refused_without_running(enhancer_keras=dense(**changed))
 
 
-def test_normalisation_of_a_shape_beyond_reason_is_refused(refused_without_running):
+def test_normalisation_with_a_huge_shape_is_refused(refused_without_running):
     odd = layer("Normalization", mean=[0.0], variance=[1.0], axis=-1) | {"build_config": {"input_shape": [None, 10**9]}}
     refused_without_running("weights in a file", enhancer_keras=with_layer(odd))
 
@@ -243,11 +243,11 @@ def _lead_out(file, path):
 
 
 @pytest.mark.parametrize("make", [_declare, _lead_out])
-def test_weights_that_do_not_stand_in_the_file_are_refused(refused_without_running, make):
+def test_weights_that_are_not_in_the_file_are_refused(refused_without_running, make):
     refused_without_running("in full", enhancer_keras=weights_of(make))
 
 
-def test_the_other_networks_are_looked_at_too(refused_without_running):
+def test_the_other_networks_are_checked_too(refused_without_running):
     content = json.loads(member_of("generator", "config.json"))
     content["config"]["layers"].append(layer("Lambda"))
     refused_without_running("Lambda", generator_keras=archive_of("generator", config=json.dumps(content).encode()))

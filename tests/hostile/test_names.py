@@ -43,7 +43,7 @@ def check_file_name(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_name_becomes_one_of_a_file(name, tmp_path):
+def test_a_name_is_encoded_as_a_file_name(name, tmp_path):
     check_file_name(name)
     folder = folder_of(tmp_path, name)
     folder.mkdir()
@@ -51,7 +51,7 @@ def test_a_name_becomes_one_of_a_file(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_name_that_no_file_can_have_is_refused(name, refused, tmp_path):
+def test_a_name_that_cannot_be_a_file_name_is_refused(name, refused, tmp_path):
     for use in (encode_name, lambda name: folder_of(tmp_path, name), ParquetStore(tmp_path).read):
         with refused("name"):
             use(name)
@@ -62,7 +62,7 @@ def test_a_name_that_no_file_can_have_is_refused(name, refused, tmp_path):
 
 @settings(derandomize=True, max_examples=500, deadline=None, database=None)
 @given(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=14), st.text(min_size=1, max_size=14))
-def test_any_name_becomes_one_of_a_file_and_no_two_the_same(name, other):
+def test_any_name_is_encoded_as_a_distinct_file_name(name, other):
     check_file_name(name)
     assert name == other or encode_name(name) != encode_name(other)
 

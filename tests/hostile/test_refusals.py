@@ -212,7 +212,7 @@ STRANGE = {
 
 
 @pytest.mark.parametrize("case", STRANGE)
-def test_a_strange_channel_gets_its_figures_or_one_line_before_the_training(told, tmp_path, monkeypatch, case):
+def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, monkeypatch, case):
     counts = {"telemetry__num_windows": 12, "enhancer__hidden_units": 4, "enhancer__epochs": 1, "noise__filters": 4}
     counts |= {"adversarial__batch_size": 8, "adversarial__num_iterations": 2, "adversarial__record_every": 1}
     make = settings.make_settings

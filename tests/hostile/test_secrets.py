@@ -52,7 +52,7 @@ DONE = {"training data", "a large data set", "scores"}
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", RUNS)
-def test_a_run_tells_and_writes_no_secret(world, capfd, caplog, name):
+def test_a_run_prints_and_writes_no_secret(world, capfd, caplog, name):
     caplog.set_level(logging.DEBUG, "enhsim_tf")
     if "cluster" in name:
         pytest.importorskip("ray")
@@ -85,7 +85,7 @@ def test_passwords_of_unusual_addresses_are_hidden(address):
 
 
 @pytest.mark.parametrize("token", ["it's secret", "back\\slash-and-more"])
-def test_no_refusal_repeats_the_token_as_it_is_quoted(monkeypatch, token):
+def test_no_refusal_repeats_the_escaped_token(monkeypatch, token):
     monkeypatch.setenv("INFLUXDB_V2_TOKEN", token)
     assert str(InputError(f"Expected a. Received: {[token]!r}.")).count("***") == 1
 

@@ -37,7 +37,7 @@ def unowned_draws(tree):
     return found
 
 
-def test_every_draw_has_an_owner():
+def test_every_random_draw_uses_an_explicit_generator_or_seed():
     found = {module: unowned_draws(tree) for module, tree in TREES.items()}
     assert {module: draws for module, draws in found.items() if draws} == {}
 
@@ -57,5 +57,5 @@ def test_every_draw_has_an_owner():
         "import random",
     ],
 )
-def test_draws_without_an_owner_would_be_seen(text):
+def test_draws_without_a_generator_or_seed_are_detected(text):
     assert unowned_draws(ast.parse(text))

@@ -35,7 +35,7 @@ def test_modules_without_networks_import_no_tensorflow():
     assert ended.returncode == 0, ended.stderr
 
 
-def test_public_names_lead_where_they_say():
+def test_public_names_resolve_to_their_objects():
     import enhsim_tf
 
     assert {"EnhancedSimulator", "NoiseGAN", "build_enhancer", "InputError"} <= set(enhsim_tf.__all__)

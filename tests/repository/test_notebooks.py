@@ -104,7 +104,7 @@ def test_cells_are_short(source):
 
 
 @each_notebook
-def test_it_defines_nothing_long_and_nothing_that_the_package_has(source):
+def test_it_defines_no_long_functions_and_repeats_none_of_the_package(source):
     for node in (node for tree in trees_of(source) for node in definitions(tree)):
         assert node.end_lineno - node.lineno < 5
         assert node.name not in PACKAGE_NAMES
@@ -123,7 +123,7 @@ def test_it_shows_figures_says_what_to_see_and_asserts_it(source):
 
 
 @each_notebook
-def test_each_promise_of_a_sight_is_held_by_the_next_code_cells(source):
+def test_each_what_to_see_note_is_followed_by_assertions(source):
     cells = build.read(source).cells
     for number, cell in enumerate(cells):
         if "*What to see:*" in cell.source:
@@ -238,7 +238,7 @@ def test_a_heavy_notebook_is_found(tiny):
     assert len(build.faults(tiny)) == 1 and "bytes" in build.faults(tiny)[0]
 
 
-def test_the_check_tells_stale_and_lost_ones_and_exits_with_1(tiny, monkeypatch, capsys):
+def test_the_check_reports_stale_and_missing_notebooks_and_exits_with_1(tiny, monkeypatch, capsys):
     monkeypatch.setattr(build, "FOLDER", tiny.parent)
     assert build.main(["--check"]) == 0
     shutil.copy(tiny.with_suffix(".ipynb"), tiny.parent / "98_lost.ipynb")
@@ -254,7 +254,7 @@ def test_an_unknown_notebook_is_refused(capsys):
 # -- what they share ---------------------------------------------------------------------------------------------------------
 
 
-def test_what_is_still_to_do_is_said_first_and_nothing_is_done(tmp_path, monkeypatch, capsys):
+def test_missing_stages_are_listed_first_and_nothing_is_computed(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("ENHSIM_TF_CACHE", str(tmp_path))
     monkeypatch.setattr(teaching, "_ROOT", tmp_path / "elsewhere")
     teaching.open_experiment("smoke")

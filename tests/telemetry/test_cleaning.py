@@ -266,13 +266,13 @@ REFUSED = BAD_VALUES | {f"times: {name}": case for name, case in BAD_TIMES.items
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_understood_is_refused_by_its_place(refused, name):
+def test_input_that_cannot_be_parsed_is_refused_with_its_place(refused, name):
     series, words = REFUSED[name]
     with refused(words):
         clean(series)
 
 
-def test_enough_kinds_of_dirt_are_tried():
+def test_enough_kinds_of_damage_are_tried():
     assert len(REPAIRED) + len(REFUSED) > 80
 
 
@@ -297,7 +297,7 @@ def test_options_out_of_range_are_refused(refused, options):
         Cleaning(**options)
 
 
-def test_a_zone_that_nobody_knows_and_an_interval_without_times_are_refused(refused):
+def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused):
     with refused("'Mars/Gale'"):
         clean(CLEAN.tz_localize(None), Cleaning(timezone="Mars/Gale"))
     with refused("interval_s=2"):
@@ -305,7 +305,7 @@ def test_a_zone_that_nobody_knows_and_an_interval_without_times_are_refused(refu
 
 
 @pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("first", 4.0), ("last", 6.0)])
-def test_one_of_different_values_of_one_time_is_taken(refused, how, value):
+def test_one_of_several_values_at_the_same_time_is_taken(refused, how, value):
     values, times = np.insert(VALUES, 11, [4.0, 6.0]), np.insert(np.arange(N), 11, [11, 11])
     values = np.delete(values, 13)  # row 11 itself: only the two others are left
     series = pd.Series(values, index=TIMES[np.delete(times, 13)], name="volts")
@@ -317,7 +317,7 @@ def test_one_of_different_values_of_one_time_is_taken(refused, how, value):
         clean(series, Cleaning(same_time="refuse"))
 
 
-def test_a_value_is_taken_before_none_and_the_mean_is_of_values_only():
+def test_a_missing_value_at_a_repeated_time_is_ignored():
     series = pd.concat([CLEAN.iloc[:6], pd.Series([np.nan, 9.0], index=TIMES[[5, 6]]), CLEAN.iloc[7:]])
     for how in ("mean", "first", "last"):
         cleaned = cleaned_of(series, same_time=how)
@@ -333,7 +333,7 @@ def test_a_leap_second_is_the_second_after_it():
 
 
 @pytest.mark.parametrize("length", [5, 6])
-def test_gaps_are_filled_up_to_the_longest_and_part_the_series_beyond(length):
+def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
     missing = np.arange(100, 100 + length)
     for series in (CLEAN.drop(TIMES[missing]), set_rows(missing, np.nan, float), set_rows(missing, np.inf, float)):
         cleaned = cleaned_of(series)
@@ -351,7 +351,7 @@ def test_gaps_are_filled_up_to_the_longest_and_part_the_series_beyond(length):
     assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
 
 
-def test_parts_too_short_are_left_out_and_counted(refused):
+def test_short_parts_are_left_out_and_counted(refused):
     series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])  # five samples stand alone
     assert [len(part) for part in cleaned_of(series).parts] == [100, 5, 270]
     cleaned = cleaned_of(series, min_part=6)
@@ -361,7 +361,7 @@ def test_parts_too_short_are_left_out_and_counted(refused):
         clean(series, Cleaning(min_part=300))
 
 
-def test_a_jump_of_the_clock_parts_the_series_and_keeps_every_row():
+def test_a_jump_of_the_clock_splits_the_series_and_keeps_every_row():
     times = TIMES + pd.to_timedelta(np.where(np.arange(N) < 150, 0, 0.4), unit="s")
     cleaned = cleaned_of(with_times(times), max_jitter=0.1)
     before, after = cleaned.parts
@@ -370,7 +370,7 @@ def test_a_jump_of_the_clock_parts_the_series_and_keeps_every_row():
     assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
 
 
-def test_jitter_is_reported_by_its_largest():
+def test_the_largest_jitter_is_reported():
     off = np.zeros(N)
     off[[20, 30]] = 0.12, -0.2
     found = cleaned_of(with_times(TIMES + pd.to_timedelta(off, unit="s"))).report.find("jitter")
@@ -388,7 +388,7 @@ def test_the_interval_is_that_of_the_rows(interval, unit):
     assert len(part) == 5_000 and part.interval_s * 5_000 == pytest.approx(interval * 5_000, abs=0.1 * interval)
 
 
-def test_the_interval_survives_jitter_gaps_and_a_share_of_other_rates():
+def test_the_interval_is_found_despite_jitter_and_gaps():
     rng = np.random.default_rng(3)
     times = np.sort(rng.choice(20_000, 9_000, replace=False)) + rng.uniform(-0.2, 0.2, 9_000)
     cleaned = cleaned_of(with_times(times, np.sin(times)))
@@ -423,7 +423,7 @@ def test_a_finer_stretch_at_the_beginning_takes_the_grid_of_what_follows():
     assert set(part.values[:10]) == {np.float32(1.5)}
 
 
-def test_a_wandering_clock_parts_the_series_before_a_sample_is_moved_too_far():
+def test_a_wandering_clock_splits_the_series_before_max_jitter_is_exceeded():
     wander = 2 * np.sin(np.arange(N) / 40)  # intervals: more than can be snapped
     cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), np.arange(N)), max_jitter=0.2)
     assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
@@ -446,7 +446,7 @@ def test_a_coarser_stretch_is_interpolated_or_left_out():
     assert [len(part) for part in wide.parts] == [121, 160]
 
 
-def test_a_rate_of_no_whole_ratio_is_interpolated():
+def test_a_noninteger_rate_ratio_is_interpolated():
     line = np.arange(900.0) / 7  # straight: interpolation is exact
     times = np.concatenate([np.arange(300), 299 + 2.5 * np.arange(1, 81), 499 + np.arange(1, 401)])
     cleaned = cleaned_of(with_times(times, np.interp(times, np.arange(900), line)))
@@ -455,7 +455,7 @@ def test_a_rate_of_no_whole_ratio_is_interpolated():
     assert cleaned.report.find("coarser stretches").count == 1
 
 
-def test_a_given_interval_averages_what_shares_it():
+def test_a_given_interval_averages_the_rows_that_share_it():
     cleaned = cleaned_of(CLEAN, interval_s=4)
     (part,) = cleaned.parts
     groups = np.round(np.arange(N) / 4).astype(int)  # the nearest place of the grid, halves to the even one
@@ -465,7 +465,7 @@ def test_a_given_interval_averages_what_shares_it():
     assert cleaned_of(random, interval_s=5).report.interval_s == 5
 
 
-def test_local_times_of_a_zone_pass_its_clock_changes():
+def test_local_times_are_converted_across_clock_changes():
     times = pd.date_range("2020-10-24T22:00Z", periods=500, freq="min")
     local = with_times(times.tz_convert("Europe/Berlin").tz_localize(None), np.sin(np.arange(500) / 9))
     cleaned = cleaned_of(local, timezone="Europe/Berlin")
@@ -479,7 +479,7 @@ def test_local_times_of_a_zone_pass_its_clock_changes():
     assert cleaned_of(spring, timezone="Europe/Berlin").report.find("clock change").rows_left_out == 60
 
 
-def test_samples_are_counted_where_there_is_no_time():
+def test_samples_are_counted_without_times():
     values = VALUES.copy()
     values[[7, *range(100, 120)]] = np.nan
     for series in (values, values.tolist(), pd.Series(values), pd.Series(values.astype(object))):
@@ -495,7 +495,7 @@ def test_samples_are_counted_where_there_is_no_time():
     assert cleaned_of(values).parts[0].offset_s == 3
 
 
-def test_what_a_channel_is_like_is_reported():
+def test_properties_of_the_values_are_reported():
     steps = np.round(VALUES * 16) / 16
     found = cleaned_of(with_times(TIMES, steps)).report.find("quantised")
     assert found.details == {"step": 0.0625, "is_even": True} and found.count == len(np.unique(steps))
@@ -516,7 +516,7 @@ def test_what_a_channel_is_like_is_reported():
     assert rounded.details["error"] == pytest.approx(0.03, abs=0.01)  # float32 keeps steps of 1/16 at a million
 
 
-def test_the_report_says_everything_in_plain_words():
+def test_the_report_as_text():
     series = pd.concat([CLEAN.drop(TIMES[[7]]), CLEAN.iloc[3:5]])
     lines = cleaned_of(series).report.lines()
     assert lines[0] == "volts: 401 rows, 399 used, 2 left out; 400 samples in 1 part, 1 of them filled in"
@@ -525,7 +525,7 @@ def test_the_report_says_everything_in_plain_words():
     assert Finding("gaps", 1, "a").action == "accepted"
 
 
-def test_every_kind_is_in_the_documents():
+def test_every_kind_is_documented():
     text = (ROOT / "docs" / "telemetry.md").read_text(encoding="utf-8")
     for kind, (action, words) in KINDS.items():
         assert f"| {kind} | {action} | {words} |" in text
@@ -583,7 +583,7 @@ def test_no_row_is_lost_silently(cells, nominal, options, form):
     seed=st.integers(0, 10**6),
     max_fill=st.integers(0, 6),
 )
-def test_what_is_left_comes_back_in_its_place(lost, blank, twice, jitter, seed, max_fill):
+def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, max_fill):
     """Rows are lost, emptied, doubled, jittered and shuffled; the oracle builds the parts from the places that are left."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal(300)

@@ -176,7 +176,7 @@ def test_locations_are_written_as_they_are_read():
         ("influxdb://b/m/%FF", "UTF-8"),
     ],
 )
-def test_what_is_no_location_is_refused(text, word, refused):
+def test_invalid_locations_are_refused(text, word, refused):
     with refused(word, "influxdb://bucket/measurement/field?tag=value"):
         parse_location(text)
 
@@ -197,7 +197,7 @@ def test_an_answer_is_the_same_in_blocks_of_any_size(monkeypatch):
     assert list(influx_server._blocks(io.BytesIO(b"\r\n"))) == []
 
 
-def test_an_answer_that_ends_within_a_line_is_not_taken_for_whole(refused):
+def test_an_answer_that_ends_within_a_line_counts_as_incomplete(refused):
     row = b",_result,0,1970-01-01T00:00:01Z,1234\r\n"
     for cut in (1, 2, 4, 30):
         blocks = influx_server._blocks(io.BytesIO(ANSWER + row + row[:-cut]))
@@ -242,7 +242,7 @@ def test_times_are_exact_nanoseconds(bucket):
     assert list(store.chunks(start_ns=first + 2, stop_ns=first + 900)) == []
 
 
-def test_times_at_both_ends_of_what_is_kept(bucket):
+def test_the_first_and_last_storable_times(bucket):
     ends = [-9_223_372_036 * 10**9, -1, 0, 1, 2**63 - 3]
     for number, at in enumerate(ends):
         _put(bucket, f"m f={number} {at}")
@@ -250,7 +250,7 @@ def test_times_at_both_ends_of_what_is_kept(bucket):
     assert times.tolist() == ends and values.tolist() == [0, 1, 2, 3, 4]
 
 
-def test_the_same_written_twice_is_there_once(bucket):
+def test_a_series_written_twice_is_stored_once(bucket):
     store, kept = InfluxStore(_location(bucket), batch_size=300), _series(1_000)
     store.write(kept)
     versions = store.versions()
@@ -260,7 +260,7 @@ def test_the_same_written_twice_is_there_once(bucket):
     assert row["_value"] == 1_000
 
 
-def test_what_was_written_here_is_a_source_by_its_name(bucket):
+def test_a_stored_series_can_be_read_as_a_source_by_name(bucket):
     first, second = _series(50, name="wheel"), _series(60, 1, name="gyro", start="2020-01-01T00:00:00+00:00", interval_s=0.5, unit="V")
     for each in (first, second):
         InfluxStore(_location(bucket)).write(each)
@@ -270,7 +270,7 @@ def test_what_was_written_here_is_a_source_by_its_name(bucket):
     assert list(read_source(_location(bucket), columns=["gyro"])) == ["gyro"]
 
 
-def test_a_series_of_somebody_else_is_a_source_and_can_be_cleaned(bucket):
+def test_a_series_of_another_program_can_be_read_and_cleaned(bucket):
     places = [place for place in range(100) if place != 40]
     _put(bucket, [f"bus,craft=a volts={place % 7} {10**18 + place * 10**9}" for place in places])
     (series,) = read_source(_location(bucket, "bus/volts?craft=a")).values()
@@ -280,7 +280,7 @@ def test_a_series_of_somebody_else_is_a_source_and_can_be_cleaned(bucket):
     assert cleaned.parts[0].values[40] == (39 % 7 + 41 % 7) / 2 and cleaned.parts[0].interval_s == 1.0
 
 
-def test_writing_again_replaces_all_of_the_old_and_may_go_back(bucket):
+def test_writing_again_replaces_the_old_series_also_by_an_earlier_one(bucket):
     store = InfluxStore(_location(bucket))
     long, short = _series(5_000, interval_s=60.0), _series(10, seed=1, interval_s=0.5, unit="V")
     neighbour = _series(70, seed=2, name="wheel 2")
@@ -324,7 +324,7 @@ def test_places_with_hostile_names(bucket):
     assert np.array_equal(_all(InfluxStore(place).chunks())[1], _series(30).values)
 
 
-def test_a_store_travels_to_another_process(bucket):
+def test_a_store_can_be_pickled_to_another_process(bucket):
     store = InfluxStore(_location(bucket))
     store.write(_series(30))
     assert same(pickle.loads(pickle.dumps(store)).read("wheel"), _series(30))
@@ -333,7 +333,7 @@ def test_a_store_travels_to_another_process(bucket):
 # -- series of others ------------------------------------------------------------------------------------------------------
 
 
-def test_a_series_of_somebody_else_is_read_as_it_is(bucket):
+def test_a_series_of_another_program_is_read_unchanged(bucket):
     rng = np.random.default_rng(0)
     times = np.unique(rng.integers(10**18, 10**18 + 10**15, 3_000))
     values = rng.normal(size=len(times))
@@ -347,7 +347,7 @@ def test_a_series_of_somebody_else_is_read_as_it_is(bucket):
     assert InfluxStore(_location(bucket, "bus/volts?craft=A")).names() == []
 
 
-def test_what_is_not_one_series_of_numbers_is_refused(bucket, refused):
+def test_anything_but_one_numeric_series_is_refused(bucket, refused):
     _put(
         bucket,
         'bus,craft=A,side=l volts=1 1\nbus,craft=A,side=r volts=2 1\nbus,craft=B volts=3 1\nbus,craft=A mode="safe" 1\nbus on=true 1',
@@ -403,7 +403,7 @@ def million():
     return Telemetry(np.random.default_rng(0).permutation(MILLION).astype(np.float32), name="million", start="1970-01-01T00:00:00+00:00")
 
 
-def test_restarts_in_the_middle_of_writing_lose_and_double_nothing(mortal, bucket, million):
+def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, bucket, million):
     store, sent, restarts = InfluxStore(_location(bucket)), [], []
     send = store.server.send
 
@@ -452,7 +452,7 @@ def test_restarts_in_the_middle_of_writing_lose_and_double_nothing(mortal, bucke
         assert len(asked) >= 3, "for the description, for the points, and for those behind the break"
 
 
-def test_the_old_stands_until_the_new_is_whole(mortal, bucket, refused):
+def test_the_old_series_stays_until_the_new_one_is_complete(mortal, bucket, refused):
     store, old, new = InfluxStore(_location(bucket), batch_size=100, max_retry_s=0.5), _series(1_000), _series(2_000, seed=1)
     store.write(old)
     send, sent = store.server.send, []
@@ -515,7 +515,7 @@ def test_a_missing_client_is_named(pretended, monkeypatch, refused):
         "http://user:secret-token@localhost",
     ],
 )
-def test_an_address_that_is_none_is_refused(pretended, monkeypatch, refused, url):
+def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
     monkeypatch.setenv("INFLUXDB_V2_URL", url)
     with refused("INFLUXDB_V2_URL") as caught:
         InfluxStore("influxdb://b/m/f")
@@ -529,19 +529,19 @@ def test_options_out_of_range_are_refused(pretended, refused, options):
 
 
 @pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read("x"), lambda store: store.write(_series()), list])
-def test_a_server_that_is_down_is_said_at_once(pretended, refused, use):
+def test_a_server_that_is_down_is_reported_at_once(pretended, refused, use):
     store = InfluxStore("influxdb://b/m/f", max_retry_s=3_600)
     with refused("http://127.0.0.1:9", "no answer"):
         use(store.chunks() if use is list else store)
 
 
-def test_a_variable_of_the_client_that_is_no_number_is_refused(pretended, monkeypatch, refused):
+def test_a_nonnumeric_client_variable_is_refused(pretended, monkeypatch, refused):
     monkeypatch.setenv("INFLUXDB_V2_TIMEOUT", "soon")
     with refused("INFLUXDB_V2_TIMEOUT"):
         InfluxStore("influxdb://b/m/f").check()
 
 
-def test_what_influxdb_cannot_keep_is_refused(pretended, refused):
+def test_series_that_influxdb_cannot_store_are_refused(pretended, refused):
     store = InfluxStore("influxdb://b/m/f")
     for wrong, word in (
         (_series(0), "0 samples"),
@@ -561,7 +561,7 @@ def test_what_influxdb_cannot_keep_is_refused(pretended, refused):
             InfluxStore(f"influxdb://b/{place}").write(_series())
 
 
-def test_what_the_server_does_not_know_is_named(named, bucket, monkeypatch, refused):
+def test_an_unknown_token_organisation_or_bucket_is_named(named, bucket, monkeypatch, refused):
     def uses(bucket):
         place = _location(bucket)
         for use in (
@@ -602,7 +602,7 @@ def test_a_token_that_may_only_read_is_named(named, bucket, monkeypatch, refused
         store.write(_series(20, seed=1))
 
 
-def test_points_that_the_bucket_does_not_take_are_named(named, bucket, refused):
+def test_points_that_the_bucket_rejects_are_named(named, bucket, refused):
     from influxdb_client import BucketRetentionRules
 
     with _client() as client:
@@ -623,7 +623,7 @@ def test_a_field_of_another_type_is_named(bucket, refused):
         InfluxStore(_location(bucket)).write(_series(20))
 
 
-def test_something_else_at_the_address_is_named(pretended, monkeypatch, refused):
+def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refused):
     import http.server
 
     answers = []
@@ -710,7 +710,7 @@ def _reproduce(tmp_path, *options):
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
 
 
-def test_the_reproduction_runs_its_goal_through_influxdb(named, bucket, tmp_path):
+def test_the_reproduction_runs_through_influxdb(named, bucket, tmp_path):
     place = _location(bucket, "paper/value")
     runs = {}
     for name, options in {"parquet": (), "influxdb": ("--store", place), "again": ("--store", place), "parquet again": ()}.items():
@@ -749,7 +749,7 @@ def test_the_reproduction_runs_its_goal_through_influxdb(named, bucket, tmp_path
         (["--store", "influxdb", "--experiment", "robustness"], "Parquet"),
     ],
 )
-def test_a_store_that_cannot_be_used_is_said_before_anything_is_done(pretended, monkeypatch, tmp_path, options, word):
+def test_an_unusable_store_is_reported_before_any_work(pretended, monkeypatch, tmp_path, options, word):
     if word == "INFLUXDB_V2_TOKEN":
         monkeypatch.delenv(word)
     words = [*options, "--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]

@@ -18,7 +18,7 @@ def test_round_trip_to_the_bit(tmp_path, about):
 
 
 @pytest.mark.parametrize("about", BEYOND, ids=str)
-def test_times_that_no_file_can_hold_are_refused(tmp_path, about, refused):
+def test_times_outside_the_nanosecond_range_are_refused(tmp_path, about, refused):
     with refused("time"):
         ParquetStore(tmp_path).write(series(**about))
     assert not any(tmp_path.iterdir())
@@ -29,7 +29,7 @@ def test_the_zone_of_a_start_counts(tmp_path):
     assert pd.read_parquet(tmp_path / "wheel")["time"].iloc[0] == pd.Timestamp("2020-02-29T22:00:00Z")
 
 
-def test_one_file_a_day_that_pandas_reads(tmp_path):
+def test_pandas_reads_the_one_file_per_day(tmp_path):
     store = ParquetStore(tmp_path)
     kept = series(60, interval_s=3_600.0, start="2020-02-28T18:00:00+00:00", name="wheel")
     store.write(kept)
@@ -56,7 +56,7 @@ def test_no_name_leaves_the_folder(tmp_path, name):
     assert len(list(folder.iterdir())) == 2 and len(list(folder.glob("*/*"))) == 2
 
 
-def test_series_without_a_name_does_not_take_the_place_of_the_store(tmp_path, refused):
+def test_a_series_without_a_name_does_not_replace_the_store(tmp_path, refused):
     store = ParquetStore(tmp_path / "store")
     store.write(series(10, name="neighbour"))
     with refused():
@@ -64,7 +64,7 @@ def test_series_without_a_name_does_not_take_the_place_of_the_store(tmp_path, re
     assert store.names() == ["neighbour"]
 
 
-def test_a_folder_of_something_else_is_left_as_it_is(tmp_path, refused):
+def test_a_folder_with_other_files_is_left_unchanged(tmp_path, refused):
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "thesis.tex").write_text("mine")
     (tmp_path / "notes").write_text("mine")
@@ -101,14 +101,14 @@ def test_damaged_day_is_refused(tmp_path, refused, content):
         store.read("wheel")
 
 
-def test_table_of_another_maker_is_refused(tmp_path, refused):
+def test_a_parquet_file_of_another_program_is_refused(tmp_path, refused):
     (tmp_path / "wheel").mkdir()
     pd.DataFrame({"t": [1, 2], "x": [3, 4]}).to_parquet(tmp_path / "wheel" / "part.parquet")
     with refused("wheel"):
         ParquetStore(tmp_path).read("wheel")
 
 
-def test_writing_again_replaces_all_of_the_old(tmp_path):
+def test_writing_again_replaces_the_old_series(tmp_path):
     store = ParquetStore(tmp_path)
     store.write(series(72, interval_s=3_600.0, start="2020-03-01", name="wheel"))
     kept = series(10, seed=1, name="wheel")
@@ -117,7 +117,7 @@ def test_writing_again_replaces_all_of_the_old(tmp_path):
     assert len(list(tmp_path.rglob("*.parquet"))) == 1
 
 
-def test_failed_write_keeps_the_old(tmp_path, monkeypatch):
+def test_a_failed_write_keeps_the_old_series(tmp_path, monkeypatch):
     import pyarrow.parquet
 
     store, kept = ParquetStore(tmp_path), series(72, interval_s=3_600.0, start="2020-03-01", name="wheel")
@@ -137,7 +137,7 @@ def test_failed_write_keeps_the_old(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["wheel"]
 
 
-def test_unknown_name_lists_what_is_there(tmp_path, refused):
+def test_an_unknown_name_lists_the_stored_names(tmp_path, refused):
     store = ParquetStore(tmp_path / "store")
     assert store.names() == []
     with refused("it is empty", "'orbit'"):

@@ -134,7 +134,7 @@ def test_the_time_that_cannot_be_used_is_named(tmp_path, refused, name):
         read_telemetry(write(tmp_path / "a.csv", pd.DataFrame({"v": RAMP[:4], "t": times})), time="t")
 
 
-def test_a_column_name_that_stands_twice_is_refused_where_it_is_needed(tmp_path, refused):
+def test_a_repeated_column_name_is_refused_if_it_is_needed(tmp_path, refused):
     lines = [f"{number},{number % 7},{-number}," for number in range(12)]
     path = write(tmp_path / "a.csv", "\n".join(["a,b,a,", *lines]).encode())
     for arguments in ({"column": "a"}, {}, {"column": "b", "time": "a"}):
@@ -145,7 +145,7 @@ def test_a_column_name_that_stands_twice_is_refused_where_it_is_needed(tmp_path,
     assert read_telemetry(path, column="a").values.tolist() == [1, 2, 4], "columns without a name have no name in common"
 
 
-def test_something_else_than_telemetry_is_refused(refused):
+def test_anything_but_telemetry_is_refused(refused):
     check_telemetry(Telemetry(RAMP))
     with refused("Received: ndarray", "Telemetry(check_values("):
         check_telemetry(RAMP)
@@ -226,7 +226,7 @@ def test_parts_keep_the_clock():
 
 @pytest.mark.parametrize("number", [1_003, 5_000, 9_999])
 @pytest.mark.parametrize("fractions", [(0.7, 0.3), (0.6, 0.2, 0.2), (0.5, 0.3, 0.1, 0.1)])
-def test_split_leaves_gaps_and_loses_next_to_nothing(number, fractions):
+def test_split_leaves_gaps_and_uses_nearly_all_samples(number, fractions):
     gap = 100
     whole = Telemetry(np.arange(number, dtype=np.float32), interval_s=2.0, offset_s=11.0)
     parts = split_by_time(whole, fractions, gap)

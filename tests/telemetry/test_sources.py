@@ -186,7 +186,7 @@ def test_bad_sources_are_refused(tmp_path, refused, case):
 
 
 @pytest.mark.parametrize("cell", ["1.5 V", "-", "1_0", "true"])
-def test_text_among_numbers_is_a_channel_and_refused_by_its_place(tmp_path, refused, cell):
+def test_text_among_numbers_is_refused_with_its_place(tmp_path, refused, cell):
     (tmp_path / "a.csv").write_text(lines(ISO, [*VALUES[:-1], cell]))
     channel = read_source(tmp_path / "a.csv")["volts"]
     with refused(f"{cell!r} at row 49"):
@@ -218,7 +218,7 @@ def test_the_series_of_a_store(tmp_path, refused):
         read_source(tmp_path / "empty")
 
 
-def test_influxdb_has_its_time_and_wants_a_location(monkeypatch, refused):
+def test_influxdb_refuses_a_time_column_and_an_incomplete_location(monkeypatch, refused):
     for name in ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG"):
         monkeypatch.delenv(name, raising=False)
     with refused("time='utc'"):
@@ -277,7 +277,7 @@ CELLS += ["#", "\x00", "°", "True", "1.5 V", "1583000000", "1583000001000", "20
     form=st.tuples(st.sampled_from(",;\t"), st.sampled_from(["\n", "\r\n"]), st.sampled_from(["utf-8", "utf-16", "latin-1"])),
     how=st.sampled_from(["refuse", "drop"]),
 )
-def test_any_table_gives_balanced_books_or_one_line(tmp_path, header, rows, form, how):
+def test_any_table_gives_a_complete_report_or_one_error_line(tmp_path, header, rows, form, how):
     separator, end, encoding = form
     (tmp_path / "a.csv").write_bytes(end.join(separator.join(row) for row in [header, *rows]).encode(encoding, "replace"))
     options = Cleaning(on_bad_times=how, on_bad_values=how, min_part=1)
