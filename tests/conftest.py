@@ -1,4 +1,4 @@
-"""What all tests share: a quiet TensorFlow, and the one form a user's mistake is answered in."""
+"""Shared configuration and fixtures: TensorFlow settings, the smoke run, and the check of error messages."""
 
 import contextlib
 import ctypes
@@ -15,24 +15,26 @@ from types import SimpleNamespace
 import pytest
 from filelock import FileLock
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell's background job; what the tests start would not hear an interrupt
+if (
+    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+):  # background jobs of a shell ignore SIGINT, and so would the processes that tests start
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # before anything imports TensorFlow
 for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(threads, "1")  # two processes test at a time; threads that wait for each other burn as much as those that work
+    os.environ.setdefault(threads, "1")  # two test processes run at a time, and waiting threads would also use CPU time
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
 from enhsim_tf.keras_tools.tensorflow_settings import apply_settings  # noqa: E402
 
-apply_settings()  # a test that imports Keras itself computes as the package does
+apply_settings()  # tests that import Keras directly use the package's settings
 
 ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module", autouse=True)
 def memory_given_back():
-    """Networks and their graphs are garbage in circles: they go with the file that made them, and their memory to the system."""
+    """Frees the networks and graphs of a test file, which are reference cycles, and returns their memory to the system."""
     yield
     gc.collect()
     if sys.platform == "linux":
@@ -41,11 +43,11 @@ def memory_given_back():
 
 @pytest.fixture(scope="session")
 def smoke_run(tmp_path_factory):
-    """One undisturbed smoke run of the reproduction, made by the first of the testing processes that asks for it.
+    """One undisturbed smoke run of the reproduction, shared by all test processes and made by the first that needs it.
 
     Returns:
-        The folders `out` and `cache`; what the command said and its exit code; whether it touched what is committed, and
-        what tells so of another run.
+        The folders `out` and `cache`, the output and exit code of the command, `touched`, which says whether it changed
+        committed files, and the function `committed`, with which other runs can be checked.
     """
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "smoke-run"
@@ -65,16 +67,16 @@ def smoke_run(tmp_path_factory):
 
 
 def committed():
-    """What no smoke run may touch: the figures and the README, with their times."""
+    """Modification times and sizes of the figures and the README, which no smoke run may change."""
     files = [ROOT / "README.md", *sorted((ROOT / "figures").rglob("*"))]
     return [(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
 
 
 @pytest.fixture(scope="module")
 def narrow_enhancer():
-    """Simulators that are fitted in this process have an enhancer of 256 units for 3,200.
+    """Fits simulators with an enhancer of 256 units instead of 3,200.
 
-    What is tested is the path from telemetry to a simulator. The wide network takes far longer, and after each training
+    These tests check the path from telemetry to a simulator. The wide network takes far longer, and after each training
     TensorFlow keeps 130 MB of its weights and moments until the process ends.
     """
     from enhsim_tf.enhancer import network as enhancer
@@ -87,7 +89,7 @@ def narrow_enhancer():
 
 @pytest.fixture
 def refused():
-    """`with refused("word"):` the block raises an `InputError` of one line that names what was expected and received."""
+    """`with refused("word"):` asserts that the block raises an `InputError` of one line with the standard form and the words."""
 
     @contextlib.contextmanager
     def refused(*words: str):
@@ -104,7 +106,7 @@ def refused():
 
 @pytest.fixture
 def near():
-    """`found == near(kept)`: the same findings, but for the last digits that another processor computes otherwise."""
+    """`found == near(expected)` compares nested results up to the last digits, which depend on the processor."""
 
     def near(value):
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""The coarse simulator, its fit to known waves, and its degraded modes in closed form."""
+"""Tests of the coarse simulator, its fit to known waves, and its degraded modes in closed form."""
 
 import dataclasses
 import json
@@ -44,7 +44,7 @@ def test_staircase_has_its_number_of_equal_steps(levels, phase, duty):
 @pytest.mark.parametrize("duty", [0.5, 0.3])
 def test_staircase_is_a_quantised_sine(duty):
     cycle = (np.arange(2_000.0) + 0.5) / 2_000
-    sine = np.sin(np.interp(cycle, [0, duty, 1], [0, np.pi, 2 * np.pi]))  # its half waves as long as the duty says
+    sine = np.sin(np.interp(cycle, [0, duty, 1], [0, np.pi, 2 * np.pi]))  # half waves whose lengths follow the duty
     staircase = SquareWave(2_000, duty=duty, num_levels=8)(2_000 * cycle)  # levels -1, -5/7 ... 1 for eighths of -1 to 1
     assert ((sine + 1) * 4).astype(int).tolist() == np.round((staircase + 1) * 3.5).astype(int).tolist()
 
@@ -102,7 +102,7 @@ def test_paired_windows_are_of_the_same_times():
 # the fit
 
 SHAPES = {
-    # of the share of a period: values between -1 and 1, their duty, the levels of the best square wave
+    # functions of the phase: values between -1 and 1, their duty, and the levels of the best square wave
     "square": (lambda cycle: np.where(cycle < 0.3, 1.0, -1.0), 0.3, (-1.0, 1.0)),
     "sine": (lambda cycle: np.sin(2 * np.pi * cycle), 0.5, (-2 / np.pi, 2 / np.pi)),
     # a ramp takes a fifth of a period: half of the time above, 0.3 at 1 and 0.2 with a mean of 1/2
@@ -126,10 +126,10 @@ def test_fit_recovers_a_noisy_wave(shape, period_s, interval_s, offset_s):
 
         (fitted,) = SquareWaveSimulator.fit(train).waves
         assert fitted.period_s == pytest.approx(period_s, rel=0.005)
-        assert fitted.duty == pytest.approx(duty, abs=0.03)  # on a slope the edge of the box is loose
+        assert fitted.duty == pytest.approx(duty, abs=0.03)  # on a slope, the edge of the box is not well determined
         assert (fitted.low, fitted.high) == pytest.approx((mean + amplitude * low, mean + amplitude * high), abs=0.05 * amplitude)
 
-        # the phase goes on in held-out time: the right square wave at the times of the test part
+        # the phase also holds at later times that were not fitted
         truth = np.where(np.mod(test.time_s / period_s + ahead, 1.0) < duty, 1, 0)
         predicted = fitted(test.time_s) > mean
         assert np.mean(predicted == truth) > 0.92
@@ -147,7 +147,7 @@ def test_fit_finds_two_waves_and_stops_there():
 
 
 def test_fit_refuses_a_series_without_a_period(refused):
-    for values in (np.ones(300), np.array([1.0, -1, 1, -1, 1, -1])):  # no wave; not four samples a period
+    for values in (np.ones(300), np.array([1.0, -1, 1, -1, 1, -1])):  # a constant; fewer than four samples per period
         with refused("wheel"):
             SquareWaveSimulator.fit(Telemetry(values.astype(np.float32), name="wheel"))
 
@@ -198,7 +198,7 @@ def test_synchronise_matches_the_phase_of_each_window():
 
 
 def by_time(mode, severity, onset=0.25, rng=0):
-    """The modes seen through a clock: a signal that reads the time shows where the mechanism's own time went."""
+    """Degrades a signal that returns the time itself, which shows how the mode changes the mechanism's time."""
     return degrade(lambda time: time.copy(), TIMES, Degraded(mode, severity, onset), (-1.0, 3.0), 40.0, np.random.default_rng(rng))
 
 
@@ -218,7 +218,7 @@ def test_nominal_to_the_bit_before_the_onset_and_not_after(mode, severity):
     assert degraded.shape == nominal.shape and degraded.dtype == np.float32
     assert degraded[:, :ONSET].tobytes() == nominal[:, :ONSET].tobytes()
     assert (degraded[:, ONSET:] != nominal[:, ONSET:]).any(axis=1).all()
-    assert (before == TIMES).all()  # the caller's times are left alone
+    assert (before == TIMES).all()  # the caller's array is unchanged
 
 
 @pytest.mark.parametrize("onset", [0.0, 0.07, 0.29, 0.57, 0.9])
@@ -251,7 +251,7 @@ def test_friction_delays_by_a_bounded_lag_and_never_reverses(severity):
     assert lag.max() <= severity * 40 / 4
     assert lag.max() > 0.9 * severity * 40 / 4  # 3 x 30 uniform lags
     assert np.diff(clock, axis=1).min() >= -1e-9
-    assert len({tuple(np.round(row, 6)) for row in lag[:, ONSET:]}) == 3  # each window has its own
+    assert len({tuple(np.round(row, 6)) for row in lag[:, ONSET:]}) == 3  # each window has its own lags
 
 
 def test_drift_is_a_ramp_to_severity_times_the_level_range():
@@ -279,7 +279,7 @@ def test_dropout_reads_the_lowest_level_in_runs_of_ten():
 
 @pytest.mark.parametrize("mode", MODES)
 def test_coarse_and_true_vehicle_degrade_alike(mode):
-    # what the clock and the reading went through, applied by hand to both signals
+    # the changes of time and values, applied by hand to both signals
     scenario, levels, period = Degraded(mode, 0.7), (-1.0, 3.0), 40.0
     true = np.sin
 

@@ -1,4 +1,4 @@
-"""Files and folders appear whole or not at all."""
+"""Tests of atomic writing: files and folders appear completely or not at all."""
 
 import hashlib
 import json
@@ -20,7 +20,7 @@ each_way = pytest.mark.parametrize("can_exchange", [True, False], ids=["exchange
 
 @pytest.fixture
 def can_exchange(request, monkeypatch):
-    """Whether folders are exchanged in one step; where they are not, the two renames are tried."""
+    """Runs a test with the exchange in one step and with the two renames."""
     if not request.param:
         monkeypatch.setattr(files, "_exchange", lambda first, second: False)
     return request.param
@@ -33,7 +33,7 @@ def content_of(folder):
 def test_make_folder_creates_parents_and_leaves_the_folder_empty(tmp_path):
     folder = files.make_folder(tmp_path / "a" / "b")
     assert folder == tmp_path / "a" / "b" and folder.is_dir() and not list(folder.iterdir())
-    assert files.make_folder(folder) == folder  # again is no error
+    assert files.make_folder(folder) == folder  # calling it again is not an error
 
 
 def test_make_folder_refuses_an_existing_file(tmp_path, refused):
@@ -245,9 +245,9 @@ def test_files_that_a_killed_process_left_are_removed(tmp_path):
 def test_a_wrong_clock_does_not_remove_files_of_a_running_process(tmp_path, monkeypatch, days):
     alive = left_by(os.getppid(), tmp_path)
     other = left_by(dead_process(), tmp_path, "another-machine")
-    grow_old(alive, days)  # the clock was changed since
+    grow_old(alive, days)  # as if the clock had been changed
     now = time.time()
-    monkeypatch.setattr(time, "time", lambda: now + days * 86_400)  # it is wrong here, and right where the files are kept
+    monkeypatch.setattr(time, "time", lambda: now + days * 86_400)  # the local clock is wrong, the file system's clock is right
     files.remove_leftovers(tmp_path)
     assert alive.is_dir() and other.is_dir()
 
@@ -272,7 +272,7 @@ def test_sha256_of_the_standard_s_examples(tmp_path):
 
 
 def left_by(process, folder, host=None):
-    """What a killed process leaves: a temporary folder with something in it."""
+    """Creates what a killed process leaves: a temporary folder with a file in it."""
     left = folder / f".stage-0123.{host or files._host()}.{process}.0123abcd.tmp"
     (left / "below").mkdir(parents=True)
     (left / "below" / "half").write_text("half")

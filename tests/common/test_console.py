@@ -1,4 +1,4 @@
-"""How the commands speak: at once, in what characters a terminal shows, and without a word of Python's own."""
+"""Tests of console output: flushed at once, in characters that the terminal can encode, without warnings of Python."""
 
 import os
 import subprocess
@@ -11,9 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_a_line_is_printed_at_once():
-    script = (
-        "import os\nfrom enhsim_tf.common.console import tell\ntell('a line')\nos._exit(0)"  # which throws away what is not yet written
-    )
+    script = "import os\nfrom enhsim_tf.common.console import tell\ntell('a line')\nos._exit(0)"  # os._exit discards unwritten output
     ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
     assert ended.stdout == "a line\n"
 

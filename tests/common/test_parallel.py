@@ -1,4 +1,4 @@
-"""Engines: every number once, whoever dies; one thread each; one line where they cannot work."""
+"""Tests of the engines: every item is computed once even if workers die, in single-threaded processes; errors are one line."""
 
 import functools
 import importlib.util
@@ -91,9 +91,9 @@ def test_ray_gives_the_same_results_and_replaces_killed_actors(tmp_path, monkeyp
 
     from enhsim_tf.common.parallel.ray import _cluster
 
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # where the work is found by its name
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))  # so that actors can import the work
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    with _cluster():  # one cluster for all of it: starting one takes as long as the rest
+    with _cluster():  # one cluster for all checks, since starting one takes as long as the rest
         running, found = engines.run("ray", threads_and_square, range(60), 2), []
         for done in running:
             found.append(done[0])
@@ -105,7 +105,7 @@ def test_ray_gives_the_same_results_and_replaces_killed_actors(tmp_path, monkeyp
         running, found = engines.run("ray", functools.partial(meet, tmp_path / "met", 8), range(60), 8), []
         for done in running:
             found.append(done)
-            if len(found) == 1:  # all eight at once, as a node that is lost takes all its actors
+            if len(found) == 1:  # all eight at once, as when a node is lost with all its actors
                 for process in os.listdir(tmp_path / "met"):
                     os.kill(int(process), signal.SIGKILL)
         assert sorted(found) == list(range(60)) and len(os.listdir(tmp_path / "met")) > 8

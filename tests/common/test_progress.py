@@ -1,4 +1,4 @@
-"""A long run without a terminal says how far it is, and when it will end; a terminal, a notebook and a caller hear none of it."""
+"""Tests of progress lines: printed by long runs without a terminal, but not in a terminal, a notebook or calls from Python."""
 
 import os
 import re
@@ -24,7 +24,7 @@ SPOKEN = re.compile(r"(.*) ([\d,]+) of ([\d,]+), (\d+) %(, about [\d.]+ (s|min|h
 
 
 class Clock:
-    """Seconds that pass when they are told to."""
+    """A clock that the test moves."""
 
     def __init__(self):
         self.now = 1_000.0
@@ -40,7 +40,7 @@ def clock():
 
 @pytest.fixture
 def at_once(monkeypatch):
-    """No time has to pass between two lines."""
+    """Prints a line at every step."""
     monkeypatch.setattr(terminal, "INTERVAL_S", 0.0)
 
 
@@ -240,7 +240,7 @@ def test_consecutive_replicates_report_the_remaining_time(clock):
         "replicate 1 of 4: a",
         "1 of 4 replicates in 2 s; about 6 s left",
         "replicate 2 of 4: b",
-        "2 of 4 replicates in 602 s; about 20 min left",  # those in the cache took no time, and say nothing of the others
+        "2 of 4 replicates in 602 s; about 20 min left",  # cached replicates took no time and are excluded from the estimate
         "replicate 3 of 4: c",
         "3 of 4 replicates in 802 s; about 7 min left",
         "replicate 4 of 4: d",
@@ -253,14 +253,14 @@ def test_consecutive_replicates_report_the_remaining_time(clock):
 
 @pytest.fixture
 def environment(tmp_path):
-    """Variables of a process, and of those that it starts, in which no time has to pass between two lines."""
+    """Environment in which a process and its children print a line at every step."""
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text("from enhsim_tf.common import console as terminal\nterminal.INTERVAL_S = 0.0\n")
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), str(ROOT)]), "TF_CPP_MIN_LOG_LEVEL": "3"}
 
 
 def spoken_in(text):
-    """What is counted, with its name, of all lines that say how far something is; and the largest number of each and its total."""
+    """For each counted unit in the progress lines, with the name of its work: the largest number and the total."""
     found = {}
     for line in text.splitlines():
         if match := SPOKEN.fullmatch(line):
@@ -276,7 +276,7 @@ def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
     assert done.returncode == 0, done.stderr
     assert spoken_in(done.stdout) == {
         "enhancer     epoch": (2, 2),
-        "noise GAN    iteration": (19, 20),  # the last of all is told by the end of the stage
+        "noise GAN    iteration": (19, 20),  # the last iteration is reported by the end of the stage
         "false alarms arm": (5, 5),
         "resemblance  comparison": (3, 4),
     }
@@ -296,7 +296,7 @@ def test_a_terminal_shows_bars_and_no_lines(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", "--only", "fig13"]
     command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))  # without a width, no bar has one
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))  # bars need the width of the terminal
     process = subprocess.Popen(command, cwd=ROOT, stdin=theirs, stdout=theirs, stderr=theirs, env=environment)
     os.close(theirs)
     shown = b""

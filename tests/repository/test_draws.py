@@ -1,4 +1,4 @@
-"""Every random draw has an owner: a generator that is passed in, or a seed that a model or a layer owns."""
+"""Every random draw uses a generator that is passed in, or a seed of a model or layer; none uses global state."""
 
 import ast
 from pathlib import Path
@@ -13,7 +13,7 @@ SEEDED = {"HeUniform", "GlorotUniform", "RandomNormal", "RandomUniform", "Dropou
 
 
 def unowned_draws(tree):
-    """Calls that draw from a global state, or build what draws without naming its seed."""
+    """Calls that draw random numbers from global state, or create a random object without a seed."""
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):

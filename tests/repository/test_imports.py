@@ -1,4 +1,4 @@
-"""What may be imported for nothing: the public names, and every module that holds no network.
+"""Importing the package, and every module without a network, must not import TensorFlow.
 
 Which package may import which is declared in `pyproject.toml` and checked by `lint-imports`.
 """

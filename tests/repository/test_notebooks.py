@@ -1,4 +1,4 @@
-"""The notebooks: executed at smoke budget in real kernels, held to their form, and never stale."""
+"""Tests of the notebooks: they run at smoke budget in real kernels, follow the required form, and are never stale."""
 
 import ast
 import base64
@@ -50,7 +50,7 @@ PACKAGE_NAMES = {node.name for path in (ROOT / "enhsim_tf").rglob("*.py") for no
 
 @pytest.fixture(scope="module")
 def cache(smoke_run):
-    """One cache for all kernels, with every stage done once."""
+    """One cache for all kernels, in which every stage is computed once."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ENHSIM_TF_CACHE", str(smoke_run.cache))
         experiment = teaching.open_experiment("smoke")
@@ -65,7 +65,7 @@ def test_no_notebook_is_lost():
 
 @pytest.fixture(scope="module")
 def kernel():
-    """One for all: each would import for longer than it computes."""
+    """One kernel for all notebooks, since importing takes longer than computing."""
     kernel = KernelManager(kernel_name="python3")
     yield kernel
     kernel.shutdown_kernel(now=True)
@@ -142,7 +142,7 @@ def test_exercises_come_with_a_folded_solution_at_the_end(source):
 
 @each_notebook
 def test_numbers_that_were_measured_are_not_typed(source):
-    """What stands in the prose is the paper's, a setting or closed form; three digits behind the point come from an array."""
+    """Numbers in the prose are the paper's, settings or closed forms; a number with three decimals would be a measurement."""
     prose = "\n".join(cell.source for cell in build.read(source).cells if cell.cell_type == "markdown")
     assert re.findall(r"\d\.\d{3,}(?!\d*\])", re.sub(r"arXiv 2008\.12082|0\.001|2008\.12082", "", prose)) == []
 
@@ -171,7 +171,7 @@ def test_the_notebook_is_its_source_executed_at_full_budget(source):
 
 @pytest.fixture
 def tiny(tmp_path):
-    """A source with the notebook that an execution at full budget would leave, and how to change it."""
+    """A small source with the notebook that an execution at full budget would produce, and functions to change them."""
     source = tmp_path / "99_tiny.py"
     source.write_text("# %% [markdown]\n# # Tiny\n\n# %%\nprint(1)\n", encoding="utf-8")
     notebook = build.read(source)
@@ -299,7 +299,7 @@ def test_a_shown_figure_is_the_one_of_the_command(cache, tmp_path, monkeypatch):
     (path,) = figure.save(name, arrays, tmp_path, caption, True, ("png",), figures=figures.FIGURES)
     ((data, options),) = shown
     seen, kept = (np.asarray(Image.open(where).convert("RGB"), float) for where in (io.BytesIO(data["image/png"]), path))
-    assert seen.shape == kept.shape and np.abs(seen - kept).mean() < 1  # of 255: what the palette costs
+    assert seen.shape == kept.shape and np.abs(seen - kept).mean() < 1  # of 255: error of the colour palette
     assert options["metadata"]["image/png"]["alt"] == figures.FIGURES[name].alt
     assert len(base64.b64encode(data["image/png"])) < 300_000
 

@@ -1,4 +1,4 @@
-"""A real InfluxDB 2 server for the tests: started on loopback with a temporary folder, and killed and started again at will."""
+"""A real InfluxDB 2 server for the tests, on the loopback interface with a temporary folder. Tests can kill and restart it."""
 
 import contextlib
 import os
@@ -18,7 +18,7 @@ WITHOUT = (
 
 
 def find_influxd():
-    """The server's program: the one that is named, on the path, or where `.ci/influxd/build` puts it; None if there is none."""
+    """Path of the influxd program: the configured one, one on the PATH, or the build of `.ci/influxd/build`; None if missing."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "enhsim_tf"
     places = [os.environ.get("ENHSIM_TF_INFLUXD"), shutil.which("influxd"), *sorted(cache.glob("influxd-*/influxd"))]
     return next((str(place) for place in places if place and os.access(place, os.X_OK)), None)
@@ -31,7 +31,7 @@ def _free_port():
 
 
 class Server:
-    """A server of ours: its address, its organisation and its token, and the power over it."""
+    """A server started by the tests: its URL, organisation and token, and methods to start and kill it."""
 
     def __init__(self, program, folder):
         self.program, self.folder, self.process = program, Path(folder), None
@@ -65,7 +65,7 @@ class Server:
         self.process.wait()
 
     def end(self):
-        """Asks it to end, and does not let it take long."""
+        """Terminates the server, and kills it if that takes too long."""
         self.process.terminate()
         try:
             self.process.wait(10)
@@ -74,7 +74,7 @@ class Server:
 
 
 class Running:
-    """A server of somebody else, which the variables name and which is not killed."""
+    """A running server that the environment variables name. The tests do not kill it."""
 
     def __init__(self):
         self.url, self.token, self.org = (os.environ[f"INFLUXDB_V2_{name}"] for name in ("URL", "TOKEN", "ORG"))

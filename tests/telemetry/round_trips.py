@@ -1,4 +1,4 @@
-"""What a store has to give back as it was, to the bit: the series that every store is tried with."""
+"""Series that every store must restore bit for bit."""
 
 import numpy as np
 
@@ -19,12 +19,12 @@ BEYOND = [{"start": "1500-01-01"}, {"start": "2261-12-31", "interval_s": 1e6}, {
 
 
 def same(first: Telemetry, second: Telemetry) -> bool:
-    """Whether two series are equal to the bit, with all that is said of them."""
+    """Whether two series and their metadata are equal, bit for bit."""
     about = ("interval_s", "offset_s", "start", "name", "unit")
     found = [(part.values.dtype, part.values.tobytes(), *(getattr(part, key) for key in about)) for part in (first, second)]
     return found[0] == found[1]
 
 
 def series(number: int = 1_000, seed: int = 0, **about) -> Telemetry:
-    """White noise with what is said of it."""
+    """White noise with the given metadata."""
     return Telemetry(np.random.default_rng(seed).normal(size=number).astype(np.float32), **about)

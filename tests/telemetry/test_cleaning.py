@@ -1,4 +1,4 @@
-"""Dirty telemetry: a known regular series is damaged in a known way, and comes back up to the stated repair, or one line."""
+"""Tests of cleaning: a known series is damaged in a known way, and is either repaired as stated or refused in one line."""
 
 import datetime
 import decimal
@@ -28,7 +28,7 @@ IS_REGULAR = {"interval_s": 1.0, "start": "2020-03-01T00:00:00+00:00"}
 
 
 def check_balance(cleaned):
-    """Nothing is lost without a line, the parts are regular, finite and in the order of time."""
+    """Checks that every row and sample is accounted for, and that the parts are regular, finite and in chronological order."""
     report = cleaned.report
     assert report.rows_in == report.rows_used + report.rows_left_out
     assert report.samples == report.rows_used + report.samples_filled == sum(map(len, cleaned.parts))
@@ -53,7 +53,7 @@ def cleaned_of(series, **options):
 
 
 def as_one(cleaned, values=VALUES, off=1e-6, begin_off=0.0):
-    """The one part, which must be `values` from the clean start on."""
+    """Checks that there is one part with the given values and the undamaged start; returns it."""
     (part,) = cleaned.parts
     assert part.interval_s == pytest.approx(1.0, abs=1e-9)
     assert abs((pd.Timestamp(part.start) - START).total_seconds()) <= begin_off
@@ -81,13 +81,13 @@ def with_times(times, values=VALUES):
 
 
 def linear(rows, values=VALUES):
-    """The values with some rows replaced by straight lines between what is left."""
+    """The values with some rows replaced by linear interpolation between the others."""
     kept = np.delete(np.arange(len(values)), rows)
     return np.interp(np.arange(len(values)), kept, np.asarray(values)[kept])
 
 
 RNG = np.random.default_rng(1)
-JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")  # most are where they belong
+JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")  # most times are undamaged
 SHUFFLED = RNG.permutation(N)
 NANOSECONDS = TIMES.as_unit("ns").asi8
 WORDS = [f"{value:.9f}" for value in VALUES]
@@ -307,7 +307,7 @@ def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused)
 @pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("first", 4.0), ("last", 6.0)])
 def test_one_of_several_values_at_the_same_time_is_taken(refused, how, value):
     values, times = np.insert(VALUES, 11, [4.0, 6.0]), np.insert(np.arange(N), 11, [11, 11])
-    values = np.delete(values, 13)  # row 11 itself: only the two others are left
+    values = np.delete(values, 13)  # removes the original row 11, so that only the two inserted values have its time
     series = pd.Series(values, index=TIMES[np.delete(times, 13)], name="volts")
     cleaned = cleaned_of(series, same_time=how)
     as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
@@ -352,7 +352,7 @@ def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
 
 
 def test_short_parts_are_left_out_and_counted(refused):
-    series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])  # five samples stand alone
+    series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])  # leaves an isolated part of five samples
     assert [len(part) for part in cleaned_of(series).parts] == [100, 5, 270]
     cleaned = cleaned_of(series, min_part=6)
     assert [len(part) for part in cleaned.parts] == [100, 270]
@@ -397,7 +397,7 @@ def test_the_interval_is_found_despite_jitter_and_gaps():
 
 @pytest.mark.parametrize("where", [0, 150, 340])
 def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
-    """Each sample of the stretch is given as five rows around its time whose mean it is."""
+    """Each sample of the stretch is replaced by five rows around its time whose mean equals the sample."""
     offsets, differences = np.array([-0.4, -0.2, 0.0, 0.2, 0.4]), np.array([1.0, -2.0, 0.5, 2.0, -1.5])
     inside = np.arange(where + 1, where + 51)
     fine = pd.Series(
@@ -424,12 +424,12 @@ def test_a_finer_stretch_at_the_beginning_takes_the_grid_of_what_follows():
 
 
 def test_a_wandering_clock_splits_the_series_before_max_jitter_is_exceeded():
-    wander = 2 * np.sin(np.arange(N) / 40)  # intervals: more than can be snapped
+    wander = 2 * np.sin(np.arange(N) / 40)  # in intervals; too much to be snapped
     cleaned = cleaned_of(with_times(TIMES + pd.to_timedelta(wander, unit="s"), np.arange(N)), max_jitter=0.2)
     assert len(cleaned.parts) > 5 and cleaned.report.rows_used > 0.9 * N
     begin = (pd.Timestamp(cleaned.parts[0].start) - START).total_seconds()
     for part in cleaned.parts:
-        rows = part.values.astype(int)  # the values count the rows; one that was filled lies between two
+        rows = part.values.astype(int)  # values are row numbers, so a filled sample lies between two integers
         real = part.values == rows
         assert np.abs(begin + part.time_s - rows - wander[rows])[real].max() <= 0.2 + 1e-6
 
@@ -442,7 +442,7 @@ def test_a_coarser_stretch_is_interpolated_or_left_out():
     assert cleaned.report.find("coarser stretches").samples_filled == len(inside)
     left = cleaned_of(series, other_rates="leave out")
     assert [len(part) for part in left.parts] == [121, 160] and left.report.find("other rates").rows_left_out == 29
-    wide = cleaned_of(series, max_fill=2)  # three missing samples between rows are more than may be filled
+    wide = cleaned_of(series, max_fill=2)  # three missing samples between rows are more than max_fill
     assert [len(part) for part in wide.parts] == [121, 160]
 
 
@@ -458,7 +458,7 @@ def test_a_noninteger_rate_ratio_is_interpolated():
 def test_a_given_interval_averages_the_rows_that_share_it():
     cleaned = cleaned_of(CLEAN, interval_s=4)
     (part,) = cleaned.parts
-    groups = np.round(np.arange(N) / 4).astype(int)  # the nearest place of the grid, halves to the even one
+    groups = np.round(np.arange(N) / 4).astype(int)  # the nearest grid point, with ties to even
     np.testing.assert_allclose(part.values, [VALUES[groups == group].mean() for group in range(groups[-1] + 1)], atol=1e-6)
     assert (part.interval_s, cleaned.report.find("averaged").rows_left_out) == (4, N - len(part))
     random = with_times(np.cumsum(np.random.default_rng(5).exponential(size=N)))
@@ -472,7 +472,7 @@ def test_local_times_are_converted_across_clock_changes():
     assert len(cleaned.parts) == 1 and len(cleaned.longest) == 500 and cleaned.longest.start == "2020-10-24T22:00:00+00:00"
     cleaned = cleaned_of(local.sample(frac=1, random_state=0), timezone="Europe/Berlin")
     found = cleaned.report.find("clock change")
-    assert found.rows_left_out == 120  # without their order, two hours cannot be told apart
+    assert found.rows_left_out == 120  # without chronological order, the repeated hour is ambiguous
     merged = cleaned_of(local, timezone="UTC")
     assert merged.report.find("same time").rows_left_out == 60
     spring = with_times(pd.date_range("2020-03-29T00:00", periods=300, freq="min"), np.sin(np.arange(300) / 9))
@@ -584,7 +584,7 @@ def test_no_row_is_lost_silently(cells, nominal, options, form):
     max_fill=st.integers(0, 6),
 )
 def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, max_fill):
-    """Rows are lost, emptied, doubled, jittered and shuffled; the oracle builds the parts from the places that are left."""
+    """Rows are dropped, emptied, duplicated, jittered and shuffled; the oracle builds the parts from the remaining times."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal(300)
     off = rng.uniform(-jitter, jitter, 300)

@@ -1,4 +1,4 @@
-"""What is kept in a real InfluxDB 2 server comes back to the bit, whatever happens to the server meanwhile; every refusal is one line."""
+"""Tests of the InfluxDB store with a real server: series are restored bit for bit despite server restarts; errors are one line."""
 
 import io
 import json
@@ -43,7 +43,7 @@ HOSTILE = [
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
-    """A server that is ours, or the running one that the variables name; else the reason why there is none."""
+    """The server started by the tests, or the running one that the environment variables name; skips if there is none."""
     pytest.importorskip("influxdb_client")
     if os.environ.get("ENHSIM_TF_INFLUXDB") == "running":
         yield influxd.Running()
@@ -58,7 +58,7 @@ def server(tmp_path_factory):
 
 @pytest.fixture
 def named(server, monkeypatch):
-    """The variables name the server."""
+    """Sets the environment variables to the server."""
     for name, value in zip(VARIABLES, (server.url, server.token, server.org), strict=True):
         monkeypatch.setenv(name, value)
     return server
@@ -66,7 +66,7 @@ def named(server, monkeypatch):
 
 @pytest.fixture
 def mortal(named):
-    """A server that may be killed, and lives when the test is over."""
+    """A server that the test may kill. It runs again after the test."""
     if not isinstance(named, influxd.Server):
         pytest.skip("the running server is not ours to kill")
     yield named
@@ -76,7 +76,7 @@ def mortal(named):
 
 @pytest.fixture
 def bucket(named):
-    """A bucket of the test's own."""
+    """A bucket used by one test only."""
     name = f"test {uuid.uuid4().hex[:12]}"
     with _client() as client:
         made = client.buckets_api().create_bucket(bucket_name=name)
@@ -91,7 +91,7 @@ def _client():
 
 
 def _put(bucket, lines):
-    """Writes points as somebody else would."""
+    """Writes points as another program would."""
     from influxdb_client.client.write_api import SYNCHRONOUS
 
     with _client() as client:
@@ -117,7 +117,7 @@ def _series(number=1_000, seed=0, **about):
 
 
 def _count(thing, method):
-    """A list that grows with each call of a method."""
+    """Records each call of a method in a list."""
     calls, plain = [], getattr(thing, method)
 
     def counted(*given):
@@ -385,7 +385,7 @@ import pyarrow
 from enhsim_tf.telemetry.influx_store import InfluxStore
 
 store = InfluxStore(sys.argv[1])
-for _ in store.chunks("million", stop_ns=10**9 * 1000):  # what is imported and kept once
+for _ in store.chunks("million", stop_ns=10**9 * 1000):  # imports and caches everything once
     pass
 found = []
 for stop in (10**5, 10**6):
@@ -399,7 +399,7 @@ print(*found)
 
 @pytest.fixture(scope="module")
 def million():
-    """Whole numbers in an order without pattern: their sum is exact in every order, and each is there once."""
+    """Distinct integers in random order. Their sum is exact in any order of summation."""
     return Telemetry(np.random.default_rng(0).permutation(MILLION).astype(np.float32), name="million", start="1970-01-01T00:00:00+00:00")
 
 
@@ -408,7 +408,7 @@ def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, b
     send = store.server.send
 
     def restart():
-        mortal.kill()  # while the next batches are on their way
+        mortal.kill()  # while further batches are being sent
         mortal.start()
 
     def counted(lines):
@@ -433,7 +433,7 @@ def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, b
     assert np.array_equal(times, 10**9 * np.arange(MILLION)) and values.tobytes() == million.values.astype(np.float64).tobytes()
     assert np.bitwise_xor.reduce(values.astype(np.int64)) == np.bitwise_xor.reduce(np.arange(MILLION))
 
-    # the same points, read in bounded memory, and read over a restart
+    # the same points, read in bounded memory and during a restart
     done = subprocess.run([sys.executable, "-c", MEMORY, _location(bucket)], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     few, few_bytes, few_arrow, many, many_bytes, many_arrow = map(int, done.stdout.split())
@@ -479,7 +479,7 @@ def test_the_old_series_stays_until_the_new_one_is_complete(mortal, bucket, refu
 
 @pytest.fixture
 def pretended(monkeypatch):
-    """Variables that name a server where none is."""
+    """Environment variables that name a server that does not exist."""
     pytest.importorskip("influxdb_client")
     for name, value in zip(VARIABLES, ("http://127.0.0.1:9", "secret-token", "nobody"), strict=True):
         monkeypatch.setenv(name, value)
@@ -666,7 +666,7 @@ def test_missing_samples_are_noticed(bucket, refused):
 
 
 def _told(error):
-    """Everything that anybody could print of an error: its words, its chain and its traceback."""
+    """Everything that can be printed of an error: message, chained errors and traceback."""
     seen = []
     while error is not None:
         seen += [str(error), repr(error), "".join(traceback.format_exception(error)), repr(vars(error))]
@@ -730,7 +730,7 @@ def test_the_reproduction_runs_through_influxdb(named, bucket, tmp_path):
     for file in tmp_path.rglob("*"):
         assert not file.is_file() or named.token.encode() not in file.read_bytes()
 
-    with _client() as client:  # what the stage says is done is gone from the server
+    with _client() as client:  # the stage counts as done, but its series is deleted from the server
         for predicate in ('_measurement="paper"', '_measurement="enhsim_tf_series"'):
             client.delete_api().delete("1970-01-01T00:00:00Z", "2200-01-01T00:00:00Z", predicate, bucket)
     done = _reproduce(tmp_path, "--store", place, "--out", tmp_path / "anew")

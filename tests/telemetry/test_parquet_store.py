@@ -1,4 +1,4 @@
-"""What is kept comes back to the bit, and nothing else is touched."""
+"""Tests of the Parquet store: series are restored bit for bit, and no other files are changed."""
 
 import numpy as np
 import pandas as pd

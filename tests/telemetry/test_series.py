@@ -1,4 +1,4 @@
-"""Reading, checking, splitting and cutting of telemetry."""
+"""Tests of reading and checking single files, and of splitting and cutting series."""
 
 import numpy as np
 import pandas as pd
@@ -58,7 +58,7 @@ def test_bad_values_are_refused(tmp_path, refused, name):
     with refused(words, "series.npy"):
         read_telemetry(write(tmp_path / "series.npy", values), min_samples=10)
     if values.dtype.kind != "c":
-        with refused(words if name not in ("empty", "text") else ""):  # an empty column of a table has no type
+        with refused(words if name not in ("empty", "text") else ""):  # an empty table column has no dtype
             read_telemetry(write(tmp_path / "series.csv", pd.DataFrame({"value": values})), min_samples=10)
         with refused(words if name not in ("empty", "text") else ""):
             read_telemetry(write(tmp_path / "series.parquet", pd.DataFrame({"value": values})), min_samples=10)
@@ -231,7 +231,7 @@ def test_split_leaves_gaps_and_uses_nearly_all_samples(number, fractions):
     whole = Telemetry(np.arange(number, dtype=np.float32), interval_s=2.0, offset_s=11.0)
     parts = split_by_time(whole, fractions, gap)
     for before, after in zip(parts[:-1], parts[1:], strict=True):
-        assert after.values[0] - before.values[-1] - 1 == gap  # the values count the samples
+        assert after.values[0] - before.values[-1] - 1 == gap  # values are sample numbers
     for part, fraction in zip(parts, fractions, strict=True):
         assert (part.time_s == 11 + 2 * part.values).all()
         assert len(part) == pytest.approx(fraction * (number - gap * (len(fractions) - 1)), abs=1)

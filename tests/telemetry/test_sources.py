@@ -1,4 +1,4 @@
-"""Raw channels from every kind of source, and what a source cannot be."""
+"""Tests of reading raw channels from every kind of source, and of invalid sources."""
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,7 @@ TABLE = pd.DataFrame({"utc": TIMES, "volts": VALUES, "mode": "nominal", "amps": 
 
 
 def lines(*columns, header="utc,volts", separator=","):
-    """CSV text of columns of cells."""
+    """CSV text of the given columns."""
     rows = [separator.join(str(cell) for cell in row) for row in zip(*columns, strict=True)]
     return "\n".join([header, *rows]) + "\n"
 
@@ -105,7 +105,7 @@ def test_channels_without_time(tmp_path):
 
 
 def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
-    """Seven rows in; one without a time, one with a word for it, one doubled, one cut short by a killed recorder."""
+    """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
     rows = [
         "2020-03-01T00:00:00,1",
         ",2",

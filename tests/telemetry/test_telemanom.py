@@ -1,4 +1,4 @@
-"""Labelled data sets: a small one made by hand with every oddity of the published file, and the real one where it is at hand."""
+"""Tests of labelled data: a small data set with every oddity of the published file, and the published one if available."""
 
 from pathlib import Path
 
@@ -151,7 +151,7 @@ needs_smap = pytest.mark.skipif(not is_labelled(SMAP), reason="needs ../shared/d
 def test_the_published_channels():
     channels = {channel.labels.channel: channel for channel in load_labelled(SMAP, spacecraft="SMAP")}
     lengths = {name: int(channel.is_anomalous.sum()) for name, channel in channels.items()}
-    assert lengths == {"P-3": 1_336, "A-2": 111, "A-3": 186, "G-1": 121, "T-1": 1_536, "T-3": 184}  # as its description counts them
+    assert lengths == {"P-3": 1_336, "A-2": 111, "A-3": 186, "G-1": 121, "T-1": 1_536, "T-3": 184}  # lengths as published
     for name, channel in channels.items():
         assert np.array_equal(channel.test.values, np.load(SMAP / "test" / f"{name}.npy")[:, 0].astype(np.float32))
         assert channel.train_commands.shape == (len(channel.train), 24)
@@ -160,7 +160,7 @@ def test_the_published_channels():
 
 @needs_smap
 def test_the_stuck_sequences_are_found_stuck():
-    """The labels are in step with the values: in each of the three stuck anomalies is the longest run of one value."""
+    """Labels match the values: each of the three stuck anomalies contains the longest run of one value."""
     for name in ("A-2", "A-3", "G-1"):
         channel = load_channel(SMAP, name)
         ((start, stop),) = channel.labels.sequences
