@@ -1,9 +1,9 @@
-"""Faults, tried for real on the commands with tiny networks: `python -m tests.faults fleet|reproduce --out docs/faults.json`.
+"""Fault injection into the real commands with tiny networks: `python -m tests.faults fleet|reproduce --out docs/faults.json`.
 
-Each try starts a command, does it some harm at a random moment, runs the same command again until it ends well, and
-compares what it made with what was made without any disturbance: every byte of the data set of `generate`; every figure's
+Each try starts a command, injects a fault at a random moment, runs the same command again until it succeeds, and
+compares the results with those of an undisturbed run: every byte of the data set of `generate`; every figure's
 arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
-tries the same in small; this takes minutes for `fleet` and about an hour for `reproduce`. `python -m tests.faults readme --out
+tries the same on a smaller scale; this takes minutes for `fleet` and about an hour for `reproduce`. `python -m tests.faults readme --out
 docs/faults.json` fills the README's table from the file.
 """
 
@@ -31,7 +31,7 @@ TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "ru
 
 
 def as_markdown(table):
-    """The README's table: what was tried on which command, how often, and what came of it."""
+    """The README's table: the faults, the command, the number of tries, and the outcomes."""
     commands = {"fleet": "`generate --workers`", "reproduce": "`enhsim_tf.reproduce`"}
     lines = ["| fault | command | tries | outcome |", "|---|---|---|---|"]
     for row in table:
@@ -68,7 +68,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0, help="of the moments and places")
     parser.add_argument("--out", type=Path, required=True, help="the table, as JSON")
     options = parser.parse_args()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it, and so would what it starts
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore SIGINT, and so would their child processes
     kept = json.loads(options.out.read_text()) if options.out.exists() else []
     if options.of == "readme":
         fill_readme(kept)

@@ -1,4 +1,4 @@
-"""What the tries of `faults.py` share: a place to try in, and the harm that is the same whichever command it is done to."""
+"""Shared parts of the fault injection: the folder of the tries, and faults that apply to every command."""
 
 import abc
 import contextlib
@@ -13,14 +13,14 @@ from pathlib import Path
 from tests.datasets.test_generate import children_of
 
 ROOT = Path(__file__).parents[2]
-MISSED = "too early or late"  # begins the outcome of a try that met nobody: it does not count, and is done again
+MISSED = "too early or late"  # prefix of the outcome of a try that hit no running process; it does not count and is repeated
 
 
 class Bench(abc.ABC):
-    """A place for tries, with what the command makes without any fault; each try has a name and a folder of that name."""
+    """A folder for tries, with the results of an undisturbed run. Each try has a name and a folder of that name."""
 
-    same: str  # what is equal after a recovery
-    disks = (".",)  # the folders of a try that a file system of its own is mounted on, one of them at random
+    same: str  # description of what must be equal after a recovery
+    disks = (".",)  # folders of a try, one of which, chosen at random, gets a separate small file system
 
     def __init__(self, folder):
         self.folder = folder
@@ -32,18 +32,18 @@ class Bench(abc.ABC):
 
     @abc.abstractmethod
     def command(self, name):
-        """What follows `python` on the command's line."""
+        """The arguments of `python` that run the command."""
 
     @abc.abstractmethod
     def wrong(self, name):
-        """What is wrong with what a run left, if anything."""
+        """Describes what is wrong with the results of a run; None if they are correct."""
 
     def start(self, name, *options, **how):
         how = {"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True} | how
         return subprocess.Popen(list(map(str, [sys.executable, *self.command(name), *options])), **how)
 
     def ran(self, name, *options, **how):
-        """A run to its end: its exit code, what it said, and its errors."""
+        """Runs the command to its end; returns the exit code, the output and the errors."""
         process = self.start(name, *options, **how)
         out, err = process.communicate()
         return process.returncode, out, err
@@ -53,18 +53,18 @@ class Bench(abc.ABC):
         time.sleep(rng.uniform(0.02, 0.95) * self.seconds)
 
     def copy(self, name):
-        """What a finished run left, to be damaged."""
+        """Copies the results of the undisturbed run, to be damaged."""
         return Path(shutil.copytree(self.folder / "undisturbed", self.folder / name))
 
     def again(self, name, said=None):
-        """What is wrong after the same command, given again: how it ends, what it leaves, and the word it has to say once."""
+        """Runs the same command again and describes what is wrong with its exit code, results or output (`said`); None if nothing is."""
         code, out, err = self.ran(name)
         if code or err:
             return f"NOT recovered: {code} {err.strip()[-200:]}"
         return self.wrong(name) or (f"NOT said: {said}" if said is not None and out.count(said) != 1 else None)
 
     def recovered(self, name, said=None):
-        """The outcome of a try: the same command is given again; where all is well, the try's folder goes."""
+        """Runs the same command again and returns the outcome of the try. If it recovered, the folder of the try is removed."""
         wrong = self.again(name, said)
         if wrong is None:
             shutil.rmtree(self.folder / name)
@@ -72,7 +72,7 @@ class Bench(abc.ABC):
 
 
 def not_one_line(code, err, expected=2):
-    """What is wrong with how a command refused, if anything: a user's mistake ends in one line."""
+    """Describes what is wrong with the way a command failed; None if it ended with the expected code and one line."""
     begins = "error: " if expected == 2 else "interrupted"
     one_line = code == expected and len(err.splitlines()) == 1 and err.startswith(begins)
     return None if one_line else f"NOT one line: {code} {err.strip()[-300:]}"
@@ -99,7 +99,7 @@ def interrupt(bench, name, rng):
 
 @contextlib.contextmanager
 def small_disk(folder, size):
-    """Yields whether a file system of this size, in kilobytes, could be mounted on a folder; it goes with all that it holds."""
+    """Mounts a file system of this size, in kilobytes, on a folder; yields whether this succeeded, and unmounts it at the end."""
     folder.mkdir(parents=True, exist_ok=True)
     mounted = not subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", folder], capture_output=True).returncode
     try:
@@ -113,7 +113,7 @@ NOT_MOUNTED = "not tried: no file system can be mounted here"
 
 
 def full_disk(bench, name, rng):
-    """A file system that fills up while the command writes; made larger afterwards."""
+    """Lets the file system fill up while the command writes. It is enlarged afterwards."""
     total = sum(path.stat().st_size for path in (bench.folder / "undisturbed").rglob("*")) // 1024
     place = bench.folder / name
     with small_disk(place, int(rng.uniform(0.001, 0.99) * total)) as mounted:
@@ -129,7 +129,7 @@ def full_disk(bench, name, rng):
 
 
 def read_only(bench, name, rng):
-    """A folder becomes read-only after a run was killed at a random moment; writable again afterwards."""
+    """Makes a folder read-only after a run was killed at a random moment. It is writable again afterwards."""
     which = bench.disks[rng.integers(len(bench.disks))]
     place = bench.folder / name / which
     with small_disk(place, 1_000_000) as mounted:
@@ -140,7 +140,7 @@ def read_only(bench, name, rng):
         workers = children_of(process)
         process.send_signal(signal.SIGKILL)
         process.communicate()
-        while any(Path(f"/proc/{worker}").exists() for worker in workers):  # they may have files open
+        while any(Path(f"/proc/{worker}").exists() for worker in workers):  # workers may still have files open
             time.sleep(0.01)
         subprocess.run(["mount", "-o", "remount,ro", place], check=True)
         code, _, err = bench.ran(name)
@@ -151,7 +151,7 @@ def read_only(bench, name, rng):
 
 
 def flip(path, rng):
-    """One bit of a file is another."""
+    """Flips one bit of a file."""
     content = bytearray(path.read_bytes())
     content[rng.integers(len(content))] ^= 1 << rng.integers(8)
     path.write_bytes(content)
@@ -169,7 +169,7 @@ time.time, time.time_ns = lambda: _time() + _step(), lambda: _time_ns() + int(1e
 
 @contextlib.contextmanager
 def stepping(folder):
-    """Yields what steps the clock of a running command by seconds, and the environment to start it with.
+    """Yields a function that moves the clock of a running command by seconds, and the environment to start the command with.
 
     The machine's own clock stays: a `sitecustomize.py` in front of the command's modules shifts `time.time`, by what a file
     says at that moment. `time.monotonic` goes on evenly, as it does when an administrator steps the clock. Files are stamped
@@ -191,15 +191,15 @@ def stepping(folder):
 
 
 def stepped(folder, seconds):
-    """Moves the times of a folder and of all in it."""
+    """Shifts the modification times of a folder and of all files in it."""
     for path in (folder, *folder.rglob("*")):
-        with contextlib.suppress(FileNotFoundError):  # a run may be at work there
+        with contextlib.suppress(FileNotFoundError):  # a run may be changing the folder
             about = path.stat()
             os.utime(path, (about.st_atime + seconds, about.st_mtime + seconds))
 
 
 def clock_change(bench, name, rng):
-    """The clock jumps by years in the middle of a run; the next run finds files of another time, and the clock as it was."""
+    """Moves the clock by years during a run. The next run finds files with those times while the clock is correct again."""
     with stepping(bench.folder / f"{name}.clock") as (step, environment):
         process = bench.start(name, env=environment)
         bench.moment(rng)

@@ -1,4 +1,4 @@
-"""The faults of `faults.py`, tried on a data set of `python -m enhsim_tf generate --workers`: see there."""
+"""Fault injection into `python -m enhsim_tf generate --workers`."""
 
 import os
 import shutil
@@ -14,7 +14,7 @@ MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: fric
 
 
 class FleetBench(Bench):
-    """Tiny networks, a mix, and the data set as it is without any fault."""
+    """Tiny networks, a scenario file, and the data set of an undisturbed run."""
 
     same = "same bytes"
 
@@ -77,7 +77,7 @@ def two_runs(bench, name, rng):
     bench.moment(rng)
     code, _, err = bench.ran(name)
     first.communicate()
-    late = f"{MISSED}; " if code == 0 else ""  # the first had ended
+    late = f"{MISSED}; " if code == 0 else ""  # the first run had already ended
     wrong = not_one_line(code, err) if code else None
     if first.returncode:
         wrong = f"NOT undisturbed: {first.returncode}"
@@ -85,7 +85,7 @@ def two_runs(bench, name, rng):
 
 
 def lost_node(bench, name, rng):
-    """A node of a two-node Ray cluster is removed while both are at work."""
+    """Removes one node of a two-node Ray cluster while both nodes are working."""
     try:
         from ray.cluster_utils import Cluster
     except ModuleNotFoundError:

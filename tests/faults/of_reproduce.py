@@ -1,4 +1,4 @@
-"""The faults of `faults.py`, tried on the cache of `python -m enhsim_tf.reproduce`: see there."""
+"""Fault injection into `python -m enhsim_tf.reproduce` and its cache."""
 
 import json
 import os
@@ -8,11 +8,11 @@ from tests.datasets.test_generate import content_of
 from tests.faults.in_common import ROOT, Bench, clock_change, flip, full_disk, interrupt, kill, read_only
 
 DAMAGED = "damaged in the cache"
-LEFT_OUT = ("timings", "from_cache", "this_run_s")  # of results.json: times, and whether the cache had it
+LEFT_OUT = ("timings", "from_cache", "this_run_s")  # keys of results.json that differ between runs: times, and use of the cache
 
 
 def found_in(out):
-    """What a run found: each figure with its arrays, and `results.json` without times. `report.html` shows the same, with times."""
+    """The results of a run: the arrays of each figure, and `results.json` without times. `report.html` shows the same, with times."""
     found = content_of(out)
     del found["report.html"]
     results = json.loads((out / "results.json").read_text(encoding="utf-8"))
@@ -20,9 +20,9 @@ def found_in(out):
 
 
 def kept_in(cache):
-    """What a cache holds, to the byte: all files but the times of stages, and of a network its weights.
+    """The exact content of a cache: all files except the times of stages, and for a network its weights.
 
-    What Keras writes beside them counts how many layers the process has made before, so whether a stage came from the cache.
+    Other Keras metadata depends on how many layers the process created before, and therefore on the use of the cache.
     """
     kept = {}
     for path in sorted(path for path in cache.rglob("*") if path.is_file() and path.name != "stage.json"):
@@ -36,7 +36,7 @@ def kept_in(cache):
 
 
 class ReproduceBench(Bench):
-    """What a run finds without any fault, and its cache."""
+    """The results and the cache of an undisturbed run."""
 
     same = "same results"
     disks = ("cache", "out")
@@ -53,7 +53,7 @@ class ReproduceBench(Bench):
         place = self.folder / name
         for what, left, expected in (
             ("results", found_in(place / "out"), self.found),
-            ("cache", kept_in(place / "cache"), self.kept),  # leftovers among it
+            ("cache", kept_in(place / "cache"), self.kept),  # including leftovers
         ):
             differ = [part for part in sorted(left.keys() | expected.keys()) if left.get(part) != expected.get(part)]
             if differ:
@@ -62,7 +62,7 @@ class ReproduceBench(Bench):
 
 
 def damaged(pattern, harm):
-    """A fault: one file of a finished cache is damaged; the next run has to say so and do its stage again."""
+    """A fault that damages one file of a finished cache. The next run must report it and compute the stage again."""
 
     def fault(bench, name, rng):
         files = sorted(path for path in (bench.copy(name) / "cache").rglob(pattern) if path.is_file())
@@ -73,7 +73,9 @@ def damaged(pattern, harm):
 
 
 def cut(path, rng):
-    os.truncate(path, rng.integers(path.stat().st_size - 1))  # the last byte of a stage.json is the line's end, which nobody misses
+    os.truncate(
+        path, rng.integers(path.stat().st_size - 1)
+    )  # truncates at least two bytes: losing the final line break alone does no damage
 
 
 def flip_or_cut(path, rng):

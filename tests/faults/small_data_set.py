@@ -1,4 +1,4 @@
-"""A data set that needs no networks, as a command: what the tests stop, kill, starve and start twice.
+"""A command that makes a data set without networks. The tests interrupt it, kill it, limit its resources and start it twice.
 
 `python -m tests.faults.small_data_set OUT`: its simulator is a coarse one with white noise, so that it starts in a second.
 """
@@ -26,7 +26,7 @@ MIX = Mix(0.5, (ScenarioShare("stuck", 0.3, (0.2, 0.9), (0.0, 0.5)), ScenarioSha
 
 
 class Plain:
-    """What an enhanced simulator is to a shard, without a network: the coarse signal, a level, and white noise."""
+    """Stands in for an enhanced simulator, without a network: the coarse signal, a level, and white noise."""
 
     def __init__(self, noise_sd=0.1, levels=None):
         self.coarse, self.noise, self.levels, self.interval_s = COARSE, GaussianNoise(noise_sd, WINDOW), levels, INTERVAL_S
@@ -36,7 +36,7 @@ class Plain:
 
 
 class PlainMaker(ShardMaker):
-    """Makes shards with plain simulators, and takes its time."""
+    """Makes shards with plain simulators, and sleeps in between."""
 
     delay_s = 0.0
 
@@ -56,21 +56,21 @@ def plan(num_windows=1_000, shard=50, seed=3, mix=MIX, shares=(1.0,)):
 
 
 def die_at_thirteen(number):
-    """Work that kills its process at one number, always."""
+    """Work that always kills its process at one item."""
     import os
 
     return number if number != 13 else os._exit(9)
 
 
 def threads_and_square(number):
-    """Work that says how it is done."""
+    """Work that reports how it is executed."""
     import os
 
     return number**2, os.getpid(), os.environ["TF_NUM_INTRAOP_THREADS"], "tensorflow" in sys.modules
 
 
 def meet(folder, num_processes, number):
-    """Work that waits until there are so many processes at it."""
+    """Work that waits until the given number of processes have started."""
     import os
 
     (folder / str(os.getpid())).touch()
@@ -80,7 +80,7 @@ def meet(folder, num_processes, number):
 
 
 def threads_of(number):
-    """How many threads a process has: TensorFlow's, and those of linear algebra."""
+    """Thread counts of a process: those of TensorFlow and of linear algebra."""
     import os
 
     import threadpoolctl
@@ -89,7 +89,7 @@ def threads_of(number):
 
 
 def refuse(number):
-    """Work that finds a user's mistake."""
+    """Work that raises an InputError."""
     from enhsim_tf.common.errors import InputError
 
     raise InputError(f"Expected another number. Received: {number}.")

@@ -1,4 +1,4 @@
-"""The paper's reproduction in small, as a command: what `python -m tests.faults` stops, starves and damages.
+"""A small version of the reproduction as a command, into which `python -m tests.faults` injects faults.
 
 `python -m tests.faults.small_reproduction --cache DIR --out DIR` is `python -m enhsim_tf.reproduce --budget smoke --arrays` with two of
 the figures and the claims that need no detector and no clock: the same stages, cache and outputs, in a third of the time.
@@ -17,7 +17,7 @@ KEPT_CLAIMS, KEPT_FIGURES = ("C1", "C4", "C5", "C9"), ("fig04_enhanced_simulatio
 def main():
     check = command.check
 
-    def check_in_small(options):  # the first thing that the command does, so that an interrupt finds it at work
+    def check_in_small(options):  # the command's first step, so that an interrupt hits it while it works
         from enhsim_tf.reproduce import settings
         from enhsim_tf.reproduce.paper import claims
 

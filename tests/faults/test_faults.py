@@ -1,4 +1,4 @@
-"""The README's table of faults is the record's; nothing in the record was lost, and every fault of the list was tried."""
+"""The README's table of faults matches the record, every listed fault was tried, and no data was lost."""
 
 import json
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""Bad and hostile input, made by machine: what is tried is in `targets`, how it is judged in `judge`."""
+"""Fuzzing with bad and hostile input. `targets` lists the functions under test, and `judge` classifies the outcomes."""

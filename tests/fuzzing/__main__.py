@@ -1,6 +1,6 @@
-"""`python -m tests.fuzzing --inputs 100000 --out fuzzing.json`: every target, one process each, led by what inputs reach.
+"""`python -m tests.fuzzing --inputs 100000 --out fuzzing.json`: fuzzes every target in its own process, guided by coverage.
 
-Needs atheris. Inputs that fail are kept in the folder of `--failures`; the exit code is 1 where there are any.
+Requires atheris. Failing inputs are saved in the folder of `--failures`. The exit code is 1 if there are any.
 """
 
 import argparse
@@ -14,33 +14,33 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.fuzzing.judge import MOST_MIB, MOST_SECONDS
+from tests.fuzzing.judge import MAX_MIB, MAX_SECONDS
 from tests.fuzzing.targets import TARGETS
 
 ROOT = Path(__file__).parents[2]
-_LEAST = 500  # inputs of a target, however slow
+_MIN_INPUTS = 500  # smallest number of inputs of a target, however slow it is
 _PACKAGES = ("atheris", "tensorflow", "keras", "numpy", "pandas", "pyarrow", "h5py", "pyyaml")
 
 
 def shares(num_inputs: int, names: list[str]) -> dict[str, int]:
-    """How many inputs each target gets: as many in all as are asked for, or a few more.
+    """Distributes the inputs over the targets. Rounding may add a few.
 
     Args:
-        num_inputs: In all.
-        names: The targets.
+        num_inputs: Total number of inputs.
+        names: Names of the targets.
     """
     total = sum(TARGETS[name].weight for name in names)
-    return {name: max(min(_LEAST, num_inputs), -int(-num_inputs * TARGETS[name].weight // total)) for name in names}
+    return {name: max(min(_MIN_INPUTS, num_inputs), -int(-num_inputs * TARGETS[name].weight // total)) for name in names}
 
 
 def run(name: str, num_inputs: int, seed: int, failures: Path) -> dict[str, float]:
-    """Runs one target and returns what came of it.
+    """Runs one target and returns its counts of outcomes.
 
     Args:
-        name: The target's.
-        num_inputs: How many inputs.
-        seed: Of every change.
-        failures: A folder that takes the inputs that failed.
+        name: Name of the target.
+        num_inputs: Number of inputs.
+        seed: Seed of the mutations.
+        failures: Folder in which failing inputs are saved.
     """
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
@@ -52,7 +52,7 @@ def run(name: str, num_inputs: int, seed: int, failures: Path) -> dict[str, floa
     found |= {"counters_at_first": counters[0], "counters": counters[-1], "seconds": round(time.monotonic() - began)}
     if found["inputs"] < num_inputs:
         (failures / f"{name.replace(' ', '-')}-ended.txt").write_text(ended.stderr[-20_000:])
-        found["failed"] += 1  # it ended before its time
+        found["failed"] += 1  # the process ended early
     return found
 
 
@@ -75,7 +75,7 @@ def main() -> int:
     sums = {key: sum(target[key] for target in found.values()) for key in ("inputs", "accepted", "refused", "failed", "seconds")}
     largest = {key: max(target.get(key, 0) for target in found.values()) for key in ("slowest_s", "peak_mib", "more_than_at_first_mib")}
     about = {"command": f"python -m tests.fuzzing --inputs {options.inputs} --seed {options.seed}", "seed": options.seed}
-    about |= {"most_seconds": MOST_SECONDS, "most_mib": MOST_MIB}
+    about |= {"most_seconds": MAX_SECONDS, "most_mib": MAX_MIB}
     versions = {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES}
     record = about | {"all": sums | largest, "targets": found, "versions": versions}
     options.out.write_text(json.dumps(record, indent=2) + "\n")

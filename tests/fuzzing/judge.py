@@ -1,4 +1,4 @@
-"""Runs one input and says what came of it: accepted, refused in one good line, or failed."""
+"""Runs one input and classifies the outcome: accepted, refused with a well-formed error, or failed."""
 
 import contextlib
 import dataclasses
@@ -16,22 +16,22 @@ from pathlib import Path
 from enhsim_tf.common.errors import InputError
 from tests.fuzzing.target import UnusedError, is_good
 
-MOST_SECONDS = 5.0
-MOST_MIB = 1024
+MAX_SECONDS = 5.0
+MAX_MIB = 1024
 
 
 class TooLong(BaseException):
-    """An input that hangs; no handler of the library catches it."""
+    """Raised for an input that takes too long. It is a BaseException, so that the package does not catch it."""
 
 
 @dataclasses.dataclass
 class Outcome:
-    """What came of one input.
+    """The outcome of one input.
 
     Args:
-        verdict: accepted, refused, failed or unused.
-        seconds: How long it took.
-        why: The line of a refusal, or the end of a traceback.
+        verdict: "accepted", "refused", "failed" or "unused".
+        seconds: Run time in seconds.
+        why: The error message of a refusal, or the end of a traceback.
     """
 
     verdict: str
@@ -40,7 +40,7 @@ class Outcome:
 
 
 def _is_of_memory(error: BaseException | None) -> bool:
-    """Whether memory that the limit did not give stands behind an error: what refuses in time never asks for it."""
+    """Whether an error was caused by a MemoryError. Input that is refused in time never allocates that much."""
     while error is not None and not isinstance(error, MemoryError):
         error = error.__context__
     return error is not None
@@ -52,14 +52,14 @@ def judge(run: Callable[[bytes, Path], None], data: bytes, folder: Path) -> Outc
     Args:
         run: A target's function.
         data: The input.
-        folder: Emptied before and made the working directory.
+        folder: Working directory of the target. It is emptied first.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     before = os.getcwd()
     os.chdir(folder)
     signal.signal(signal.SIGALRM, _interrupt)
-    signal.setitimer(signal.ITIMER_REAL, MOST_SECONDS)
+    signal.setitimer(signal.ITIMER_REAL, MAX_SECONDS)
     began = time.perf_counter()
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
@@ -73,25 +73,25 @@ def judge(run: Callable[[bytes, Path], None], data: bytes, folder: Path) -> Outc
     except UnusedError:
         verdict, why = "unused", ""
     except TooLong:
-        verdict, why = "failed", f"still running after {MOST_SECONDS} s"
-    except BaseException as error:  # noqa: BLE001  every other error is what is looked for
+        verdict, why = "failed", f"still running after {MAX_SECONDS} s"
+    except BaseException as error:  # noqa: BLE001  any other exception is a failure
         verdict, why = "failed", "".join(traceback.format_exception(error)[-12:])
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         os.chdir(before)
     seconds = time.perf_counter() - began
-    if seconds > MOST_SECONDS:
+    if seconds > MAX_SECONDS:
         verdict, why = "failed", f"{seconds:.1f} s"
     return Outcome(verdict, seconds, why)
 
 
 def peak_mib() -> float:
-    """The most memory that this process has had, in MiB."""
+    """Peak memory of this process in MiB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def limit_memory(more_mib: int) -> None:
-    """Lets this process have so much more address space than it has now."""
+    """Limits the address space of this process to the current size plus the given amount."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + more_mib * 2**20
     resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))

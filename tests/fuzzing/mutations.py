@@ -1,4 +1,4 @@
-"""Changes to inputs: of bytes, of text, and of JSON by its structure. The same generator makes the same changes."""
+"""Mutations of inputs as bytes, as text, and as JSON structures. Equal generators make equal mutations."""
 
 import copy
 import json
@@ -18,7 +18,7 @@ NASTY_JSON = (None, True, False, [], {}, [[]], [None], {"": None}, [0] * 50, "x"
 
 
 def change_bytes(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
-    """Some changes to bytes: bits, values, pieces left out, repeated, moved in from another input."""
+    """Mutates bytes: flips bits, changes values, and drops, repeats or inserts pieces."""
     data = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 4, 8))):
         place = rng.randrange(len(data) + 1)
@@ -48,7 +48,7 @@ def change_bytes(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
 
 
 def change_text(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
-    """Some changes to text: a word or a number of it becomes another one, lines are repeated or left out."""
+    """Mutates text: replaces words and numbers, and repeats or drops lines."""
     text = data.decode("utf-8", "replace")
     for _ in range(rng.choice((1, 1, 2, 3))):
         kind = rng.randrange(5)
@@ -70,7 +70,7 @@ def change_text(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
 
 
 def change_json(data: bytes, rng: random.Random, others: list[bytes]) -> bytes:
-    """Some changes to JSON that leave it JSON: what stands somewhere becomes something else, or goes, or is doubled."""
+    """Mutates JSON so that it stays valid JSON: replaces, drops or repeats entries."""
     try:
         content = [json.loads(data)]
     except (ValueError, RecursionError):

@@ -1,6 +1,6 @@
-"""Targets that read what the package wrote: a model's folder, a large data set's folder.
+"""Targets that read folders written by the package: saved models and large data sets.
 
-What stands behind a checksum is changed and the checksum made right, as somebody would who wants it to be believed.
+Content protected by a checksum is changed together with its checksum, as an attacker would do.
 """
 
 import functools
@@ -47,11 +47,11 @@ def saved_model() -> dict[str, bytes]:
 
 
 def write_model(folder: Path, **changed: bytes) -> Path:
-    """Writes a saved simulator with some files changed and their checksums right.
+    """Writes a saved simulator with some files changed and correct checksums.
 
     Args:
         folder: Where to.
-        **changed: Contents by the names of files, with `_` for the point.
+        **changed: Content by file name, with `_` instead of the dot.
     """
     files = saved_model() | {name.replace("_", ".", 1): content for name, content in changed.items()}
     if "manifest_json" not in changed:
@@ -64,7 +64,7 @@ def write_model(folder: Path, **changed: bytes) -> Path:
 
 
 def archive_of(name: str, **members: bytes) -> bytes:
-    """A network's archive with some members changed.
+    """The archive of a saved network with some members changed.
 
     Args:
         name: Of the network.
@@ -79,7 +79,7 @@ def archive_of(name: str, **members: bytes) -> bytes:
 
 
 def member_of(name: str, member: str) -> bytes:
-    """A member of a network's archive."""
+    """Reads a member of the archive of a saved network."""
     with zipfile.ZipFile(io.BytesIO(saved_model()[f"{name}.keras"])) as archive:
         return archive.read(member)
 
@@ -105,7 +105,7 @@ def _settings(data: bytes, folder: Path) -> None:
 
 
 def _description(data: bytes, folder: Path) -> None:
-    """JSON as the description of one of the networks, which its name chooses."""
+    """JSON as the configuration of one of the networks, which is chosen by its name."""
     try:
         name = json.loads(data)["config"]["name"]
     except (ValueError, KeyError, TypeError, RecursionError):
@@ -125,7 +125,7 @@ def _weights(data: bytes, folder: Path) -> None:
 
 
 def _planned(data: bytes, folder: Path) -> None:
-    """JSON as the settings and the description of a model that is planned with but not loaded: fast, so often."""
+    """JSON as the settings and description of a model, which are read for planning without loading it."""
     content = json_of(data)
     texts = {name: json.dumps(content.get(name)).encode() for name in ("settings", "config")}
     model = write_model(folder / "model", settings_json=texts["settings"], enhancer_keras=archive_of("enhancer", config=texts["config"]))

@@ -26,7 +26,7 @@ def _wave() -> np.ndarray:
 
 
 def _use(source: Path | str, **options) -> None:
-    """Reads and cleans every channel of a source, strictly and not."""
+    """Reads and cleans every channel of a source, refusing and dropping bad cells."""
 
     def channels(cleaning: Cleaning) -> None:
         for series in read_source(source, options=cleaning, **options).values():
@@ -91,7 +91,7 @@ def _parquet_seeds() -> list[bytes]:
 
 
 def _parquet_about(data: bytes, folder: Path) -> None:
-    """JSON as what pandas wrote about a table into its file, and the kind of the first column."""
+    """JSON as the metadata that pandas writes into a Parquet file, and the type of the first column."""
     about = json_of(data)
     number = about.get("table", 0)
     table = _tables()[number if type(number) is int and number in range(7) else 0]
@@ -123,7 +123,7 @@ def _npy_seeds() -> list[bytes]:
 
 
 def _npy_header(data: bytes, folder: Path) -> None:
-    """Text as the header of an array, with its length set right, so that what it declares is believed or not."""
+    """Text as the header of a `.npy` file with a correct length, so that its content is parsed."""
     header = data[:60_000]
     content = b"\x93NUMPY\x02\x00" + len(header).to_bytes(4, "little") + header + bytes(480)
     all_of(lambda: _file("x.npy")(content, folder), lambda: _labelled(content, folder, "train"))
@@ -155,12 +155,12 @@ def _store_seeds() -> list[bytes]:
 
 
 def _store_about(data: bytes, folder: Path) -> None:
-    """JSON as what a store wrote about a series into its file."""
+    """JSON as the metadata that a store writes into the file of a series."""
     about = {str(key): str(value) for key, value in json_of(data).items()}
     table = pq.read_table(io.BytesIO(_store_seeds()[0]))
     try:
         content = _parquet_bytes(table.replace_schema_metadata(about))
-    except UnicodeEncodeError:  # a surrogate, which Arrow does not write
+    except UnicodeEncodeError:  # Arrow cannot write surrogates
         raise UnusedError from None
     _store_file(content, folder)
 
@@ -171,7 +171,7 @@ def _store_about_seeds() -> list[bytes]:
 
 
 def _store_names(data: bytes, folder: Path) -> None:
-    """A channel's name through the store: it stands below the store's folder, and comes back as it was."""
+    """A channel name in a store: its folder is inside the store, and the name is restored."""
     name = text_of(data)
     all_of(lambda: _round_trip(name, folder / "store"), lambda: _use(f"{folder / 'store'}#{name}"), lambda: ParquetStore(folder).read(name))
 

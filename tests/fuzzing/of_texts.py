@@ -1,4 +1,4 @@
-"""Targets that read text: the scenario file, options of the command line, addresses, names, answers of a database."""
+"""Targets that parse text: scenario files, command-line options, addresses, names and database responses."""
 
 import contextlib
 import io
@@ -53,7 +53,7 @@ def _scenario_file(data: bytes, folder: Path) -> None:
 
 
 def _channel_name(data: bytes, folder: Path) -> None:
-    """A channel's folder is one step below the models' folder, whatever its name, and no name that a system keeps for itself."""
+    """For any channel name, the folder is directly inside the models folder and its name is not reserved by a system."""
     found = folder_of(folder, text_of(data))
     found.mkdir()
     assert found.parent == folder and [path.name for path in folder.iterdir()] == [found.name]
@@ -90,7 +90,7 @@ def _column_options(data: bytes, folder: Path) -> None:
 
 
 def _source_name(data: bytes, folder: Path) -> None:
-    text = text_of(data).replace("/", ":")  # not out of this folder
+    text = text_of(data).replace("/", ":")  # so that it does not leave this folder
     (folder / "x.csv").write_text("value\n1\n2\n3\n")
     all_of(lambda: read_source(text), lambda: read_source(f"store#{text}"), lambda: read_telemetry(text), lambda: read_mix(text))
 
@@ -104,7 +104,7 @@ def _command_line(data: bytes, folder: Path) -> None:
 
 
 class _Answer:
-    """An answer of a server, a few bytes at a time."""
+    """A server response that is read a few bytes at a time."""
 
     def __init__(self, data: bytes):
         self.left = io.BytesIO(data)
@@ -133,7 +133,7 @@ def _server_answer_seeds() -> list[bytes]:
 
 
 def _server_description(data: bytes, folder: Path) -> None:
-    """JSON as what a server answers for the description of a series."""
+    """JSON as a server's response for the description of a series."""
     about = json_of(data)
     with _named_server():
         store = InfluxStore("influxdb://bucket/measurement/field")
@@ -150,7 +150,7 @@ def _server_description_seeds() -> list[bytes]:
 
 
 def _store_write(data: bytes, folder: Path) -> None:
-    """A name of a series and of where it goes, as line protocol: one line a point, whatever is in the names."""
+    """A series name and location in line protocol: one line per point, whatever the names contain."""
     name = text_of(data)
     with _named_server():
         all_of(lambda: _written("influxdb://bucket/measurement/field", name), lambda: _written(name, "volts"))

@@ -1,4 +1,4 @@
-"""What a target is: a function of bytes, seeds to begin with, and a way to change them."""
+"""A fuzzing target: a function of bytes, seed inputs, and the mutations to apply."""
 
 import dataclasses
 import json
@@ -10,23 +10,23 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 from tests.fuzzing.mutations import change_bytes, change_json, change_text
 
-MOST_LETTERS = 600  # of a refusal
+MAX_CHARACTERS = 600  # of an error message
 CHANGES = {"bytes": change_bytes, "text": change_text, "json": change_json}
 
 
 class UnusedError(Exception):
-    """Bytes that are no input for a target; they are not counted."""
+    """Raised for bytes that are not an input for a target. They are not counted."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A loader and how inputs for it are made.
+    """A function under test and how inputs for it are made.
 
     Args:
-        run: Takes an input and an empty folder; `InputError` refuses the input.
-        seeds: Makes valid inputs.
-        form: bytes, text or json: how inputs are changed.
-        weight: Its share of the inputs, against the others'.
+        run: Called with an input and an empty folder. Raises `InputError` to refuse the input.
+        seeds: Returns valid inputs.
+        form: Kind of mutations: "bytes", "text" or "json".
+        weight: Number of inputs relative to other targets.
     """
 
     run: Callable[[bytes, Path], None]
@@ -35,13 +35,13 @@ class Target:
     weight: float = 1.0
 
     def change(self, data: bytes, rng: random.Random, seeds: list[bytes]) -> bytes:
-        """A changed input; now and then by its bytes, whatever its form is."""
+        """Returns a mutated input. One in ten is mutated as bytes, whatever `form` is."""
         form = "bytes" if rng.random() < 0.1 else self.form
         return CHANGES[form](data, rng, seeds)
 
 
 def all_of(*calls: Callable[[], None]) -> None:
-    """Makes all calls; if each refuses, a refusal is raised at the end."""
+    """Makes all calls. If all of them raise `InputError`, raises the first one at the end."""
     refusals = []
     for call in calls:
         try:
@@ -54,17 +54,17 @@ def all_of(*calls: Callable[[], None]) -> None:
 
 
 def is_good(line: str) -> bool:
-    """Whether a refusal is one printable line, not too long, that says what was expected and received."""
-    return line.isprintable() and len(line) <= MOST_LETTERS and line.startswith("Expected ") and "Received: " in line
+    """Whether an error message is one short printable line that says what was expected and received."""
+    return line.isprintable() and len(line) <= MAX_CHARACTERS and line.startswith("Expected ") and "Received: " in line
 
 
 def text_of(data: bytes) -> str:
-    """Text as the command line gives it: what is not UTF-8 becomes surrogates."""
+    """Decodes bytes as the command line does: invalid UTF-8 becomes surrogates."""
     return data.decode("utf-8", "surrogateescape")
 
 
 def json_of(data: bytes) -> dict[str, Any]:
-    """A JSON object that a target makes a file of; other bytes are unused."""
+    """Parses a JSON object; other bytes count as unused."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):

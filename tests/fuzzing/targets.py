@@ -1,4 +1,4 @@
-"""The table of targets: everything of the package that reads what somebody else may have written."""
+"""The table of targets: all functions of the package that read data which others may have written."""
 
 from tests.fuzzing import of_folders, of_tables, of_texts
 from tests.fuzzing.target import Target

@@ -1,6 +1,6 @@
-"""One target in a process of its own: atheris changes its inputs by what they reach in the package's code.
+"""Fuzzes one target in its own process. atheris mutates the inputs, guided by their coverage of the package's code.
 
-`python -m tests.fuzzing.worker TARGET INPUTS SEED RECORD FAILURES`; libFuzzer tells on standard error how many counters grew.
+`python -m tests.fuzzing.worker TARGET INPUTS SEED RECORD FAILURES`; libFuzzer prints its coverage counters on standard error.
 """
 
 import atexit
@@ -17,28 +17,28 @@ import atheris  # noqa: E402
 with atheris.instrument_imports(include=["enhsim_tf"], enable_loader_override=False):
     from tests.fuzzing.targets import TARGETS
 
-from tests.fuzzing.judge import MOST_MIB, judge, limit_memory, peak_mib  # noqa: E402
+from tests.fuzzing.judge import MAX_MIB, judge, limit_memory, peak_mib  # noqa: E402
 
-_MAX_FAILURES = 5  # that are kept of a target
+_MAX_FAILURES = 5  # failing inputs saved for each target
 
 
 def main(name: str, num_inputs: int, seed: int, record: Path, failures: Path) -> None:
-    """Runs a target's inputs and writes what came of them.
+    """Runs the inputs of a target and writes the counts of outcomes.
 
     Args:
-        name: The target's.
-        num_inputs: How many inputs are tried.
-        seed: Of every change.
-        record: A JSON file.
-        failures: A folder that takes the inputs that failed.
+        name: Name of the target.
+        num_inputs: Number of inputs.
+        seed: Seed of the mutations.
+        record: JSON file for the counts.
+        failures: Folder in which failing inputs are saved.
     """
     target, folder = TARGETS[name], Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
     seeds, rng = target.seeds(), random.Random(seed)
     for data in seeds:
-        judge(target.run, data, folder / "work")  # whatever is imported late is imported now
+        judge(target.run, data, folder / "work")  # triggers late imports before memory is measured
     counts = {"inputs": 0, "accepted": 0, "refused": 0, "failed": 0, "unused": 0, "slowest_s": 0.0}
     begin_mib = peak_mib()
-    limit_memory(2 * MOST_MIB)
+    limit_memory(2 * MAX_MIB)
 
     def try_one(data: bytes) -> None:
         if counts["inputs"] >= num_inputs:

@@ -1,7 +1,7 @@
-"""Bad and hostile input made by machine: nothing but a result or a refusal in one line comes of it.
+"""Fuzzing with bad and hostile input: every input is either accepted or refused with an error of one line.
 
-The same targets are tried at length by `python -m tests.fuzzing`, led by what inputs reach; here the changes are the same in
-every run, and few enough for each run.
+`python -m tests.fuzzing` runs the same targets for longer and guided by code coverage. Here the inputs are the same in every run,
+and few enough to be tried each time.
 """
 
 import importlib.util
@@ -18,16 +18,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
-from tests.fuzzing import judge as judge_room
+from tests.fuzzing import judge as judge_module
 from tests.fuzzing.__main__ import shares
-from tests.fuzzing.judge import MOST_MIB, MOST_SECONDS, judge
+from tests.fuzzing.judge import MAX_MIB, MAX_SECONDS, judge
 from tests.fuzzing.mutations import change_json
-from tests.fuzzing.target import MOST_LETTERS, Target, all_of, is_good
+from tests.fuzzing.target import MAX_CHARACTERS, Target, all_of, is_good
 from tests.fuzzing.targets import TARGETS
 
 ROOT = Path(__file__).parents[2]
 _INPUTS = 60  # for a target of weight 1
-_SLOW = {name for name, target in TARGETS.items() if target.weight < 1}  # those that load networks
+_SLOW = {name for name, target in TARGETS.items() if target.weight < 1}  # targets that load networks
 
 _anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
@@ -58,7 +58,10 @@ def test_changed_inputs_are_accepted_or_refused_in_one_line(name, tmp_path):
         outcome = judge(target.run, data, tmp_path / "work")
         assert outcome.verdict != "failed", f"{data[:300]!r}\n{outcome.why}"
         verdicts.add(outcome.verdict)
-    assert "refused" in verdicts or name in ("manifest of a model", "journal of a data set")  # of these something can always be read
+    assert "refused" in verdicts or name in (
+        "manifest of a model",
+        "journal of a data set",
+    )  # for these targets, some content can always be read
 
 
 @pytest.mark.parametrize("name", sorted(set(TARGETS) - _SLOW))
@@ -147,7 +150,7 @@ def _loops(data, folder):
     ],
 )
 def test_the_judge_recognises_each_verdict(monkeypatch, tmp_path, run, verdict):
-    monkeypatch.setattr(judge_room, "MOST_SECONDS", 0.2)
+    monkeypatch.setattr(judge_module, "MAX_SECONDS", 0.2)
     assert judge(run, b"", tmp_path / "work").verdict == verdict
 
 
@@ -158,13 +161,13 @@ def test_a_refusal_is_seen_among_several_calls():
         all_of(lambda: good(0, 0), lambda: good(0, 0))
     with pytest.raises(AssertionError):
         all_of(lambda: bad(0, 0), lambda: None)
-    assert not any(map(is_good, ["Expected a. Received: \x1b[31m.", f"Expected a. Received: {'b' * MOST_LETTERS}."]))
+    assert not any(map(is_good, ["Expected a. Received: \x1b[31m.", f"Expected a. Received: {'b' * MAX_CHARACTERS}."]))
 
 
 @pytest.mark.parametrize("text", ["a\nb", "\x1b[31mred", "\u202eabc", "x" * 10_000, "\ud800", "a\x85b\u2028c\rd"])
 def test_every_refusal_is_one_printable_line(text):
     line = str(InputError(f"Expected a. Received: {text}. Do c."))
-    assert line.isprintable() and len(line) <= MOST_LETTERS and line.startswith("Expected a.") and line.endswith("Do c.")
+    assert line.isprintable() and len(line) <= MAX_CHARACTERS and line.startswith("Expected a.") and line.endswith("Do c.")
 
 
 def test_an_allocation_beyond_the_limit_is_a_failure(tmp_path):
@@ -218,8 +221,8 @@ def test_the_record_covers_the_stated_number_of_inputs():
     assert all(each["accepted"] and each["counters"] for each in record["targets"].values())
     grown = [name for name, each in record["targets"].items() if each["counters"] > each["counters_at_first"]]
     assert len(grown) > len(TARGETS) / 2
-    assert total["peak_mib"] < MOST_MIB
-    assert total["slowest_s"] < MOST_SECONDS == record["most_seconds"] and total["more_than_at_first_mib"] < MOST_MIB == record["most_mib"]
+    assert total["peak_mib"] < MAX_MIB
+    assert total["slowest_s"] < MAX_SECONDS == record["most_seconds"] and total["more_than_at_first_mib"] < MAX_MIB == record["most_mib"]
 
 
 def test_the_stated_numbers_match_the_record():

@@ -1,6 +1,6 @@
-"""A model of somebody else cannot run code, take memory that its files do not hold, or lead out of its folder: tried for real.
+"""A malicious model cannot run code, allocate more memory than its files justify, or access files outside its folder.
 
-Each payload would create a file if it ran. The checksums are right throughout, as somebody would make them who wants to be believed.
+Each payload would create a file if it ran. All checksums are correct, as an attacker would make them.
 """
 
 import io
@@ -26,7 +26,7 @@ from tests.fuzzing.of_folders import archive_of, member_of, saved_model, write_m
 
 @pytest.fixture
 def refused_without_running(tmp_path, refused):
-    """Loads a model, which must be refused in one line, and nothing must have run."""
+    """Loads a model, and checks that it is refused in one line and that no payload ran."""
 
     def check(*words, **changed):
         model = write_model(tmp_path / "models" / "volts", **changed)
@@ -67,7 +67,7 @@ def test_the_model_as_it_was_written_loads(tmp_path):
     assert EnhancedSimulator.load(model).generate(2).shape == (2, 24) and plan_of(Mix(), model, 0, 5).window == 24
 
 
-@pytest.mark.filterwarnings("default")  # as it is for users: Keras would warn, and keep weights that nobody trained
+@pytest.mark.filterwarnings("default")  # as for users: Keras would only warn and keep untrained weights
 def test_a_network_whose_weights_are_those_of_another_is_refused(refused_without_running):
     content = json.loads(member_of("generator", "config.json"))
     content["config"]["name"] = "enhancer"
@@ -78,7 +78,7 @@ def test_marshalled_code_in_a_lambda_layer_does_not_run(tmp_path, refused_withou
     import base64
 
     code = compile(f"open({str(tmp_path / 'ran')!r}, 'w')", "payload", "eval")
-    exec(code)  # it would
+    exec(code)  # unprotected, it runs
     os.remove(tmp_path / "ran")
     function = {
         "class_name": "__lambda__",
@@ -92,7 +92,7 @@ def test_a_lambda_layer_that_keras_itself_saved_does_not_run(tmp_path, refused_w
         [keras.Input((24,)), keras.layers.Lambda(lambda values, path=str(tmp_path / "ran"): (open(path, "w"), values)[1])]
     )
     network.save(tmp_path / "lambda.keras")
-    (tmp_path / "ran").unlink()  # it ran when it was built here
+    (tmp_path / "ran").unlink()  # building it here ran the payload
     refused_without_running("Lambda", enhancer_keras=(tmp_path / "lambda.keras").read_bytes())
 
 
@@ -135,7 +135,7 @@ def test_a_registered_class_is_not_instantiated(tmp_path, refused_without_runnin
 
 
 class Payload:
-    """Pickled, it makes a file when it is loaded."""
+    """Creates a file when it is unpickled."""
 
     def __init__(self, path):
         self.path = path
@@ -147,7 +147,7 @@ class Payload:
 def test_pickled_objects_in_arrays_are_not_loaded(tmp_path, refused):
     ran = str(tmp_path / "ran")
     content = pickle.dumps(Payload(ran))
-    pickle.loads(content).close()  # it would
+    pickle.loads(content).close()  # unprotected, it runs
     os.remove(ran)
     (tmp_path / "plain.npy").write_bytes(content)
     np.save(tmp_path / "objects.npy", np.array([Payload(ran)] * 3, object), allow_pickle=True)

@@ -1,7 +1,7 @@
-"""Names of channels, columns and sources may hold anything: they stay in their folder, and print as one plain line.
+"""Hostile names of channels, columns and sources cannot leave their folder, and are printed as one plain line.
 
-With the real writers: models, training data, scores, stores, reports. The page `report.html` has its own test in
-`test_page.py`, with hostile words wherever one can come from a file.
+The tests use the real writers of models, training data, scores, stores and reports. The page `report.html` is tested in
+`test_page.py`.
 """
 
 import html.parser
@@ -32,7 +32,7 @@ NAMES = (
     "-rf", "~", "%2e%2e", "%", "a?b*c|d", "$HOME", "`id`", "a" * 160,
 )  # fmt: skip
 REFUSED = ("", "a" * 181, "é" * 40, "\ud800", "a\udcffb", "." * 61)
-KEPT = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}  # by Windows
+KEPT = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}  # reserved by Windows
 ALLOWED = set(string.ascii_letters + string.digits + "%_-~ ")
 
 
@@ -83,14 +83,14 @@ def test_a_store_keeps_every_name_in_its_folder(tmp_path):
 
 
 def lines_of(capfd):
-    """Everything that was printed, whose lines hold nothing but what prints."""
+    """The printed output; checks that it has only printable characters."""
     out, error = capfd.readouterr()
     lines = [*out.split("\n"), *error.split("\n")]
     assert all(line.isprintable() for line in lines), [line for line in lines if not line.isprintable()]
     return lines
 
 
-COMMANDED = [name for name in NAMES if name == name.strip()]  # a table's columns lose the spaces around them
+COMMANDED = [name for name in NAMES if name == name.strip()]  # spaces around the column names of a table are stripped
 
 
 @pytest.fixture
@@ -151,7 +151,7 @@ def test_a_fit_of_hostile_channels_stays_in_its_folder(tmp_path, capfd):
     lines = lines_of(capfd)
     assert sum("<script>" in line for line in lines) and sum(line.startswith("error: short") for line in lines) == 1
     report = json.loads((folder_of(out, names[0]) / "report.json").read_text())
-    assert report["cleaning"]["channel"] == names[0]  # in JSON it stays what it is
+    assert report["cleaning"]["channel"] == names[0]  # JSON keeps the name unchanged
     assert "\x1b" not in (folder_of(out, names[0]) / "report.json").read_text()
 
 

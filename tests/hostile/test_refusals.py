@@ -1,4 +1,4 @@
-"""What the command refuses: exit code 2, one line that says what was expected and received, and nothing written."""
+"""Refused input of the commands: exit code 2, one line that says what was expected and received, and no files written."""
 
 import subprocess
 import sys
@@ -114,7 +114,7 @@ def told(tmp_path, capfd):
 
 @pytest.fixture
 def refused_line(told, tmp_path):
-    """Runs the command, which must refuse: exit code 2, one line, and no file written anywhere; returns the line."""
+    """Runs the command and checks that it refuses: exit code 2, one line, and no file written. Returns the line."""
 
     def files():
         return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
@@ -142,7 +142,7 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
     ("arguments", "word"),
     [
         (["--seed", "-1"], "--seed -1"),
-        (["--seed", str(2**32)], str(2**32)),  # the detectors and the classifier take no larger one
+        (["--seed", str(2**32)], str(2**32)),  # the detectors and the classifier accept no larger seed
         (["--spread", "-1"], "--spread -1"),
         (["--only", "fig15"], "fig15"),
         (["--only", "fig0"], "fig0"),

@@ -1,6 +1,6 @@
-"""The token of a database and the passwords of addresses stay out of everything that is printed or written.
+"""The database token and passwords in URLs never appear in anything that is printed or written.
 
-What needs a server is in `test_influx_store.py::test_the_token_appears_nowhere`.
+Tests that need a server are in `test_influx_store.py::test_the_token_appears_nowhere`.
 """
 
 import logging
@@ -21,7 +21,7 @@ TOKEN, PASSWORD = "token-0123456789abcdef==", "pass-0123456789"
 
 @pytest.fixture(autouse=True)
 def named_server(monkeypatch):
-    """Variables of a server that is not there."""
+    """Environment variables that name a server that does not exist."""
     pytest.importorskip("influxdb_client")
     for name, value in {"URL": "http://127.0.0.1:9", "TOKEN": TOKEN, "ORG": "ours"}.items():
         monkeypatch.setenv(f"INFLUXDB_V2_{name}", value)
@@ -98,6 +98,6 @@ def test_no_refusal_repeats_the_token(monkeypatch, token):
 
 
 def test_addresses_and_words_without_secrets_stay_as_they_are(monkeypatch):
-    monkeypatch.setenv("INFLUXDB_V2_TOKEN", "a")  # a word that a message may need
+    monkeypatch.setenv("INFLUXDB_V2_TOKEN", "a")  # a short token may be an ordinary word of a message
     for text in ("Expected a time at 12:30. Received: http://host:8086/a@b.", "Expected a. Received: influxdb://bucket/measurement/a:b@c."):
         assert str(InputError(text)) == text
