@@ -41,8 +41,8 @@ def _temporary(path: Path, kind: str = "tmp") -> Path:
 def _host() -> str:
     """Identifies the machine and container in which a process number is valid: at most 17 characters, without dots."""
     name, container = socket.gethostname(), "/proc/self/ns/pid"
-    whole = name + (os.readlink(container) if os.path.islink(container) else "")
-    return f"{re.sub(r'[^A-Za-z0-9-]', '-', name)[:8]}-{hashlib.sha256(whole.encode(errors='replace')).hexdigest()[:8]}"
+    identity = name + (os.readlink(container) if os.path.islink(container) else "")
+    return f"{re.sub(r'[^A-Za-z0-9-]', '-', name)[:8]}-{hashlib.sha256(identity.encode(errors='replace')).hexdigest()[:8]}"
 
 
 def encode_name(name: str) -> str:

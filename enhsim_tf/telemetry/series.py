@@ -19,7 +19,8 @@ class Telemetry:
     Args:
         values: float32 array of shape `(samples,)`.
         interval_s: Sampling interval in seconds. It is 1 (one sample) if `has_time` is False.
-        offset_s: Time of the first sample after `start`, in seconds. All parts of one series share the same `start`.
+        offset_s: Time of the first sample in seconds after `start`, or in samples without times. All parts of one series share
+            the same `start`.
         start: Zero of the time axis as ISO 8601 text in UTC, or None if the source has no times.
         name: Channel name.
         unit: Unit of the values.

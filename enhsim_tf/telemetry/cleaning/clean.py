@@ -128,7 +128,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         raise InputError(f"Expected samples. Received: none from {name}. Give a source that holds a series.")
     has_time = is_series and not isinstance(series.index, pd.RangeIndex)
     if has_time:
-        log, rows = _timed_rows(series.index, values, name, options, about)
+        log, rows = _rows_with_times(series.index, values, name, options, about)
     elif options.interval_s is not None:
         raise InputError(f"Expected interval_s with times only. Received: interval_s={options.interval_s} with {name}, which has none.")
     else:
@@ -160,8 +160,8 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         segments = find_binned_segments(rows.times, interval, options.max_fill + 1)
     else:
         segments = find_regular_segments(rows.times, interval, options.max_jitter, options.max_fill + 1)
-    share = "mean" if options.interval_s is not None else options.same_time
-    parts, used = build_parts(rows, segments, interval, log, name, share, options.max_fill, options.min_part)
+    same_place = "mean" if options.interval_s is not None else options.same_time
+    parts, used = build_parts(rows, segments, interval, log, name, same_place, options.max_fill, options.min_part)
     describe_values(parts, log)
 
     first = parts[0].begin if has_time else -base
@@ -172,7 +172,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     return Cleaned(telemetry, report)
 
 
-def _timed_rows(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
+def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
     """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
     stamps, bad, noted = parse_times(index, f"the times of {name}", options.on_bad_times == "drop", options.time_unit, options.time_format)
     had_time = stamps.notna()

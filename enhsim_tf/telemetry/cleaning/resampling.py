@@ -183,28 +183,31 @@ def _resample_segment(rows: Rows, interval: float, segment: OtherRateSegment, fr
     cells = np.arange(np.ceil(places[0] - 1e-6), np.floor(places[-1] + 1e-6) + 1)
     from_source = np.zeros(len(cells), np.int64)
     from_source[np.clip(np.round(places - cells[0]).astype(np.int64), 0, len(cells) - 1)] = rows.from_source
-    behind = np.clip(np.searchsorted(places, cells + 1e-6, "right") - 1, 0, None)
+    previous = np.clip(np.searchsorted(places, cells + 1e-6, "right") - 1, 0, None)
     times = anchor + np.round(cells * interval).astype(np.int64)
-    return Rows(times, np.interp(cells, places, rows.values), rows.source_row[behind], from_source)
+    return Rows(times, np.interp(cells, places, rows.values), rows.source_row[previous], from_source)
 
 
 def build_parts(
     rows: Rows, segments: Sequence[Segment], interval: float, log: CleaningLog, name: str, same_place: str, max_fill: int, min_part: int
 ) -> tuple[list[Part], int]:
-    """Regular parts with their short gaps filled.
+    """Builds regular parts and fills their short gaps by linear interpolation.
 
     Args:
         rows: The rows.
-        segments: Where they lie on regular grids.
+        segments: Segments of the rows that lie on a regular grid.
         interval: The sampling interval in nanoseconds.
-        log: Takes what is found.
+        log: The cleaning log, to which findings are added.
         name: Channel name, for messages.
-        same_place: Which of rows that share a place is taken: mean, first, last or refuse.
+        same_place: Which of several rows at one grid point is kept: mean, first, last or refuse.
         max_fill: Longest gap inside a segment, in samples.
         min_part: Shortest part that is kept, in samples.
 
     Returns:
-        The parts, and how many rows their samples stand for.
+        The parts, and the number of source rows that their samples represent.
+
+    Raises:
+        InputError: If no part is long enough, or several rows share a grid point and `same_place` is "refuse".
     """
     parts, used, merged, short, gaps, num_filled, num_coarse = [], 0, [], [], [], 0, 0
     off = np.zeros(len(rows))
@@ -222,8 +225,8 @@ def build_parts(
             )
         merged.append(left)
         places, samples = np.unique(segment.places), np.arange(length)
-        behind = np.searchsorted(places, samples, "right") - 1
-        parts.append(Part(segment.begin, np.interp(samples, places, inside.values), inside.source_row[behind]))
+        previous = np.searchsorted(places, samples, "right") - 1
+        parts.append(Part(segment.begin, np.interp(samples, places, inside.values), inside.source_row[previous]))
         used += int(inside.from_source.sum())
         gaps.append(inside.source_row[:-1][np.diff(places) > 1])
         num_filled += length - len(places)
