@@ -141,7 +141,7 @@ BAD = {
     "empty": ("a.csv", "", {}, "empty"),
     "blank": ("a.csv", "\n \n", {}, "empty"),
     "comments only": ("a.csv", "# a\n# b\n", {}, "a.csv"),
-    "bytes": ("a.csv", bytes(range(256)) * 20, {}, "no text"),
+    "bytes": ("a.csv", bytes(range(256)) * 20, {}, "not text"),
     "no header": ("a.csv", "1,2\n3,4\n5,6\n", {}, "1, 2"),
     "no header, decimal commas": ("a.csv", "1,5;2\n3,5;4\n", {}, "header"),
     "lines longer than the header": ("a.csv", "a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
