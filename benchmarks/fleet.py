@@ -112,7 +112,7 @@ def measure_parts(options: argparse.Namespace) -> dict:
     from enhsim_tf.common.parallel import local as local_engine
     from enhsim_tf.datasets import shard as shards
 
-    local_engine.begin(pickle.dumps(None), threads=1)
+    local_engine.start_worker(pickle.dumps(None), threads=1)
 
     plan = plan_for(options)
     num_shards = min(plan.num_shards - 1, 6)

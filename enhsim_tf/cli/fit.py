@@ -19,7 +19,7 @@ def run_fit(options: argparse.Namespace) -> int:
     chosen = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed)
     from enhsim_tf.common.parallel.engines import parse_workers
 
-    workers = workers_of(options.workers)
+    workers = parse_workers(options.workers)
     from enhsim_tf.enhanced_simulator.fit_many import fit_channels  # imported here, because pandas is slow to import
     from enhsim_tf.telemetry.sources import read_source
 

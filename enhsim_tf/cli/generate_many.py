@@ -21,7 +21,7 @@ def run_fleet(options: argparse.Namespace, tell: Callable[[str], None]) -> int:
         options: Parsed options of `generate`.
         tell: Function that is called with each line of output.
     """
-    workers = workers_of(options.workers)
+    workers = parse_workers(options.workers)
     plans = plans_of(options)  # all plans are checked before the first data set is generated
     for out, plan in plans.items():
         generate_fleet(out, plan, workers, options.engine or "local", tell)

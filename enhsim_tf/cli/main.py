@@ -7,7 +7,7 @@ from enhsim_tf.cli.fit import run_fit
 from enhsim_tf.cli.generate import run_generate
 from enhsim_tf.cli.score import run_score
 from enhsim_tf.cli.verify import run_verify
-from enhsim_tf.common.console import finish
+from enhsim_tf.common.console import run_command
 from enhsim_tf.common.errors import InputError
 
 
@@ -31,4 +31,4 @@ def main(arguments: list[str] | None = None) -> int:
     Args:
         arguments: Arguments of the command. None uses those of the process.
     """
-    return finish(lambda: run(parse(arguments)), "interrupted; what was finished is kept")
+    return run_command(lambda: run(parse(arguments)), "interrupted; what was finished is kept")

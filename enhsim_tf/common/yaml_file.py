@@ -15,9 +15,9 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from enhsim_tf.common.errors import InputError
 
-_MOST_BYTES = 1_000_000
-_MOST_EVENTS = 20_000  # of the parser; a thousand scenarios with everything written out need 15,000
-_MOST_DEPTH = 10
+_MAX_BYTES = 1_000_000
+_MAX_EVENTS = 20_000  # of the parser; a thousand scenarios with everything written out need 15,000
+_MAX_DEPTH = 10
 
 
 def refusal(expected: str, **about: Any) -> PydanticCustomError:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, units_of
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
@@ -136,7 +136,7 @@ def _build(
     """Builds a simulator whose enhancer is untrained and whose noise networks are missing."""
     coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
     network = enhancer_network.build_enhancer(settings.window, seed=settings.seed)
-    offset, scale = units_of(coarse) if settings.normalise else (0.0, 1.0)
+    offset, scale = level_offset_and_scale(coarse) if settings.normalise else (0.0, 1.0)
     levels = [[0.0, 1.0]] if settings.follow else None  # replaced once the enhancer is trained
     return create(coarse, network, None, parts[0].interval_s, offset, scale, levels)
 

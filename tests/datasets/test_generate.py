@@ -121,7 +121,7 @@ def exchange(one, other):
     one.with_suffix(".x").rename(other)
 
 
-@pytest.mark.parametrize("name", DAMAGES)
+@pytest.mark.parametrize("name", READ_ERRORS)
 def test_damaged_shards_are_found_and_generated_again(name, undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
     READ_ERRORS[name](folder)
