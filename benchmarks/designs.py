@@ -133,9 +133,9 @@ class Bench:
             draws = np.random.default_rng([self.settings.seed, 1 + DESIGNS.index(noise)])
             generated = gan.generate(len(self.held_out), draws)
             arms = [waves + gan.generate(len(waves), draws) for waves in self.waves]
-        ratios = {row.measure: row.ratio for row in self.floor.judge(generated).rows}
+        ratios = {row.measure: row.ratio for row in self.floor.evaluate(generated).rows}
         quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
-        judged = robustness.judge_arm(*arms, self.trial, quick, self.settings.seed)
+        judged = robustness.evaluate_arm(*arms, self.trial, quick, self.settings.seed)
         alarms, windows = (sum(row[name] for row in judged["alarms"]) for name in ("alarms", "windows"))
         recall = float(np.mean([row["recall"] for row in judged["recall"]]))
         return {"iterations": number, "false_alarms": alarms / windows, "recall": recall, **ratios}

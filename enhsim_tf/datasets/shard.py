@@ -21,7 +21,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.labelled_windows import NOMINAL, columns_of
 from enhsim_tf.datasets.plan import FORMAT, Plan
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
-from enhsim_tf.enhancer.training_pairs import at_level
+from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -127,7 +127,7 @@ def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: i
             clean = simulator.enhance(coarse)[: len(places)]
             if simulator.levels is not None:
                 levels = simulator.levels[(rows.level[places] * len(simulator.levels)).astype(int)]
-                clean = at_level(clean, *levels.T)
+                clean = apply_shift_and_gain(clean, *levels.T)
             windows[places] = clean + simulator.noise.generate(batch, noise)[: len(places)]
     return windows, rows
 

@@ -91,7 +91,7 @@ def make_trial(
     return Trial(nominal, reference, anomalous, trace, labels, **settings)
 
 
-def judge_arm(
+def evaluate_arm(
     training: np.ndarray,
     held_out: np.ndarray,
     trial: Trial,
@@ -186,7 +186,7 @@ def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_s
     return np.append(total / number, np.full(num_samples - end, scores[-1]))
 
 
-def mixed(simulated: np.ndarray, real: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+def mix_real_and_simulated(simulated: np.ndarray, real: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
     """Windows of which a share is real: the mixing curve's arms (Jaufmann et al.).
 
     Args:
@@ -201,7 +201,7 @@ def mixed(simulated: np.ndarray, real: np.ndarray, share: float, rng: np.random.
     return rng.permutation(np.concatenate([real[:num_real], simulated[num_real:]]))
 
 
-def summary(rows: Sequence[Mapping]) -> dict[str, float]:
+def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
     """False-alarm rate of each detector, from the rows of `alarms`."""
     names = dict.fromkeys(row["detector"] for row in rows)
     return {

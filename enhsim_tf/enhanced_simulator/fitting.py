@@ -14,7 +14,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.report_measure import ChannelReport, report_on
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-from enhsim_tf.enhancer.training_pairs import num_places, split_off
+from enhsim_tf.enhancer.training_pairs import num_window_starts, split_end
 from enhsim_tf.telemetry.series import Telemetry
 
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
@@ -40,10 +40,10 @@ def fit_channel(
         InputError: If the telemetry is too short, constant or not periodic.
     """
     options = options or FitOptions()
-    learnt, held_out = split_off(parts, options.held_out)
+    learnt, held_out = split_end(parts, options.held_out)
     simulator = fit_simulator(learnt, options, verbose, progress)
     usable = [part for part in learnt if len(part) >= simulator.window]
-    is_held_out = bool(options.held_out) and num_places(held_out, simulator.window) >= simulator.window
+    is_held_out = bool(options.held_out) and num_window_starts(held_out, simulator.window) >= simulator.window
     return simulator, report_on(simulator, usable, held_out if is_held_out else usable, is_held_out, options.seed)
 
 

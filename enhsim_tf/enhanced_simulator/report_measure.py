@@ -12,7 +12,7 @@ import numpy as np
 from enhsim_tf.detection import evaluation as robustness
 from enhsim_tf.detection.detectors import DETECTORS
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
-from enhsim_tf.enhancer.training_pairs import cut_pairs, even_places, ridge, window_errors
+from enhsim_tf.enhancer.training_pairs import cut_pairs, evenly_spaced_starts, ridge, window_errors
 from enhsim_tf.realism import real_floor as realism
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import disjoint_offsets
@@ -51,7 +51,7 @@ def report_on(
     extracted = simulator.residual_windows(learnt, _NUM_WINDOWS, np.random.default_rng([seed, 2]))
     noise_sd = float(np.std(extracted, dtype=np.float64))
     noise_window, rows = _compare_noise(simulator, [*learnt, *held_out] if is_held_out else list(learnt), seed)
-    places = even_places(learnt, window, 2 * _NUM_WINDOWS)
+    places = evenly_spaced_starts(learnt, window, 2 * _NUM_WINDOWS)
     training = cut_pairs(learnt, simulator.coarse, places, window, follow=True)
     real = training.target
     trial = robustness.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
@@ -60,8 +60,8 @@ def report_on(
     cut = len(real) * 3 // 5  # later real windows set the threshold, with a gap in time, because neighbouring windows overlap
     gap = window * len(real) // max(1, sum(map(len, learnt)))
     judged = {
-        "generated": robustness.judge_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
-        "real": robustness.judge_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
+        "generated": robustness.evaluate_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
+        "real": robustness.evaluate_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
     }
     recall = {name: {row["kind"]: row["recall"] for row in judged["generated"]["recall"] if row["detector"] == name} for name in QUICK}
     return ChannelReport(
@@ -72,17 +72,17 @@ def report_on(
         len(pairs),
         min(len(pairs), sum(len(part) // window for part in held_out)),
         {
-            "coarse": _nrmse(pairs.coarse_at_level, pairs.target),
+            "coarse": _nrmse(pairs.coarse_rescaled, pairs.target),
             "ridge": _nrmse(ridge(training, pairs), pairs.target),
             "enhanced": _nrmse(enhanced, pairs.target),
         },
         rows,
         noise_window,
-        {name: robustness.summary(tables["alarms"]) for name, tables in judged.items()},
+        {name: robustness.false_alarm_rates(tables["alarms"]) for name, tables in judged.items()},
         recall,
         noise_sd,
         {
-            "coarse": pairs.coarse_at_level[typical],
+            "coarse": pairs.coarse_rescaled[typical],
             "enhanced": enhanced[typical],
             "real": pairs.target[typical],
             "generated": generated[0],

@@ -198,7 +198,7 @@ class EnhancedSimulator:
             return pairs
         phases = self.coarse.waves[0].period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
         coarse = self.coarse.simulate(phases[:, None] + self.interval_s * np.arange(self.window))
-        return set_by_shape(pairs, coarse, self.enhance(coarse))
+        return align_to_enhanced(pairs, coarse, self.enhance(coarse))
 
     def follow(self, pairs: Pairs) -> np.ndarray:
         """Returns the enhanced signal without noise for pairs of windows, at the level of the telemetry.
@@ -210,7 +210,7 @@ class EnhancedSimulator:
             float32 array of shape `(windows, samples)`, in the telemetry's unit.
         """
         enhanced = self.enhance(pairs.coarse)
-        return enhanced if self.levels is None else at_level(enhanced, pairs.shift, pairs.gain)
+        return enhanced if self.levels is None else apply_shift_and_gain(enhanced, pairs.shift, pairs.gain)
 
     def generate_coarse(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Generates coarse windows that begin at random times (step 2 of the paper's pipeline).
@@ -227,7 +227,7 @@ class EnhancedSimulator:
         rng = np.random.default_rng(seed)
         begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         coarse = self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
-        return coarse if levels is None else at_level(coarse, *levels.T)
+        return coarse if levels is None else apply_shift_and_gain(coarse, *levels.T)
 
     def _draw_levels(self, num_windows: int, seed: int) -> np.ndarray | None:
         """Draws the offset and gain of each generated window from those seen in training, shape `(num_windows, 2)`."""
@@ -312,7 +312,7 @@ class EnhancedSimulator:
         for first in range(0, num_windows, _CHUNK):
             times = self.interval_s * (begins[first : first + _CHUNK, None] + np.arange(self.window))
             windows = self.enhance(self.coarse.simulate(times, scenario, rng))
-            yield windows if levels is None else at_level(windows, *levels[first : first + _CHUNK].T)
+            yield windows if levels is None else apply_shift_and_gain(windows, *levels[first : first + _CHUNK].T)
 
     def generate_to_parquet(self, path: str | os.PathLike, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> None:
         """Writes the windows of `generate` to a Parquet file, chunk by chunk, so that memory does not grow with their number.
@@ -353,7 +353,7 @@ class EnhancedSimulator:
         begins = hop * np.arange(num_windows)
         enhanced = self.enhance(cut_windows(coarse, begins, window))
         if self.levels is not None:
-            enhanced = at_level(enhanced, *self._follow_levels(num_windows, seed).T)
+            enhanced = apply_shift_and_gain(enhanced, *self._follow_levels(num_windows, seed).T)
 
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
         signal, total = np.zeros((2, length))

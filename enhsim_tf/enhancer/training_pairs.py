@@ -14,7 +14,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows
 
-LEAST_GAIN = 0.1  # of the simulator's own amplitude: below it a window shows nothing that a network could learn a shape from
+MIN_GAIN = 0.1  # of the simulator's own amplitude: below it a window shows nothing that a network could learn a shape from
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,22 +39,22 @@ class Pairs:
         return len(self.coarse)
 
     @property
-    def coarse_at_level(self) -> np.ndarray:
+    def coarse_rescaled(self) -> np.ndarray:
         """The coarse windows at the level and amplitude of the telemetry's."""
-        return at_level(self.coarse, self.shift, self.gain)
+        return apply_shift_and_gain(self.coarse, self.shift, self.gain)
 
     @property
     def target_in_unit(self) -> np.ndarray:
         """The telemetry at the simulator's own level and amplitude: what the enhancer learns."""
         return ((self.target - self.shift[:, None]) / self.gain[:, None]).astype(np.float32)
 
-    def clear(self) -> "Pairs":
+    def drop_flat(self) -> "Pairs":
         """Those windows that follow the simulator: a window without its motion has no shape to learn.
 
         Raises:
             InputError: If there is none.
         """
-        follows = self.gain >= LEAST_GAIN
+        follows = self.gain >= MIN_GAIN
         if not follows.any():
             raise InputError(
                 f"Expected windows that follow the coarse simulator. Received: none of {len(self)}. Give another simulator, or telemetry that moves."
@@ -62,7 +62,7 @@ class Pairs:
         return Pairs(**{field.name: getattr(self, field.name)[follows] for field in dataclasses.fields(self)})
 
 
-def at_level(windows: np.ndarray, shift: np.ndarray, gain: np.ndarray) -> np.ndarray:
+def apply_shift_and_gain(windows: np.ndarray, shift: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """Windows moved to a level and amplitude each, float32 of the same shape `(windows, samples)`.
 
     Args:
@@ -73,7 +73,7 @@ def at_level(windows: np.ndarray, shift: np.ndarray, gain: np.ndarray) -> np.nda
     return (shift[:, None] + gain[:, None] * windows).astype(np.float32)
 
 
-def split_off(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry], list[Telemetry]]:
+def split_end(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry], list[Telemetry]]:
     """Splits the end off a series.
 
     Args:
@@ -95,12 +95,12 @@ def split_off(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry]
     return first, rest
 
 
-def num_places(parts: Sequence[Telemetry], window: int) -> int:
+def num_window_starts(parts: Sequence[Telemetry], window: int) -> int:
     """At how many samples a whole window can begin."""
     return sum(max(0, len(part) - window + 1) for part in parts)
 
 
-def random_places(parts: Sequence[Telemetry], window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
+def random_window_starts(parts: Sequence[Telemetry], window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
     """Random places for windows, every sample that begins a whole one as likely as any other.
 
     Args:
@@ -110,19 +110,19 @@ def random_places(parts: Sequence[Telemetry], window: int, num_windows: int, rng
         rng: Owner of the draws.
 
     Returns:
-        Integers below `num_places`, shape `(num_windows,)`.
+        Integers below `num_window_starts`, shape `(num_windows,)`.
 
     Raises:
         InputError: If no stretch is as long as a window.
     """
-    places = num_places(parts, window)
+    places = num_window_starts(parts, window)
     if not places:
         longest = max((len(part) for part in parts), default=0)
         raise InputError(f"Expected at least one window of {window} samples in a piece. Received: {longest}. Give a longer series.")
     return rng.integers(0, places, num_windows)
 
 
-def even_places(parts: Sequence[Telemetry], window: int, num_windows: int) -> np.ndarray:
+def evenly_spaced_starts(parts: Sequence[Telemetry], window: int, num_windows: int) -> np.ndarray:
     """Places spread evenly over the stretches, in the order of time.
 
     Args:
@@ -130,16 +130,16 @@ def even_places(parts: Sequence[Telemetry], window: int, num_windows: int) -> np
         window: Samples of a window.
         num_windows: Number of places, at most; none comes twice.
     """
-    places = num_places(parts, window)
+    places = num_window_starts(parts, window)
     return np.unique(np.linspace(0, places - 1, min(num_windows, places)).astype(np.int64))
 
 
-def cut_parts(parts: Sequence[Telemetry], places: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+def cut_windows_from_parts(parts: Sequence[Telemetry], places: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
     """Cuts windows out of the stretches of a series.
 
     Args:
         parts: Stretches of one series, on one clock.
-        places: Where each window begins, counted over the stretches as `num_places` counts.
+        places: Where each window begins, counted over the stretches as `num_window_starts` counts.
         window: Samples of a window.
 
     Returns:
@@ -168,12 +168,12 @@ def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, places: n
     Args:
         parts: Stretches of one series, on one clock.
         coarse: The coarse simulator.
-        places: Where each window begins, counted over the stretches as `num_places` counts.
+        places: Where each window begins, counted over the stretches as `num_window_starts` counts.
         window: Samples of a window.
         follow: Whether the simulator is set to the clock, level and amplitude of each window, by correlation and least
             squares; else it runs on as it is configured.
     """
-    target, time_s = cut_parts(parts, places, window)
+    target, time_s = cut_windows_from_parts(parts, places, window)
     times = time_s[:, None] + parts[0].interval_s * np.arange(window)
     if not follow:
         return Pairs(coarse.simulate(times), target, np.zeros(len(target)), np.ones(len(target)), time_s)
@@ -181,7 +181,7 @@ def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, places: n
     return Pairs(windows, target, *_least_squares(windows, target), time_s)
 
 
-def set_by_shape(pairs: Pairs, coarse: np.ndarray, shapes: np.ndarray) -> Pairs:
+def align_to_enhanced(pairs: Pairs, coarse: np.ndarray, shapes: np.ndarray) -> Pairs:
     """Sets the simulator to each window again, by what its windows look like once they are enhanced.
 
     A square wave tells the clock by its edges alone; the enhanced shape tells it by every sample.
@@ -213,9 +213,9 @@ def ridge(learnt: Pairs, pairs: Pairs) -> np.ndarray:
     """
     from sklearn.linear_model import Ridge
 
-    learnt = learnt.clear()
+    learnt = learnt.drop_flat()
     predicted = Ridge().fit(learnt.coarse, learnt.target_in_unit).predict(pairs.coarse)
-    return at_level(predicted, pairs.shift, pairs.gain)
+    return apply_shift_and_gain(predicted, pairs.shift, pairs.gain)
 
 
 def window_errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from enhsim_tf.keras_tools.tensorflow_settings import SETTINGS, apply_settings
 
 
 @contextlib.contextmanager
-def _without_standard_error() -> Iterator[None]:
+def _standard_error_silenced() -> Iterator[None]:
     """Turns the file descriptor itself away: TensorFlow writes to it before any of its own log levels counts."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
@@ -30,7 +30,7 @@ def _without_standard_error() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _collector_at_rest() -> Iterator[None]:
+def _garbage_collection_paused() -> Iterator[None]:
     """Rests the garbage collector, which would walk again and again over all that is imported, and that stays."""
     collects = gc.isenabled()
     gc.disable()
@@ -44,7 +44,7 @@ def _collector_at_rest() -> Iterator[None]:
 def _start() -> None:
     apply_settings()
     _check_backend("Expected KERAS_BACKEND", os.environ["KERAS_BACKEND"])
-    with _without_standard_error(), _collector_at_rest():
+    with _standard_error_silenced(), _garbage_collection_paused():
         import tensorflow
 
         tensorflow.config.list_physical_devices()  # the messages about devices come with the first look at them

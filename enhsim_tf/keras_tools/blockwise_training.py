@@ -85,12 +85,12 @@ def is_wide_dense_stack(network: keras.Model) -> bool:
     """Whether a model is a stack of Dense layers, relu or linear, with a kernel that is larger than a block."""
     if type(network) is not keras.Sequential:
         return False
-    return all(map(_is_usual, network.layers)) and any(
+    return all(map(_is_plain_dense, network.layers)) and any(
         layer.kernel.shape[0] * layer.kernel.shape[1] * 4 > BLOCK_BYTES for layer in network.layers
     )
 
 
-def _is_usual(layer: keras.layers.Layer) -> bool:
+def _is_plain_dense(layer: keras.layers.Layer) -> bool:
     if type(layer) is not keras.layers.Dense or not layer.trainable or not layer.use_bias or layer.activation not in _ACTIVATIONS:
         return False
     extras = (layer.kernel_regularizer, layer.bias_regularizer, layer.activity_regularizer, layer.kernel_constraint, layer.bias_constraint)

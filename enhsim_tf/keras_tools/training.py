@@ -78,7 +78,7 @@ def fit_windows(
     trained.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile)
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
-    held_out = None if validation is None else _untuned(tf.data.Dataset.from_tensor_slices(validation).batch(256))
+    held_out = None if validation is None else _without_autotuning(tf.data.Dataset.from_tensor_slices(validation).batch(256))
     history = trained.fit(
         batches(inputs, targets, orders, batch_size),
         epochs=epochs,
@@ -93,7 +93,7 @@ def fit_windows(
     return {key: np.array(values) for key, values in history.history.items()}
 
 
-class EpochsDone(keras.callbacks.Callback):
+class EpochProgress(keras.callbacks.Callback):
     """Calls a function with the epochs that are done, the part of the one under way included, after each step.
 
     Args:
@@ -124,10 +124,10 @@ def batches(inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_s
     """
     inputs, targets = tf.constant(inputs), tf.constant(targets)
     rows = tf.data.Dataset.from_tensor_slices(orders).flat_map(lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size))
-    return _untuned(rows.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows))).prefetch(2))
+    return _without_autotuning(rows.map(lambda rows: (tf.gather(inputs, rows), tf.gather(targets, rows))).prefetch(2))
 
 
-def _untuned(data: tf.data.Dataset) -> tf.data.Dataset:
+def _without_autotuning(data: tf.data.Dataset) -> tf.data.Dataset:
     """The data set without its tuning thread, whose naps double up to a minute: dropping the data set waits for the last one."""
     options = tf.data.Options()
     options.autotune.enabled = False

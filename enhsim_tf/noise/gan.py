@@ -104,17 +104,17 @@ class NoiseGAN:
         weights = self.discriminator.trainable_variables
         with tf.GradientTape(watch_accessed_variables=False) as tape:
             tape.watch([weight.value for weight in weights])
-            loss = self.loss(tags, self._judge(rows))
+            loss = self.loss(tags, self._discriminate(rows))
         self.discriminator_optimizer.apply(tape.gradient(loss, weights), weights)
 
     def _update_generator(self) -> None:
         with tf.GradientTape() as tape:
-            judged = self._judge(self.generator(self._draw_latent(self.seeds), training=True))
+            judged = self._discriminate(self.generator(self._draw_latent(self.seeds), training=True))
             loss = self.loss(self._tags(REAL), judged)
         weights = self.generator.trainable_variables
         self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
 
-    def _judge(self, rows: tf.Tensor) -> tf.Tensor:
+    def _discriminate(self, rows: tf.Tensor) -> tf.Tensor:
         """The discriminator in training mode, its first layers by the fast path where they are what that computes."""
         number = num_layers_computed(self.discriminator.layers)
         if not number:
@@ -215,7 +215,7 @@ class NoiseGAN:
         """
         rng = np.random.default_rng(seed)
         if self.latent.is_series:
-            stretches = self.latent.stretches(num_samples, rng)
+            stretches = self.latent.series_chunks(num_samples, rng)
             return np.concatenate([np.asarray(self.generator.predict_on_batch(each))[0, :, 0] for each in stretches]) * np.float32(
                 self.scale
             )

@@ -10,7 +10,7 @@ import numpy as np
 
 from enhsim_tf.keras_tools.backend import keras, tf
 
-_STRETCH = 100_000  # samples of a series made at a time
+_CHUNK_SAMPLES = 100_000  # samples of a series made at a time
 
 
 def standard_normal(shape: Sequence[int], seed: tf.Tensor) -> tf.Tensor:
@@ -69,24 +69,24 @@ class Latent:
 
     def sample(self, num_rows: int, rng: np.random.Generator) -> np.ndarray:
         """Draws for generating windows, float32 of shape `(num_rows, *input shape)`, row after row."""
-        return self._slowed(rng.standard_normal((num_rows, *self._shape), np.float32))
+        return self._filter_slow_channels(rng.standard_normal((num_rows, *self._shape), np.float32))
 
-    def stretches(self, num_samples: int, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    def series_chunks(self, num_samples: int, rng: np.random.Generator) -> Iterator[np.ndarray]:
         """Yields the latent series for a series of noise, stretch after stretch, each of shape `(1, samples + margin, channels)`.
 
         A stretch begins with the last samples of the one before, as many as the generator consumes: its outputs join
         as if they had been made in one piece.
         """
         before, state = np.empty((1, 0, self._shape[1]), np.float32), None
-        for first in range(0, num_samples, _STRETCH):
-            length = min(_STRETCH, num_samples - first) + self._margin - before.shape[1]
-            draws = self._slowed(rng.standard_normal((1, length, self._shape[1]), np.float32), state)
+        for first in range(0, num_samples, _CHUNK_SAMPLES):
+            length = min(_CHUNK_SAMPLES, num_samples - first) + self._margin - before.shape[1]
+            draws = self._filter_slow_channels(rng.standard_normal((1, length, self._shape[1]), np.float32), state)
             state = draws[:, -1]
             stretch = np.concatenate([before, draws], axis=1)
             before = stretch[:, stretch.shape[1] - self._margin :]
             yield stretch
 
-    def _slowed(self, draws: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
+    def _filter_slow_channels(self, draws: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
         """White channels times the span, and the slow ones as they go on from their last values, or anew."""
         from scipy.signal import lfilter
 

@@ -29,7 +29,7 @@ class Measure:
         compare: From generated and real rows to the value.
         perfect: The value of perfect noise; larger and smaller ones are both worse.
         is_ratio: Whether the departure from perfect is that of the logarithm.
-        most_resplits: Re-splits that its floor is worth at most: the dear ones take fewer.
+        max_resplits: Re-splits that its floor is worth at most: the dear ones take fewer.
         p_value: Permutation p-value, from the same rows.
     """
 
@@ -39,7 +39,7 @@ class Measure:
     compare: Comparison
     perfect: float = 0.0
     is_ratio: bool = False
-    most_resplits: int = 200
+    max_resplits: int = 200
     p_value: Comparison | None = None
 
     def departure(self, value: float) -> float:
@@ -84,17 +84,17 @@ MEASURES = (
     Measure("A1", "log spectral distance", fidelity.window_spectra, fidelity.log_spectral_distance),
     Measure("A2", "scale difference", _values, fidelity.scale_difference),
     Measure("A2", "log scale distance", fidelity.log_scales, fidelity.log_scale_distance),
-    Measure("A3", "marginal distance", _values, fidelity.marginal_distance, most_resplits=100),
+    Measure("A3", "marginal distance", _values, fidelity.marginal_distance, max_resplits=100),
     Measure("A3", "kurtosis difference", _values, fidelity.kurtosis_difference),
     Measure("A3", "tail ratio", _values, fidelity.tail_ratio, perfect=1.0, is_ratio=True),
     Measure("A4", "autocorrelation distance", _products, fidelity.autocorrelation_distance),
     Measure("A4", "autocorrelation distance of squares", _square_products, fidelity.autocorrelation_distance),
     Measure("A5", "classifier AUC, boosted trees", two_sample.window_features, _boosted_auc, 0.5, False, 20, _boosted_p),
     Measure("A5", "classifier AUC, convolutions", two_sample.convolution_features, _linear_auc, 0.5, False, 50, _linear_p),
-    Measure("A6", "density", two_sample.window_features, two_sample.density, perfect=1.0, most_resplits=50),
-    Measure("A6", "coverage", two_sample.window_features, two_sample.coverage, perfect=1 - 2.0**-5, most_resplits=50),
+    Measure("A6", "density", two_sample.window_features, two_sample.density, perfect=1.0, max_resplits=50),
+    Measure("A6", "coverage", two_sample.window_features, two_sample.coverage, perfect=1 - 2.0**-5, max_resplits=50),
     Measure("A7", "MMD squared", two_sample.window_features, two_sample.mmd_squared, 0.0, False, 50, two_sample.mmd_p_value),
-    Measure("rank", "effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, most_resplits=40),
+    Measure("rank", "effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, max_resplits=40),
 )
 
 
@@ -128,7 +128,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class RealismReport:
     """All rows, and the windows a side that they were measured on.
 
     Args:
@@ -166,8 +166,8 @@ class RealFloor:
 
     Args:
         real: Real windows of shape `(windows, samples)`, in the order of time, none overlapping another.
-        real_again: As many other real windows, from later.
-        num_resplits: Re-splits of both; a measure takes its `most_resplits` at most.
+        later_real: As many other real windows, from later.
+        num_resplits: Re-splits of both; a measure takes its `max_resplits` at most.
         block: Consecutive windows that stay together.
         seed: Draws the re-splits.
         measures: Which measures.
@@ -179,26 +179,26 @@ class RealFloor:
     def __init__(
         self,
         real: np.ndarray,
-        real_again: np.ndarray,
+        later_real: np.ndarray,
         num_resplits: int = 200,
         block: int = 10,
         seed: int = 0,
         measures: Sequence[Measure] = MEASURES,
     ):
-        self.measures, self.num_windows, self.samples = tuple(measures), min(len(real), len(real_again)), np.shape(real)[1]
+        self.measures, self.num_windows, self.samples = tuple(measures), min(len(real), len(later_real)), np.shape(real)[1]
         self._offset, self._unit = np.mean(real, dtype=np.float64), np.std(real, dtype=np.float64)
-        real, real_again = self._checked(real, "real"), self._checked(real_again, "second real")
-        describe = functools.cache(lambda function: (function(real), function(real_again)))
+        real, later_real = self._checked(real, "real"), self._checked(later_real, "second real")
+        describe = functools.cache(lambda function: (function(real), function(later_real)))
         self._real = {measure.describe: describe(measure.describe)[0] for measure in self.measures}
         splits = list(self._resplits(num_resplits, block, np.random.default_rng(seed)))
         self.values: dict[str, np.ndarray] = {}
         for measure in self.measures:
             pooled, compare = np.concatenate(describe(measure.describe)), measure.compare
-            chosen = splits[: measure.most_resplits]
+            chosen = splits[: measure.max_resplits]
             with threadpool_limits(1):  # threads that wait for each other on a busy machine take ten times as long
                 self.values[measure.name] = np.array([compare(pooled[first], pooled[second]) for first, second in chosen])
 
-    def judge(self, generated: np.ndarray) -> Judgement:
+    def evaluate(self, generated: np.ndarray) -> RealismReport:
         """Measures generated windows against the real ones.
 
         Args:
@@ -220,7 +220,7 @@ class RealFloor:
             ratio = departure / max(mean, 1e-12)
             row = Row(measure.section, measure.name, value, departure, mean, high, ratio, departure <= high, len(floor), p_value)
             rows.append(row)
-        return Judgement(tuple(rows), self.num_windows)
+        return RealismReport(tuple(rows), self.num_windows)
 
     def _checked(self, windows: np.ndarray, kind: str) -> np.ndarray:
         """The first `num_windows` windows in units of the real standard deviation, about the real mean."""
@@ -239,14 +239,14 @@ class RealFloor:
             yield np.sort(order[: self.num_windows]), np.sort(order[self.num_windows :])
 
 
-def judge(generated: np.ndarray, real: np.ndarray, real_again: np.ndarray, num_resplits: int = 200, seed: int = 0) -> Judgement:
+def evaluate(generated: np.ndarray, real: np.ndarray, later_real: np.ndarray, num_resplits: int = 200, seed: int = 0) -> RealismReport:
     """Measures one set of generated windows against a `RealFloor` made for it; keep the floor to judge several.
 
     Args:
         generated: Generated windows of shape `(windows, samples)`.
         real: Real windows, in the order of time.
-        real_again: As many other real windows, from later.
+        later_real: As many other real windows, from later.
         num_resplits: Re-splits of the real windows at most.
         seed: Draws the re-splits.
     """
-    return RealFloor(real, real_again, num_resplits, seed=seed).judge(generated)
+    return RealFloor(real, later_real, num_resplits, seed=seed).evaluate(generated)

@@ -7,7 +7,14 @@ from enhsim_tf.detection import evaluation as robustness
 from enhsim_tf.detection import metrics as detection
 from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
 from enhsim_tf.detection.detectors import LargestStep, PCAResidual
-from enhsim_tf.detection.evaluation import judge_arm, make_trial, mean_over_windows, mixed, score_trace, summary
+from enhsim_tf.detection.evaluation import (
+    evaluate_arm,
+    false_alarm_rates,
+    make_trial,
+    mean_over_windows,
+    mix_real_and_simulated,
+    score_trace,
+)
 
 WINDOW = 300
 
@@ -66,12 +73,12 @@ def test_the_trace_holds_two_ranges_of_each_kind():
 def test_rates_worked_by_hand():
     made = trial(rate=0.1)
     held_out = noise(99, 5)
-    found = judge_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0, num_blocks=4)
+    found = evaluate_arm(noise(50, 4), held_out, made, {"largest": lambda seed: Largest()}, seed=0, num_blocks=4)
     threshold = np.sort(held_out.max(axis=1))[89]  # rank ceil(100 * 0.9) of 99
     alarms = made.nominal.max(axis=1) > threshold
     assert [row["alarms"] for row in found["alarms"]] == [int(block.sum()) for block in np.split(alarms, 4)]
     assert [row["windows"] for row in found["alarms"]] == [30] * 4
-    assert summary(found["alarms"]) == {"largest": pytest.approx(alarms.mean())}
+    assert false_alarm_rates(found["alarms"]) == {"largest": pytest.approx(alarms.mean())}
     (row,) = [row for row in found["recall"] if (row["kind"], row["severity"]) == ("level_shift", 4.0)]
     scores = made.anomalous["level_shift", 4.0].max(axis=1)
     assert row["recall"] == np.mean(scores > threshold)
@@ -85,8 +92,8 @@ def test_exchangeable_arms_alarm_at_the_rate_they_were_set_for():
     for seed in range(40):
         nominal = noise(500, [seed, 1])
         real = robustness.Trial(nominal, nominal, {("ramp", 1.0): nominal[:5]}, rate=0.05)
-        found = judge_arm(noise(5, [seed, 2]), noise(500, [seed, 3]), real, {"step": lambda seed: LargestStep()}, seed=0)
-        rates.append(summary(found["alarms"])["step"])
+        found = evaluate_arm(noise(5, [seed, 2]), noise(500, [seed, 3]), real, {"step": lambda seed: LargestStep()}, seed=0)
+        rates.append(false_alarm_rates(found["alarms"])["step"])
     assert abs(np.mean(rates) - 0.05) < 0.008
 
 
@@ -94,8 +101,8 @@ def test_too_clean_an_arm_alarms_on_everything_and_too_noisy_a_one_on_nothing():
     made = trial()
     rates = {}
     for name, sd in (("clean", 0.5), ("right", 1.0), ("noisy", 2.0)):
-        found = judge_arm(noise(200, 6, sd), noise(200, 7, sd), made, {"PCA": lambda seed: PCAResidual(5, seed=seed)}, seed=0)
-        rates[name] = summary(found["alarms"])["PCA"]
+        found = evaluate_arm(noise(200, 6, sd), noise(200, 7, sd), made, {"PCA": lambda seed: PCAResidual(5, seed=seed)}, seed=0)
+        rates[name] = false_alarm_rates(found["alarms"])["PCA"]
         recalls = [row["recall"] for row in found["recall"] if row["kind"] == "variance_change"]
         assert recalls == sorted(recalls)  # grows with the severity
     assert rates["clean"] == 1.0 and rates["right"] < 0.1 and rates["noisy"] == 0.0
@@ -121,12 +128,12 @@ def test_a_trace_shorter_than_a_window_is_refused(refused):
 
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.25, 1.0])
 def test_a_mixture_holds_its_share_of_real_windows(share):
-    made = mixed(np.zeros((40, 3)), np.ones((40, 3)), share, np.random.default_rng(0))
+    made = mix_real_and_simulated(np.zeros((40, 3)), np.ones((40, 3)), share, np.random.default_rng(0))
     assert made.shape == (40, 3) and made[:, 0].sum() == round(40 * share)
 
 
 def test_a_mixture_of_unequal_numbers_is_refused(refused):
     with refused("40 and 39"):
-        mixed(np.zeros((40, 3)), np.ones((39, 3)), 0.5, np.random.default_rng(0))
+        mix_real_and_simulated(np.zeros((40, 3)), np.ones((39, 3)), 0.5, np.random.default_rng(0))
     with refused("1.5"):
-        mixed(np.zeros((4, 3)), np.ones((4, 3)), 1.5, np.random.default_rng(0))
+        mix_real_and_simulated(np.zeros((4, 3)), np.ones((4, 3)), 1.5, np.random.default_rng(0))

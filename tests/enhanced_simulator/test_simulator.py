@@ -17,7 +17,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.simulator import PAPER, EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.enhancer.training_pairs import cut_pairs, even_places
+from enhsim_tf.enhancer.training_pairs import cut_pairs, evenly_spaced_starts
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN
@@ -456,7 +456,7 @@ def followers():
 def test_follow_keeps_the_error_small_outside_the_range_of_training_levels(followers):
     later, errors = drifting().part(2_500, 4_000), {}
     for follow, simulator in followers.items():
-        pairs = cut_pairs([later], simulator.coarse, even_places([later], 80, 50), 80, follow)
+        pairs = cut_pairs([later], simulator.coarse, evenly_spaced_starts([later], 80, 50), 80, follow)
         enhanced = simulator.follow(pairs)
         errors[follow] = np.median(np.sqrt(np.mean((enhanced - pairs.target) ** 2, axis=1)) / pairs.target.std(axis=1))
     assert errors[True] < 0.3 and errors[False] > 3  # in standard deviations of each window

@@ -114,7 +114,7 @@ def small_discriminator(**settings):
 
 
 class PlainGAN(NoiseGAN):
-    def _judge(self, rows):
+    def _discriminate(self, rows):
         return self.discriminator(rows, training=True)
 
 

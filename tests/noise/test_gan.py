@@ -218,17 +218,17 @@ def test_training_sees_the_discriminator_that_was_built(width, stride):
     gan = small(width=width, stride=stride)
     for weight in gan.discriminator.weights:  # biases that are zero would hide a mistake
         weight.assign(np.random.default_rng(0).normal(0, 0.3, weight.shape))
-    np.testing.assert_allclose(gan._judge(rows_of(NOISE)), gan.discriminator(rows_of(NOISE)), rtol=1e-5)
+    np.testing.assert_allclose(gan._discriminate(rows_of(NOISE)), gan.discriminator(rows_of(NOISE)), rtol=1e-5)
 
 
 def test_training_drops_in_both_places_and_judging_in_none():
     gan, rows = small(dropout=0.3), rows_of(NOISE)
     convolution, _, _, narrow, _, last = gan.discriminator.layers
     narrow.set_weights([np.ones((12, 5)), np.zeros(5)])
-    assert np.ptp(gan._judge(tf.repeat(rows[:1], 64, axis=0))) > 0  # equal rows, judged differently
+    assert np.ptp(gan._discriminate(tf.repeat(rows[:1], 64, axis=0))) > 0  # equal rows, judged differently
     convolution.set_weights([np.zeros((20, 1, 12)), np.ones(12)])  # every product is 1: its maximum survives what is dropped
     last.set_weights([np.arange(5.0)[:, None] / 100, np.zeros(1)])
-    judged = np.ravel(gan._judge(rows))
+    judged = np.ravel(gan._discriminate(rows))
     assert 3 < len(set(np.round(judged, 5))) <= 2**4  # what is left of the four units with a weight
     assert np.ptp(gan.discriminator(rows)) < 1e-6
 
@@ -250,13 +250,13 @@ def test_training_sees_a_discriminator_of_another_make(convolution):
     gan = NoiseGAN(build_generator(WINDOW, LATENT, 8), discriminator, batch_size=BATCH)
     for weight in discriminator.weights:
         weight.assign(np.random.default_rng(0).normal(0, 0.3, weight.shape))
-    np.testing.assert_allclose(gan._judge(rows_of(NOISE)), discriminator(rows_of(NOISE)), rtol=1e-5)
+    np.testing.assert_allclose(gan._discriminate(rows_of(NOISE)), discriminator(rows_of(NOISE)), rtol=1e-5)
 
 
 class PlainPath(NoiseGAN):
     """Judges by the Keras layers alone."""
 
-    def _judge(self, rows):
+    def _discriminate(self, rows):
         return self.discriminator(rows, training=True)
 
 

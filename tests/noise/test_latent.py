@@ -77,9 +77,9 @@ def test_rows_do_not_depend_on_how_many_are_drawn():
 def test_stretches_join_as_one_piece(stretch, monkeypatch):
     generator = convolution()
     latent = Latent(generator, 40, slow_samples=SLOW)
-    whole = np.asarray(generator(next(latent.stretches(250, np.random.default_rng(2)))))[0, :, 0]
-    monkeypatch.setattr(room, "_STRETCH", stretch)
-    parts = [np.asarray(generator(each))[0, :, 0] for each in latent.stretches(250, np.random.default_rng(2))]
+    whole = np.asarray(generator(next(latent.series_chunks(250, np.random.default_rng(2)))))[0, :, 0]
+    monkeypatch.setattr(room, "_CHUNK_SAMPLES", stretch)
+    parts = [np.asarray(generator(each))[0, :, 0] for each in latent.series_chunks(250, np.random.default_rng(2))]
     assert [len(part) for part in parts[:-1]] == [stretch] * (len(parts) - 1)
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-5)
     assert len(whole) == 250
@@ -87,5 +87,5 @@ def test_stretches_join_as_one_piece(stretch, monkeypatch):
 
 def test_slow_channels_of_a_series_are_stationary():
     latent = Latent(convolution(), 40, slow_samples=(20.0,))
-    series = next(latent.stretches(100_000, np.random.default_rng(0)))[:, :, -1]
+    series = next(latent.series_chunks(100_000, np.random.default_rng(0)))[:, :, -1]
     assert abs(series.std() - 1) < 0.05 and abs(correlation(series, 20) - np.exp(-1)) < 0.05

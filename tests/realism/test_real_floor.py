@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.realism import measures as fidelity
-from enhsim_tf.realism.real_floor import MEASURES, RealFloor, judge
+from enhsim_tf.realism.real_floor import MEASURES, RealFloor, evaluate
 from enhsim_tf.reproduce.robustness import negative_controls
 
 NUM_WINDOWS, SAMPLES = 200, 500
@@ -33,8 +33,8 @@ def floor():
 def judged(floor):
     """The rows of each control, made from windows that the floor has not seen."""
     real = process(3)
-    return {"real": floor.judge(real)} | {
-        name: floor.judge(make(real, np.random.default_rng(4))) for name, make in negative_controls.NEGATIVE_CONTROLS.items()
+    return {"real": floor.evaluate(real)} | {
+        name: floor.evaluate(make(real, np.random.default_rng(4))) for name, make in negative_controls.NEGATIVE_CONTROLS.items()
     }
 
 
@@ -116,7 +116,7 @@ def test_each_measure_lets_real_noise_pass_nine_times_in_ten():
     within = []
     for seed in range(30):
         real, again, third = (process(1_000 + 3 * seed + part, 40, 100) for part in range(3))
-        within.append([row.is_within for row in RealFloor(real, again, 50, block=4, measures=CHEAP).judge(third).rows])
+        within.append([row.is_within for row in RealFloor(real, again, 50, block=4, measures=CHEAP).evaluate(third).rows])
     assert 0.85 < np.mean(within) < 0.98
     assert np.min(np.mean(within, axis=0)) > 0.7
 
@@ -186,7 +186,7 @@ def test_floors_are_real_against_real():
         order = owner.permutation(80)
         halves = np.concatenate([real, again])[order[:40]], np.concatenate([real, again])[order[40:]]
         by_hand.append(fidelity.scale_difference(*halves))
-    row = found.judge(real).rows[0]
+    row = found.evaluate(real).rows[0]
     error = 5 * np.std(by_hand) * np.sqrt(2 / 200)
     assert row.floor_mean == pytest.approx(np.mean(by_hand), abs=error)
     assert row.floor_95 == pytest.approx(np.quantile(by_hand, 0.95), abs=3 * error)
@@ -207,7 +207,7 @@ def test_the_unit_and_the_offset_do_not_matter():
     real, again, generated = (process(seed, 60, 100) for seed in (1, 2, 3))
     measures = [measure for measure in QUICK if measure.name != "classifier AUC, convolutions"]
     one, other = (
-        RealFloor(*(unit * part + offset for part in (real, again)), 3, measures=measures).judge(unit * generated + offset)
+        RealFloor(*(unit * part + offset for part in (real, again)), 3, measures=measures).evaluate(unit * generated + offset)
         for unit, offset in ((1.0, 0.0), (1e-3, 0.02))
     )
     for row, again_row in zip(one.rows, other.rows, strict=True):
@@ -222,12 +222,12 @@ def test_dear_measures_say_that_they_took_fewer_resplits(judged):
 
 def test_judging_in_one_call_is_the_same():
     real, again, generated = (process(seed, 25, 60) for seed in (1, 2, 3))
-    assert repr(judge(generated, real, again, 3, seed=5)) == repr(RealFloor(real, again, 3, seed=5).judge(generated))
+    assert repr(evaluate(generated, real, again, 3, seed=5)) == repr(RealFloor(real, again, 3, seed=5).evaluate(generated))
 
 
 def test_a_floor_can_be_kept_for_other_processes():
     floor, generated = RealFloor(process(1, 25, 60), process(2, 25, 60), 2), process(3, 25, 60)
-    assert repr(pickle.loads(pickle.dumps(floor)).judge(generated)) == repr(floor.judge(generated))
+    assert repr(pickle.loads(pickle.dumps(floor)).evaluate(generated)) == repr(floor.evaluate(generated))
 
 
 def test_windows_that_cannot_be_judged_are_refused(refused):
@@ -236,10 +236,10 @@ def test_windows_that_cannot_be_judged_are_refused(refused):
     with refused("at least 20 real windows"):
         RealFloor(real[:19], again)
     with refused("at least 30 generated windows of 60 samples"):
-        floor.judge(real[:29])
+        floor.evaluate(real[:29])
     with refused("60 samples"):
-        floor.judge(process(3, 30, 61))
+        floor.evaluate(process(3, 30, 61))
     with refused("finite"):
-        floor.judge(np.where(real > 2, np.nan, real))
+        floor.evaluate(np.where(real > 2, np.nan, real))
     with refused("vary"):
         RealFloor(np.ones((30, 60)), again)

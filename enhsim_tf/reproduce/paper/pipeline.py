@@ -93,7 +93,7 @@ class Experiment:
         return build_enhancer(self.data.window, chosen.hidden_units, chosen.num_hidden, self.settings.seed, chosen.initialiser)
 
     def _make_enhancer(self, folder: Path) -> None:
-        from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
+        from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 
         chosen, seed, number = self.settings.enhancer, self.settings.seed, self.settings.telemetry.num_windows
         offset, scale, _ = self.data.units
@@ -112,7 +112,7 @@ class Experiment:
             seed,
             chosen.learning_rate,
             tuple(validation),
-            callbacks=[EpochsDone(self.stages.progress.loop("epoch", chosen.epochs))],
+            callbacks=[EpochProgress(self.stages.progress.loop("epoch", chosen.epochs))],
             verbose=self.verbose,
             loss=chosen.loss,
         )

@@ -175,11 +175,11 @@ class DegradedModes:
         """The second pipeline's enhancer, as it is trained there, on other windows."""
         from enhsim_tf.enhancer.network import build_enhancer
         from enhsim_tf.keras_tools.backend import keras
-        from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
+        from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 
         seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.enhancer.batch_size
         network = build_enhancer(self.data.window, seed=seed)
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
-        callbacks = [EpochsDone(self.stages.progress.loop("enhancer, epoch", epochs))]
+        callbacks = [EpochProgress(self.stages.progress.loop("enhancer, epoch", epochs))]
         fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=callbacks, verbose=self.replicate.verbose)
         return network

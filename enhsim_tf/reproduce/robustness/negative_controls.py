@@ -94,7 +94,7 @@ def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int,
     controls: dict[str, Control] = {"real": lambda windows, rng: windows, **NEGATIVE_CONTROLS}
     rows, told = [], progress.loop("control", len(controls))
     for number, (name, make) in enumerate(controls.items()):
-        judged = floor.judge(make(third, np.random.default_rng([seed, 3 + number])))
+        judged = floor.evaluate(make(third, np.random.default_rng([seed, 3 + number])))
         rows += [{"control": name, "num_windows": num_windows, **dataclasses.asdict(row)} for row in judged.rows]
         told(number + 1)
     return pd.DataFrame(rows)

@@ -135,10 +135,10 @@ class Replicate:
         for number, arm in enumerate(ARMS):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
             on_detector = told.within(number, len(detectors))
-            judged = robustness.judge_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
+            judged = robustness.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
             for name, found in judged.items():
                 rows[name] += [{"arm": arm, **row} for row in found]
-            rates = robustness.summary(judged["alarms"]).values()
+            rates = robustness.false_alarm_rates(judged["alarms"]).values()
             self.stages.tell(f"  {arm:22} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
         oracle = robustness.detection.vus_pr(trial.labels, trial.labels.astype(float), trial.max_buffer)
         rows["traces"].append({"arm": "real", "detector": "oracle", "vus_pr": oracle})
@@ -154,10 +154,10 @@ class Replicate:
         for number, (arm, scale, share, both) in enumerate(VARIATIONS):
             draws = self.experiment.data.draw(f"mixed windows, {arm}, {scale}, {share}")
             training, held_out = (
-                robustness.mixed(_scaled(arms, arm, scale), arms["real"], part, draws)
+                robustness.mix_real_and_simulated(_scaled(arms, arm, scale), arms["real"], part, draws)
                 for arms, part in ((learnt, share), (limiting, share if both else 0.0))
             )
-            judged = robustness.judge_arm(training, held_out, trial, quick, seed, on_detector=told.within(number, len(quick)))
+            judged = robustness.evaluate_arm(training, held_out, trial, quick, seed, on_detector=told.within(number, len(quick)))
             recall, alarms = ({name: [] for name in quick} for _ in range(2))
             for row in judged["recall"]:
                 recall[row["detector"]].append(row["recall"])
@@ -180,7 +180,7 @@ class Replicate:
             judged |= {f"{name} + {noise}": model.generate(number, seed) for noise, model in self.surrogates[pipeline].items()}
         rows, told = [], self.stages.progress.loop("noise", len(judged))
         for done, (noise, windows) in enumerate(judged.items(), 1):
-            rows += [{"noise": noise, **dataclasses.asdict(row)} for row in floor.judge(windows).rows]
+            rows += [{"noise": noise, **dataclasses.asdict(row)} for row in floor.evaluate(windows).rows]
             told(done)
         process = NOISES[self.settings.telemetry.noise]
         parameters = [

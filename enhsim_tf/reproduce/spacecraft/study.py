@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.detection import evaluation as robustness
 from enhsim_tf.detection import metrics as detection
 from enhsim_tf.detection.detectors import CONTROLS, DETECTORS
-from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_parts, even_places, ridge, window_errors
+from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_windows_from_parts, evenly_spaced_starts, ridge, window_errors
 from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.reproduce.settings import Settings
@@ -121,7 +121,7 @@ class ChannelStudy:
 
     @staticmethod
     def _said(rows: Mapping[str, list[dict]], arm: str) -> str:
-        found = robustness.summary([row for row in rows["alarms"] if row["arm"] == arm])
+        found = robustness.false_alarm_rates([row for row in rows["alarms"] if row["arm"] == arm])
         return ", ".join(f"{rate:.0%}" for rate in found.values())
 
     # -- what the detectors learn from -------------------------------------------------------------------------------------
@@ -167,7 +167,7 @@ class ChannelStudy:
         train, window = self.channel.train, self.simulator.window
         cut = 2 * len(train) // 3
         part = train.part(0, cut) if is_training else train.part(min(cut + window, len(train) - window), len(train))
-        return cut_parts([part], even_places([part], window, number), window)[0]
+        return cut_windows_from_parts([part], evenly_spaced_starts([part], window, number), window)[0]
 
     def degraded(self, seed: int) -> np.ndarray:
         """Windows of every degraded mode at every severity."""
@@ -182,7 +182,7 @@ class ChannelStudy:
         """First samples of the scored windows of the test part, the windows, and which of them hold no labelled sample."""
         window, values = self.simulator.window, self.channel.test.values
         begins = np.arange(0, len(values) - window + 1, max(1, window // _STRIDES))
-        return begins, cut_parts([self.channel.test], begins, window)[0], self._is_nominal(begins)
+        return begins, cut_windows_from_parts([self.channel.test], begins, window)[0], self._is_nominal(begins)
 
     def _is_nominal(self, begins: np.ndarray) -> np.ndarray:
         """Which windows of the test part hold no labelled sample, by their first samples."""
@@ -235,12 +235,12 @@ class ChannelStudy:
     def enhancement(self) -> list[dict]:
         """Error over nominal test windows that share no sample, of the coarse signal, ridge regression and the enhancer: quartiles."""
         window, simulator, train, test = self.simulator.window, self.simulator, self.channel.train, self.channel.test
-        begins, places = disjoint_offsets(len(test), window), even_places([train], window, len(train))
+        begins, places = disjoint_offsets(len(test), window), evenly_spaced_starts([train], window, len(train))
         begins = begins[self._is_nominal(begins)]
         by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
         by_shape = simulator.pairs(test, begins)  # set to the clock and level by the enhanced shape
         windows = {
-            "coarse": by_edges.coarse_at_level,
+            "coarse": by_edges.coarse_rescaled,
             "ridge": ridge(cut_pairs([train], simulator.coarse, places, window, follow=True), by_edges),
             "ridge, same clock": ridge(simulator.pairs(train, places), by_shape),  # what the network itself is worth
             "enhanced": simulator.follow(by_shape),
