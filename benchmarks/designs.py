@@ -123,7 +123,7 @@ class Bench:
             them, trained on telemetry with this noise, and each measure's departure in units of its mean floor.
         """
         from enhsim_tf.detection import evaluation as robustness
-        from enhsim_tf.detection.detectors import DETECTORS
+        from enhsim_tf.detection.registry import DETECTORS
         from enhsim_tf.reproduce.robustness.replicate import QUICK_DETECTORS
 
         number, generated, arms = 0, self.held_out, self.telemetry

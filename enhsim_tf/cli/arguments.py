@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 
 from enhsim_tf.common.console import Parser
+from enhsim_tf.detection import registry
+from enhsim_tf.detection.registry import option_name
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
 
 EXAMPLES = """\

@@ -17,7 +17,7 @@ def run_score(options: argparse.Namespace) -> int:
     from enhsim_tf.detection import detectors
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
 
-    detector = {name.casefold().replace(" ", "-"): name for name in detectors.DETECTORS}[options.detector]
+    detector = {option_name(name): name for name in DETECTORS}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_of(options, 2)
     from enhsim_tf.enhanced_simulator.model_folder import models_of

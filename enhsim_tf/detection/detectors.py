@@ -4,24 +4,10 @@ What the paper's title is about and its text never trains. A detector never sets
 does, on held-out windows of the kind it was trained on. `DETECTORS` names them all, `CONTROLS` what they must beat.
 """
 
-from collections.abc import Callable
-from typing import Protocol
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAutoencoder
 from enhsim_tf.realism.window_features import window_features
-
-
-class Detector(Protocol):
-    """What every detector does."""
-
-    def fit(self, windows: np.ndarray) -> "Detector":
-        """Learns what is nominal from windows of shape `(windows, samples)`."""
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """One anomaly score a window, shape `(windows,)`; higher is stranger."""
 
 
 class LimitCheck:
@@ -195,22 +181,3 @@ class MovingDeviation:
         sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0))), axis=2)
         mean, square = (sums[:, :, self.width :] - sums[:, :, : -self.width]) / self.width
         return np.sqrt(np.maximum(square - mean**2, 0).max(axis=1))
-
-
-DETECTORS: dict[str, Callable[[int], Detector]] = {
-    "limit check": lambda seed: LimitCheck(),
-    "PCA residual": lambda seed: PCAResidual(seed=seed),
-    "nearest neighbours": lambda seed: NearestNeighbours(),
-    "isolation forest": lambda seed: IsolationForestOnFeatures(seed=seed),
-    "one-class SVM": lambda seed: OneClassSVMOnFeatures(),
-    "dense autoencoder": lambda seed: DenseAutoencoder(seed=seed),
-    "convolutional autoencoder": lambda seed: ConvolutionalAutoencoder(seed=seed),
-}
-"""From a name to what makes the untrained detector from a seed: the plainest first, the networks last."""
-
-CONTROLS: dict[str, Callable[[int], Detector]] = {
-    "random score": lambda seed: RandomScore(seed),
-    "largest step": lambda seed: LargestStep(),
-    "moving deviation": lambda seed: MovingDeviation(),
-}
-"""Scores that no detector should be below."""

@@ -13,7 +13,7 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics as detection
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject, inject_into_trace
-from enhsim_tf.detection.detectors import Detector
+from enhsim_tf.detection.interface import Detector
 from enhsim_tf.telemetry.windows import cut_windows
 
 PREVALENCE = 0.02  # share of anomalous windows that precision is stated for

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.detection import evaluation as robustness
-from enhsim_tf.detection.detectors import DETECTORS
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.training_pairs import cut_pairs, evenly_spaced_starts, ridge, window_errors
 from enhsim_tf.realism import real_floor as realism

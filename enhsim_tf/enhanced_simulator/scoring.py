@@ -14,8 +14,8 @@ import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.detectors import DETECTORS
 from enhsim_tf.detection.evaluation import score_trace
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import to_series
 

@@ -12,6 +12,7 @@ import importlib.metadata
 import inspect
 import json
 import os
+import re
 import textwrap
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -24,6 +25,7 @@ from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace
 from enhsim_tf.common.console import SILENT, Progress, time_left
 
 _PACKAGE = Path(__file__).parents[1]
+_LAZY_IMPORT = re.compile(r"enhsim_tf(\.\w+)+:\w+")
 VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
 
 
@@ -225,11 +227,16 @@ def what_runs(source: str) -> str:
 
 
 def imports_of(source: str) -> list[str]:
-    """Names of the package's modules that a source imports, without the package's own name."""
+    """Names of the package's modules that a source imports, without the package's own name.
+
+    The path of a class that is imported by its name, such as `enhsim_tf.detection.detectors:LimitCheck`, counts as an import.
+    """
     found = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "enhsim_tf":
             module = node.module.partition(".")[2]
             is_folder = not module or (_PACKAGE / module.replace(".", "/")).is_dir()
             found += [f"{module}.{alias.name}".strip(".") for alias in node.names] if is_folder else [module]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _LAZY_IMPORT.fullmatch(node.value):
+            found.append(node.value.partition(":")[0].removeprefix("enhsim_tf."))
     return found

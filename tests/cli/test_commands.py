@@ -17,7 +17,7 @@ from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.detection import detectors
+from enhsim_tf.detection import registry
 from enhsim_tf.enhanced_simulator import report_measure as channel_report
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
@@ -127,7 +127,7 @@ def test_help_lists_all_choices(capsys):
             parse([command, "--help"])
         text = capsys.readouterr().out
         assert all(word in text for word in words) and max(map(len, text.splitlines())) <= 140
-    assert [name.casefold().replace(" ", "-") for name in detectors.DETECTORS] == list(DETECTORS)
+    assert [name.casefold().replace(" ", "-") for name in registry.DETECTORS] == list(DETECTORS)
 
 
 # end to end

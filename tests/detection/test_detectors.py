@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.detection import detectors as room
+from enhsim_tf.detection import registry
+from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAutoencoder
 from enhsim_tf.detection.detectors import (
-    ConvolutionalAutoencoder,
-    DenseAutoencoder,
     IsolationForestOnFeatures,
     LargestStep,
     LimitCheck,
@@ -120,9 +119,9 @@ def test_same_seed_same_scores(name):
 
 
 def test_every_detector_and_control_has_a_name():
-    assert list(room.DETECTORS) == [name for name in DETECTORS if name not in room.CONTROLS]
-    assert list(room.CONTROLS) == ["random score", "largest step", "moving deviation"]
-    made = {name: make(5) for name, make in {**room.DETECTORS, **room.CONTROLS}.items()}
+    assert list(registry.DETECTORS) == [name for name in DETECTORS if name not in registry.CONTROLS]
+    assert list(registry.CONTROLS) == ["random score", "largest step", "moving deviation"]
+    made = {name: make(5) for name, make in {**registry.DETECTORS, **registry.CONTROLS}.items()}
     assert {name: type(detector) for name, detector in made.items() if name in DETECTORS} == {
         name: type(make()) for name, make in DETECTORS.items()
     }

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.detection.detectors import DETECTORS
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator import scoring
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator

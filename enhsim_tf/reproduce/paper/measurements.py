@@ -8,7 +8,8 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.console import SILENT, Progress
-from enhsim_tf.detection.detectors import DenseAutoencoder, IsolationForestOnFeatures, PCAResidual
+from enhsim_tf.detection.autoencoders import DenseAutoencoder
+from enhsim_tf.detection.detectors import IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.realism import measures as fidelity
 from enhsim_tf.realism.two_sample import two_sample_auc
 from enhsim_tf.reproduce.settings import DetectorSettings

@@ -148,7 +148,7 @@ def report(found: Findings, root: Path) -> None:
 def table(found: Findings) -> str:
     """The README's table: false alarms by arm and environment, and recall."""
     from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
-    from enhsim_tf.detection.detectors import DETECTORS
+    from enhsim_tf.detection.registry import DETECTORS
     from enhsim_tf.reproduce.settings import make_settings
 
     names = found["environments"]

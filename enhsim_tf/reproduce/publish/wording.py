@@ -93,8 +93,8 @@ def first_trial(found: Findings) -> str:
 def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     """What the template says that is no number of the findings: names, what was fixed before, and what follows from a comparison."""
     from enhsim_tf.detection import anomalies as injections
-    from enhsim_tf.detection import detectors
     from enhsim_tf.detection import evaluation as robustness
+    from enhsim_tf.detection.registry import DETECTORS
     from enhsim_tf.reproduce import statistics as inference
     from enhsim_tf.reproduce.robustness import degraded_modes
     from enhsim_tf.reproduce.robustness import replicate as replicates
@@ -117,7 +117,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         "is_realistic": all(bar["measures_within"] == bar["num_measures"] for bar in asked),
         "gaussian_names": gaussian,
         "other_names": [name for name in found["bars"] if name not in gaussian],
-        "detectors": list(detectors.DETECTORS),
+        "detectors": list(DETECTORS),
         "quick": replicates.QUICK_DETECTORS,
         "kinds": [kind.replace("_", " ") for kind in injections.INJECTIONS],
         "is_ar_as_good": all(bar["over_autoregression"]["mean"] >= -bars.MARGIN for bar in asked),

@@ -7,7 +7,9 @@ import matplotlib.figure
 import numpy as np
 from matplotlib.axes import Axes
 
+from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, label_ends, new_sheet, panels
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.publish.wording import by_scale
@@ -277,7 +279,7 @@ FIGURES: dict[str, Figure] = {
         21,
         "False alarms by training arm",
         "Four panels, one for each kind of noise. Thirteen training arms from top to bottom, the false-alarm rate on a logarithmic axis: a dot "
-        "with an interval for the mean over seven detectors, small marks for each of them, a line at the one per cent they are set for.",
+        f"with an interval for the mean over {in_words(len(DETECTORS))} detectors, small marks for each of them, a line at the one per cent they are set for.",
         false_alarms,
     ),
     "recall": Figure(

@@ -183,7 +183,7 @@ def _trust_curves(trust: "pd.DataFrame") -> dict[str, Any]:
 
 
 def _controls(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
-    from enhsim_tf.detection.detectors import CONTROLS
+    from enhsim_tf.detection.registry import CONTROLS
 
     recall, traces = (table[table["arm"] == "real"].groupby("detector") for table in (tables["recall"], tables["traces"]))
     alarms = rates(tables["alarms"]).query("arm == 'real'").groupby("detector")["rate"].mean()

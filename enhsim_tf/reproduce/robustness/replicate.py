@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.detection import evaluation as robustness
-from enhsim_tf.detection.detectors import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.realism import real_floor as realism
 from enhsim_tf.reproduce.noise_processes import NOISES

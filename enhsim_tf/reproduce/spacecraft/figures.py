@@ -6,7 +6,9 @@ from typing import Any
 import matplotlib.figure
 import numpy as np
 
+from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, SINGLE, new_sheet, panels
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.spacecraft.study import ARMS, GENERATED_ARM
 
@@ -62,7 +64,7 @@ def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
         f"On a real spacecraft, detectors trained on generated telemetry alarm on {100 * ours['false_alarms']['mean']:.0f} % of nominal windows "
         f"and find {100 * ours['found']['mean']:.0f} % of the labelled anomalies; trained on its own past, on {100 * real['false_alarms']['mean']:.0f} % "
         f"and {100 * real['found']['mean']:.0f} %",
-        f"Set for 1 % (line). Dot and bar: mean over seven detectors and {number} channels, with its 95 % interval over channels; small marks: "
+        f"Set for 1 % (line). Dot and bar: mean over {in_words(len(DETECTORS))} detectors and {number} channels, with its 95 % interval over channels; small marks: "
         f"each detector. {found['num_sequences']} labelled sequences.",
     )
     grid = panels(figure, down + 0.12, 1, 2, gap=(0.3, 0.12), sharey=True)

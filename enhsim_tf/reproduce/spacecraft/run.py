@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import make_folder, write_json
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.number_words import in_words
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
 from enhsim_tf.telemetry.telemanom import load_channel, read_labels
@@ -119,7 +121,7 @@ def table(found: dict[str, Any]) -> str:
     pairs = found["pairs"]
     return "\n".join(rows) + (
         "\n\nNRMSE: median over nominal test windows, once clock, level and amplitude are set to each window from that window; *same clock*: the one "
-        f"that the enhanced shape finds. Alarms and finds: means over seven detectors set for 1 %; {found['num_sequences']} labelled sequences; one "
+        f"that the enhanced shape finds. Alarms and finds: means over {in_words(len(DETECTORS))} detectors set for 1 %; {found['num_sequences']} labelled sequences; one "
         f"training seed. In {pairs['saturated']} of {pairs['number']} pairs of channel and detector both trainings alarm on more than "
         f"{100 * pairs['above']:.0f} % of nominal windows. From `figures/labelled/findings.json`."
     )

@@ -15,7 +15,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.detection import evaluation as robustness
 from enhsim_tf.detection import metrics as detection
-from enhsim_tf.detection.detectors import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_windows_from_parts, evenly_spaced_starts, ridge, window_errors
 from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise

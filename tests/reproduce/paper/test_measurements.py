@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
-from enhsim_tf.detection.detectors import DenseAutoencoder, IsolationForestOnFeatures, PCAResidual
+from enhsim_tf.detection.autoencoders import DenseAutoencoder
+from enhsim_tf.detection.detectors import IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.reproduce.paper import measurements
 from enhsim_tf.reproduce.settings import DetectorSettings
 

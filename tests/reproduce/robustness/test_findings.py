@@ -11,8 +11,9 @@ import pytest
 from benchmarks import designs
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.number_words import in_words
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.detection.detectors import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.realism.real_floor import MEASURES
 from enhsim_tf.reproduce import figure
 from enhsim_tf.reproduce.caption import caption_of_findings
@@ -422,8 +423,7 @@ def test_the_readmes_words_hold():
         pytest.skip("the experiment has not been run: no figures/robustness")
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    in_words = {4: "four", 7: "seven", 13: "thirteen"}
-    counts = [in_words[len(each)] for each in (DETECTORS, ARMS, kept["environments"])]
+    counts = [in_words(len(each)) for each in (DETECTORS, ARMS, kept["environments"])]
     assert "{} detectors are trained on {} kinds of windows".format(*counts) in readme and f"with {counts[2]} kinds of noise" in readme
     words = report_words.words(kept, make_settings(kept["budget"]))
     assert words["is_ar_as_good"] == ("Where noise is Gaussian, a fitted autoregression does as well." in readme)

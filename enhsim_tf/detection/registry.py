@@ -1,0 +1,107 @@
+"""Names and factories of all anomaly detectors (the application that the paper's title promises).
+
+To add a detector, write its class in a module of this package and add one line to `BUILT_IN`. A detector of another
+library is added at run time with `register`. This module imports nothing slow, so that the command line can list the
+names.
+"""
+
+import importlib
+import inspect
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from enhsim_tf.common.errors import InputError
+
+if TYPE_CHECKING:
+    from enhsim_tf.detection.interface import Detector
+
+BUILT_IN = {
+    "limit check": "enhsim_tf.detection.detectors:LimitCheck",
+    "PCA residual": "enhsim_tf.detection.detectors:PCAResidual",
+    "nearest neighbours": "enhsim_tf.detection.detectors:NearestNeighbours",
+    "isolation forest": "enhsim_tf.detection.detectors:IsolationForestOnFeatures",
+    "one-class SVM": "enhsim_tf.detection.detectors:OneClassSVMOnFeatures",
+    "dense autoencoder": "enhsim_tf.detection.autoencoders:DenseAutoencoder",
+    "convolutional autoencoder": "enhsim_tf.detection.autoencoders:ConvolutionalAutoencoder",
+}
+"""Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last.
+
+The stages of `enhsim_tf.reproduce` read these paths as imports, so that a stage runs again when a detector changes.
+"""
+
+BUILT_IN_CONTROLS = {
+    "random score": "enhsim_tf.detection.detectors:RandomScore",
+    "largest step": "enhsim_tf.detection.detectors:LargestStep",
+    "moving deviation": "enhsim_tf.detection.detectors:MovingDeviation",
+}
+"""The same for the controls: trivial scores that every useful detector should outperform."""
+
+
+def _build(path: str, seed: int) -> "Detector":
+    """Imports a built-in class and creates it, with the seed if its constructor takes one."""
+    module, name = path.split(":")
+    detector = getattr(importlib.import_module(module), name)
+    return detector(seed=seed) if "seed" in inspect.signature(detector).parameters else detector()
+
+
+DETECTORS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path) for name, path in BUILT_IN.items()}
+"""Maps a name to a factory, which takes a seed and returns an unfitted detector."""
+
+CONTROLS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path) for name, path in BUILT_IN_CONTROLS.items()}
+"""The same for the controls."""
+
+
+def option_name(name: str) -> str:
+    """The form of a detector's name on the command line, for example `pca-residual` for `PCA residual`."""
+    return name.casefold().replace(" ", "-")
+
+
+def register(name: str, factory: Callable[[int], Any]) -> None:
+    """Adds a detector to `DETECTORS`.
+
+    The factory may return a detector of this package's interface, or an estimator of another library:
+
+    - scikit-learn: `fit(X)` and `score_samples(X)`, where higher is more normal;
+    - PyOD: `fit(X)` and `decision_function(X)`, where higher is more anomalous.
+
+    An estimator that has `score_samples` is taken for one of scikit-learn, whose outlier detectors also have a
+    `decision_function` of the opposite sign. The experiments of `enhsim_tf.reproduce` keep their results by the code of the
+    built-in detectors, so add a detector that is to take part in them to `BUILT_IN` instead.
+
+    Args:
+        name: The detector's name in tables, and the value of `ScoreOptions.detector`.
+        factory: Takes a seed and returns an unfitted detector or estimator, a new one at each call.
+
+    Raises:
+        InputError: If a detector or control of this name exists already, or the factory cannot be called.
+
+    Example:
+    >>> from sklearn.neighbors import LocalOutlierFactor
+    >>> register("local outlier factor", lambda seed: LocalOutlierFactor(novelty=True))
+    """
+    if option_name(name) in map(option_name, (*DETECTORS, *CONTROLS)):
+        raise InputError(f"Expected a name that no detector has yet. Received: name={name!r}. Choose another name.")
+    if not callable(factory):
+        raise InputError(f"Expected a factory that takes a seed. Received: {type(factory).__name__}. Wrap it, as in `lambda seed: ...`.")
+    DETECTORS[name] = partial(_build_registered, factory)
+
+
+def unregister(name: str) -> None:
+    """Removes a detector that `register` added.
+
+    Args:
+        name: The detector's name.
+
+    Raises:
+        InputError: If `register` did not add a detector of this name.
+    """
+    if name in BUILT_IN or name not in DETECTORS:
+        raise InputError(f"Expected the name of a registered detector. Received: name={name!r}. Built-in detectors cannot be removed.")
+    del DETECTORS[name]
+
+
+def _build_registered(factory: Callable[[int], Any], seed: int) -> "Detector":
+    from enhsim_tf.detection.estimators import as_detector
+
+    return as_detector(factory(seed))
