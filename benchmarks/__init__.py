@@ -1,1 +1,1 @@
-"""Speed of the package, beside what a competent user would write and beside the machine's limits: `python -m benchmarks`."""
+"""Speed of enhsim_tf, compared with other implementations and with the limits of the machine: `python -m benchmarks`."""

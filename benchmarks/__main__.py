@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: measures, prints the table, writes `benchmarks/results.json` and draws two figures from it."""
+"""The command `python -m benchmarks`: runs the benchmarks, prints a table, writes `results.json` and draws two figures."""
 
 import argparse
 import dataclasses
@@ -10,11 +10,11 @@ from pathlib import Path
 ROWS = ("enhancer", "gan", "second", "generation", "loading", "starting", "growth", "reproduce")
 FOLDER = Path(__file__).parent
 RESULTS = ("results.json", "results_avx2.json")
-"""Files of the results: with the instructions that the processor has, and without AVX-512."""
+"""Names of the result files: with all instructions of the processor, and without AVX-512."""
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
-    """The command's options."""
+    """Parses the options of the command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
     parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
     parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
@@ -63,15 +63,15 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measure(options: argparse.Namespace) -> dict:
-    """Measures the rows that the options ask for, and prints each; what `results.json` is to hold."""
-    from benchmarks import rows as room
+    """Runs the selected benchmarks, prints each row, and returns the content of `results.json`."""
+    from benchmarks import rows as benchmark_rows
     from benchmarks.machine import AVX2, PLAIN_KERNELS, machine
     from benchmarks.report import line_of
     from benchmarks.worker import Worker
 
     if options.avx2:
         Worker.processor, Worker.of_comparisons = AVX2, PLAIN_KERNELS
-    budget, began = room.QUICK if options.quick else room.Budget(), time.time()
+    budget, began = benchmark_rows.QUICK if options.quick else benchmark_rows.Budget(), time.time()
     if options.repetitions:
         budget = dataclasses.replace(budget, repetitions=options.repetitions)
     kept = json.loads(options.out.read_text())["rows"] if options.only and options.out.exists() else []
@@ -80,11 +80,11 @@ def measure(options: argparse.Namespace) -> dict:
         if options.only and name not in options.only:
             found += [row for row in kept if row.get("of") == name]
             continue
-        for row in room.ROWS[name](budget):
+        for row in benchmark_rows.ROWS[name](budget):
             found.append({"of": name, **row})
             print(line_of(row), flush=True)
     about = machine() | {"as_without_avx512": options.avx2}
-    for row in room.reproduction(found, room.bar_of_reproduction(about)):
+    for row in benchmark_rows.reproduction(found, benchmark_rows.bar_of_reproduction(about)):
         found.append({"of": "reproduction", **row})
         print(line_of(row), flush=True)
     return {"quick": options.quick, "minutes": round((time.time() - began) / 60, 1), "machine": about, "rows": found}

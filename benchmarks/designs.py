@@ -1,9 +1,9 @@
-"""What else was tried where the second generator misses a bar: `python -m benchmarks.designs`.
+"""Compares variants of the convolutional GAN where it misses a target: `python -m benchmarks.designs`.
 
-Each row of the file it writes is one noise on a development seed: real noise held out, the frozen design, and the design
-with one thing changed. The generators learn the true noise, so what they miss is not the enhancer's doing. The noise is
-measured as the replicates of the experiment on robustness measure theirs, and trains detectors on the true waves. A row
-that is there is not made again. `docs/REPORT.md` shows them all.
+Each row of the resulting file belongs to one noise and one development seed. The noise is held-out real noise, noise of the
+final design, or noise of the design with one change. The generators are trained on the true noise, so that errors of the
+enhancer have no effect. The noise is evaluated as in the replicates of the robustness experiment, and detectors are trained on
+the true waves with this noise. Existing rows are not computed again. `docs/REPORT.md` shows all rows.
 """
 
 import argparse
@@ -32,11 +32,11 @@ LONGER, LEAST_SQUARES, TAILS, MAXIMUM = (
 DESIGNS = (AS_IT_IS, LONGER, LEAST_SQUARES, TAILS, MAXIMUM)
 _FROM_TO = f"{DEVELOPMENT_SEEDS[0]} to {DEVELOPMENT_SEEDS[-1]}"
 KEYS = ("environment", "seed", "noise")
-"""Columns that say which row it is."""
+"""Columns that identify a row."""
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The command's options."""
+    """Parses the options of the command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.designs", description="Other trainings of the second generator.")
     parser.add_argument("--environment", action="append", choices=ENVIRONMENTS, help="these alone (default: all)")
     parser.add_argument("--noise", action="append", choices=(REAL_NOISE, *DESIGNS), help="these alone (default: all)")
@@ -53,13 +53,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def untrained(design: str, noise: np.ndarray, num_iterations: int, seed: int) -> tuple["NoiseGAN", int]:
-    """Both networks of a design, and how many iterations it trains.
+    """Builds the untrained networks of a design, and returns them with the number of training iterations.
 
     Args:
         design: One of `DESIGNS`.
-        noise: Windows to learn, shape `(windows, samples)`.
-        num_iterations: Those of the frozen design.
-        seed: Seed of the weights and of every draw.
+        noise: Training windows, shape `(windows, samples)`.
+        num_iterations: Number of iterations of the final design.
+        seed: Seed for the initial weights and for all random numbers in training.
     """
     from enhsim_tf.keras_tools.backend import keras
     from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
@@ -80,12 +80,12 @@ def untrained(design: str, noise: np.ndarray, num_iterations: int, seed: int) ->
 
 
 def heavy_tailed(generator: "keras.Model", num_slow: int, weight: float = 0.2) -> "keras.Model":
-    """The generator on white channels of Tukey's h distribution, z exp(h z²/2), in place of the normal one.
+    """Replaces the normal distribution of a generator's white-noise channels by Tukey's h distribution, z exp(h z²/2).
 
     Args:
-        generator: From `(rows, samples, channels)`, the slow channels last.
-        num_slow: Channels that stay normal.
-        weight: The h of the distribution: moments of the order 1/h and above are infinite.
+        generator: Model whose input has the shape `(rows, samples, channels)`, with the slow channels last.
+        num_slow: Number of slow channels, which remain normally distributed.
+        weight: Parameter h of the distribution. Moments of order 1/h and above are infinite.
     """
     from enhsim_tf.keras_tools.backend import keras
 
@@ -96,10 +96,10 @@ def heavy_tailed(generator: "keras.Model", num_slow: int, weight: float = 0.2) -
 
 
 class Bench:
-    """What the noises of one environment and seed learn from and are measured by.
+    """Training data and evaluation data for all designs, in one environment and with one seed.
 
     Args:
-        one: Whose telemetry and whose settings.
+        one: Replicate of the robustness experiment, which provides the telemetry and the settings.
     """
 
     def __init__(self, one: "Replicate"):
@@ -107,20 +107,20 @@ class Bench:
         chosen = self.settings.robustness
         self.floor, self.held_out = one.floor()
         self.learnt = one.true_noise("train", self.settings.second.num_windows, "tries, noise")
-        # what detectors learn from, and what their thresholds are set on
+        # windows for the training of detectors, and windows for their thresholds
         self.waves = [data.windows("train", chosen.num_windows, f"tries, {part}")["truth"] for part in ("training", "threshold")]
         self.telemetry = [data.windows(part, chosen.num_windows, f"tries, real, {part}")["target"] for part in ("train", "calibration")]
         self.trial = one.trial(chosen.num_anomalous_varied)
 
     def measure(self, noise: str) -> dict[str, object]:
-        """Trains a design and measures its noise, or measures real noise that was held out.
+        """Trains a design and evaluates its noise, or evaluates held-out real noise.
 
         Args:
             noise: `REAL_NOISE` or one of `DESIGNS`.
 
         Returns:
-            A row: iterations of training, false alarms and recall of the detectors that train in a second, mean over
-            them, trained on telemetry with this noise, and each measure's departure in units of its mean floor.
+            A row: the number of training iterations, the mean false-alarm rate and recall of the fast detectors after training
+            on telemetry with this noise, and the departure of each realism measure in units of its mean floor.
         """
         from enhsim_tf.detection import evaluation as robustness
         from enhsim_tf.detection.registry import DETECTORS
@@ -142,7 +142,7 @@ class Bench:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Makes the rows that are missing, and writes the file after each."""
+    """Computes the missing rows, and writes the file after each row."""
     options = parse(arguments)
     from enhsim_tf.common.atomic_files import replace_file
     from enhsim_tf.common.console import tell

@@ -1,7 +1,7 @@
-"""What every way of doing a work is given, and how an epoch is timed. It imports neither TensorFlow nor the package.
+"""Example data for all compared implementations, and the timing of an epoch. This module imports neither TensorFlow nor enhsim_tf.
 
-A comparison must run as its user would run it: were the package imported beside it, TensorFlow would start with the
-package's settings.
+Each implementation must run as its users would run it. If enhsim_tf were imported in the same process, TensorFlow would
+start with the settings of enhsim_tf.
 """
 
 import resource
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     import keras  # noqa: TID251  the package's own module would start TensorFlow
 
 Work = tuple[Callable[[], object], int]
-"""What is repeated, and its units of work."""
+"""A function that is called repeatedly, and the number of units of work in each call."""
 
 
 def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coarse and noisy target windows like the paper's: float32 arrays of shape `(num_windows, window)`."""
+    """Returns coarse windows and noisy target windows like those of the paper, float32 of shape `(num_windows, window)`."""
     rng = np.random.default_rng(0)
     phase = 2 * np.pi * (rng.integers(0, 480, num_windows)[:, None] + np.arange(window)) / 480
     coarse = 0.5 * np.sign(np.sin(phase)) + 0.25 * np.sign(np.sin(4 * phase))
@@ -28,14 +28,14 @@ def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarr
 
 
 def seconds_of_epoch(model: "keras.Model", *data: object, **settings: object) -> tuple[float, int]:
-    """Seconds and page faults of one epoch of `fit`, from its begin to its end: what `fit` does before and after is paid once a training."""
+    """Returns the seconds and the page faults of one epoch of `fit`, without the work of `fit` before and after the epochs."""
     clock, of_last = epoch_clock()
     model.fit(*data, epochs=1, verbose=0, callbacks=[clock], **settings)
     return of_last()
 
 
 def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], tuple[float, int]]]:
-    """A callback that notes when epochs begin and end, and what tells the seconds and the page faults of the last one."""
+    """Returns a callback that records epochs, and a function that returns the seconds and the page faults of the last epoch."""
     from keras.callbacks import LambdaCallback  # noqa: TID251
 
     notes = []
@@ -51,5 +51,5 @@ def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], tuple[float,
 
 
 def minor_faults() -> int:
-    """Pages that the system has given this process so far, each of which it had to clear."""
+    """Returns the number of minor page faults of this process so far. At each of them, the system clears a page of memory."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt

@@ -1,4 +1,4 @@
-"""The two figures of speed, drawn from the content of `results.json` alone, on the sheet of all figures."""
+"""Draws the two figures of the benchmarks from `results.json`, in the common style of all figures."""
 
 import textwrap
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from enhsim_tf.reproduce.figure import Figure, save
 
 
 def draw(results: dict, folder: Path) -> list[Path]:
-    """Draws what the results hold; the files written."""
+    """Draws the figures for which there are results, and returns the files."""
     rows, machine = results["rows"], results.get("machine", {})
     data = {
         "rows": [row for row in rows if "ratio" in row and row.get("bar")],
@@ -31,7 +31,7 @@ def draw(results: dict, folder: Path) -> list[Path]:
 
 
 def ratios(data: dict) -> matplotlib.figure.Figure:
-    """Each comparison with its range and the bar it has to reach."""
+    """Draws each comparison with its range and its target."""
     rows = data["rows"]
     missed = [f"{row['work']} against {row['comparison']}" for row in rows if not row["reached"]]
     reached = f"{len(rows) - len(missed)} of these {len(rows)} bars are reached" if missed else f"All of these {len(rows)} bars are reached"
@@ -39,7 +39,7 @@ def ratios(data: dict) -> matplotlib.figure.Figure:
         DOUBLE,
         1.35 + 0.36 * len(rows),
         f"{reached}{'; not reached: ' if missed else ''}{'; '.join(missed)}",
-        "Time, ours / theirs, less is faster. Dot and line: median and range over repetitions. Black tick: the bar, which the "
+        "Time of enhsim_tf / time of the comparison; less is faster. Dot and line: median and range over repetitions. Black tick: the bar, which the "
         "median is to stay below (blue: it does, orange: not; both in numbers at the right). Grey line: the same time.",
     )
     ((axes,),) = panels(figure, down + 0.02, 1, 1, right=0.85)
@@ -63,12 +63,12 @@ def ratios(data: dict) -> matplotlib.figure.Figure:
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(min(0.18, 0.9 * low), max(2.0, 1.1 * high))
-    figure.text(left + (place.x1 - left) / 2, (FOOT + 0.04) / figure.get_size_inches()[1], "time, ours / theirs", ha="center")
+    figure.text(left + (place.x1 - left) / 2, (FOOT + 0.04) / figure.get_size_inches()[1], "time, enhsim_tf / comparison", ha="center")
     return figure
 
 
 def growth(data: dict) -> matplotlib.figure.Figure:
-    """Time and memory of generation against the number of windows; time of training against a window's length."""
+    """Draws time and memory of generation against the number of windows, and time of training against the window length."""
     windows, lengths = data["growth"]["num_windows"], data["growth"]["window"]
     numbers, length = [each["num_windows"] for each in windows], [each["window"] for each in lengths]
     memory, first, last = [each["peak_mb"] for each in windows], windows[0], windows[-1]
@@ -109,7 +109,7 @@ def growth(data: dict) -> matplotlib.figure.Figure:
     training.minorticks_off()
     low, high = np.log(training.get_ylim())
     (lower, name, colour), (upper, other, of_other) = sorted(((np.log(values[-1]) - low) / (high - low), *about) for values, *about in ends)
-    upper = max(upper, lower + 0.26)  # two labels of two lines
+    upper = max(upper, lower + 0.26)  # makes room for two labels of two lines each
     beside(training, lower, name, colour)
     beside(training, upper, other, of_other)
     return figure
@@ -121,7 +121,7 @@ def _curve(axes: Axes, x: list[float], y: list[float], colour: str, marker: str)
 
 
 def _plain_ticks(axis: Axis, limits: tuple[float, float], steps: Sequence[int], every: int = 1) -> None:
-    """Ticks at `steps` times every so many powers of ten, written out: exponents would be too small to read."""
+    """Sets ticks at `steps` times powers of ten, and writes them without exponents, which would be too small to read."""
     places = [step * 10.0**power for power in range(-6, 10) for step in steps]
     places = [place for place in places if limits[0] <= place <= limits[1]][::every]
     axis.set_ticks(places, [f"{place:,.0f}" if place >= 1 else f"{place:g}" for place in places])

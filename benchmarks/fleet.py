@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 ROWS = {"local, 1 worker": ("local", 1), "local, 2 workers": ("local", 2), "ray, 2 workers": ("ray", 2)}
 PARTS, IDLE = "where the time goes", {"a driver alone, local": ("local", 2), "a driver alone, ray": ("ray", 2)}
-_NUM_IDLE = 5_000  # numbers that are handed out and come back, with no work between
+_NUM_IDLE = 5_000  # number of tasks without any work
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The command's options."""
+    """Parses the options of the command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fleet", description="Speed of large data sets.")
     parser.add_argument("models", type=Path, metavar="MODEL_DIR", help="a saved simulator")
     parser.add_argument("--windows", type=int, default=200_000, metavar="N", help="windows of each row (default: 200000)")
@@ -40,12 +40,14 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--nominal-share", type=float, default=0.5, metavar="SHARE", help="the others are stuck or drift (default: 0.5)")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "fleet.json", help="the results (default: %(default)s)")
-    parser.add_argument("--one", choices=[*ROWS, PARTS, *IDLE], help=argparse.SUPPRESS)  # in a process whose memory is its own
+    parser.add_argument(
+        "--one", choices=[*ROWS, PARTS, *IDLE], help=argparse.SUPPRESS
+    )  # measured in a separate process, so that its memory is its own
     return parser.parse_args(arguments)
 
 
 def plan_for(options: argparse.Namespace) -> "Plan":
-    """The data set of every row."""
+    """Returns the plan of the data set, which is the same for all rows."""
     from enhsim_tf.coarse_simulator.degraded import Degraded
     from enhsim_tf.datasets.plan import plan_of
     from enhsim_tf.datasets.scenario_file import mix_of
@@ -56,7 +58,7 @@ def plan_for(options: argparse.Namespace) -> "Plan":
 
 
 def measure_row(options: argparse.Namespace) -> dict:
-    """Makes one data set and says what that took."""
+    """Generates one data set, and returns the time and the memory that this took."""
     from enhsim_tf.common.parallel import engines
     from enhsim_tf.datasets import generate as fleet
 
@@ -95,20 +97,20 @@ def measure_row(options: argparse.Namespace) -> dict:
 
 
 def _largest_actor() -> int:
-    """Peak memory of the largest Ray actor of this machine, in bytes; they are nobody's children."""
+    """Returns the peak memory of the largest Ray actor on this machine, in bytes. Actors are not child processes of this one."""
     most = 0
     for process in Path("/proc").glob("[0-9]*"):
         try:
             if (process / "cmdline").read_bytes().startswith(b"ray::_Actor"):
                 lines = (process / "status").read_text().splitlines()
                 most = max(most, *(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")))
-        except OSError:  # it has ended
+        except OSError:  # the process has ended
             continue
     return most
 
 
 def measure_parts(options: argparse.Namespace) -> dict:
-    """Makes shards in this process, in one thread as a worker does, and says what each part of the work took, a window."""
+    """Generates shards in this process, with one thread like a worker, and returns the time for each part of the work."""
     from enhsim_tf.common.parallel import local as local_engine
     from enhsim_tf.datasets import shard as shards
 
@@ -156,7 +158,7 @@ def measure_parts(options: argparse.Namespace) -> dict:
 
 
 def _matrix_product() -> tuple[float, float]:
-    """Seconds and operations of the best of some matrix products of the enhancer's size, in this process' one thread."""
+    """Returns the seconds of the fastest of eight matrix products of the enhancer's size, and the number of operations."""
     from enhsim_tf.keras_tools.backend import tf
 
     first, second = (tf.random.stateless_uniform(shape, (1, 2)) for shape in ((1_024, 3_200), (3_200, 3_200)))
@@ -169,16 +171,18 @@ def _matrix_product() -> tuple[float, float]:
 
 
 def measure_idle(options: argparse.Namespace) -> dict:
-    """How many numbers a second an engine hands out and gets back."""
+    """Measures how many tasks without work an engine can distribute and collect in a second."""
     from enhsim_tf.common.parallel import engines
 
     engine, workers = IDLE[options.one]
-    times = [time.perf_counter() for _ in engines.run(engine, operator.index, range(_NUM_IDLE), workers)]  # no work at all
+    times = [
+        time.perf_counter() for _ in engines.run(engine, operator.index, range(_NUM_IDLE), workers)
+    ]  # `operator.index` returns its argument
     return {"shards_a_second": (len(times) - 500) / (times[-1] - times[499])}
 
 
 def measured(options: argparse.Namespace, name: str, windows: int) -> dict:
-    """What a process of its own measured."""
+    """Runs a measurement in a separate process and returns its result."""
     given = [str(options.models), "--windows", str(windows), "--nominal-share", str(options.nominal_share), "--one", name]
     ended = subprocess.run([sys.executable, "-m", "benchmarks.fleet", *given], capture_output=True, text=True)
     if ended.returncode:
@@ -209,7 +213,7 @@ def main(arguments: list[str] | None = None) -> int:
         return row
 
     for _ in range(options.repetitions):
-        for name in names:  # in turn: what else the machine does meets all rows alike
+        for name in names:  # alternating, so that other load on the machine affects all rows equally
             found[name].append(measure_and_say(name, options.windows))
     for name in names[1:]:
         large[name] = measure_and_say(name, options.large)

@@ -1,4 +1,4 @@
-"""Plain Keras 3, as its guides teach it: `fit` and `predict` with numpy arrays, and one `tf.function` step for the GAN."""
+"""Comparison: plain Keras 3 as in its guides, with `fit` and `predict` on NumPy arrays, and a `tf.function` step for the GAN."""
 
 import keras
 import numpy as np
@@ -9,14 +9,14 @@ from benchmarks.examples import Work, example_windows, seconds_of_epoch
 
 
 def enhancer(window: int, hidden_units: int) -> keras.Model:
-    """The paper's enhancer."""
+    """Builds the paper's enhancer."""
     widths = (window, hidden_units, hidden_units)
     hidden = [layers.Dense(width, activation="relu", kernel_initializer="he_uniform") for width in widths]
     return keras.Sequential([keras.Input((window,)), *hidden, layers.Dense(window, kernel_initializer="he_uniform")])
 
 
 def networks(window: int, filters: int, dropout: float) -> tuple[keras.Model, keras.Model]:
-    """The paper's generator and discriminator."""
+    """Builds the paper's generator and discriminator."""
     generator = keras.Sequential(
         [
             keras.Input((16,)),
@@ -42,7 +42,7 @@ def networks(window: int, filters: int, dropout: float) -> tuple[keras.Model, ke
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
-    """`compile("adam", "mse")` and `fit`."""
+    """Prepares training steps of the enhancer by `compile("adam", "mse")` and `fit`."""
     source, target = example_windows(15 * num_steps, window)
     model = enhancer(window, hidden_units)
     model.compile("adam", "mse")
@@ -50,7 +50,7 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
-    """One straightforward `tf.function` step: three tapes, Conv1D as it is."""
+    """Prepares GAN iterations by a straightforward `tf.function` with three gradient tapes and the Conv1D layer of Keras."""
     generator, discriminator = networks(window, filters, dropout)
     loss = keras.losses.BinaryCrossentropy()
     of_discriminator, of_generator = keras.optimizers.Adam(), keras.optimizers.Adam()
@@ -80,7 +80,7 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
 
 
 def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
-    """`predict` of both networks, as it comes."""
+    """Prepares the generation of windows by `predict` of both networks."""
     enhancing, (generator, _) = enhancer(window, hidden_units), networks(window, 500, 0.0)
     coarse, _ = example_windows(num_windows, window)
     latent = np.random.default_rng(0).normal(size=(num_windows, 16)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""What the measurements are made on, and how a processor without AVX-512 is put in its place."""
+"""Description of the machine, and settings that make it compute like a processor without AVX-512."""
 
 import os
 import platform
@@ -9,13 +9,13 @@ from pathlib import Path
 _INSTRUCTION_SETS = r"sse4_2|avx|avx2|fma|avx_vnni|avx512\w*|amx\w*|asimd|sve\w*"
 
 AVX2 = {"ONEDNN_MAX_CPU_ISA": "AVX2", "ATEN_CPU_CAPABILITY": "avx2", "MKL_ENABLE_INSTRUCTIONS": "AVX2"}
-"""Variables that keep TensorFlow and PyTorch to the instructions of most laptops."""
+"""Environment variables that restrict TensorFlow and PyTorch to AVX2, the instructions of most laptops."""
 PLAIN_KERNELS = {"TF_ENABLE_ONEDNN_OPTS": "0"}
-"""What TensorFlow chooses by itself on a processor without AVX-512, and so what a user of plain Keras has there."""
+"""TensorFlow's default on a processor without AVX-512, which a user of plain Keras therefore has there."""
 
 
 def machine() -> dict:
-    """The processor with its instruction sets, and the versions of what computes."""
+    """Returns the processor with its instruction sets, and the versions of the numerical libraries."""
     versions = {}
     for name in ("tensorflow", "keras", "tf_keras", "torch", "numpy", "pyarrow"):
         try:
@@ -33,13 +33,13 @@ def machine() -> dict:
 
 
 def instruction_sets(cpuinfo: str) -> list[str]:
-    """The vector instructions in the content of `/proc/cpuinfo`; none where the system has no such file."""
+    """Returns the vector instruction sets that the content of `/proc/cpuinfo` lists. An empty content gives none."""
     flags = (_of(cpuinfo, "flags") or _of(cpuinfo, "Features") or "").split()
     return sorted({flag for flag in flags if re.fullmatch(_INSTRUCTION_SETS, flag)})
 
 
 def has_avx512(about: dict) -> bool:
-    """Whether a processor has the instructions on which TensorFlow switches oneDNN on by itself."""
+    """Returns whether a processor has AVX-512, with which TensorFlow enables oneDNN by default."""
     return "avx512f" in about.get("instruction_sets", ())
 
 

@@ -1,4 +1,4 @@
-"""The package's own ways, called as its users call them. Each function returns what to repeat and its units of work."""
+"""The implementations of enhsim_tf, called as by its users. Each function returns a `Work` (see `benchmarks.examples`)."""
 
 import os
 import tempfile
@@ -18,7 +18,7 @@ from enhsim_tf.noise.generator import build_generator
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
-    """Steps of 15 windows through `fit_windows`."""
+    """Prepares training steps of 15 windows by `fit_windows`."""
     source, target = example_windows(15 * num_steps, window)
     model = build_enhancer(window, hidden_units)
 
@@ -31,12 +31,12 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
-    """Iterations of 200 real, 200 generated and 200 judged rows."""
+    """Prepares iterations of the paper's GAN, with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
     return _iterations(NoiseGAN(build_generator(window), build_discriminator(window, filters, dropout=dropout)), num_iterations, window)
 
 
 def convolutional_iteration(num_iterations: int, window: int = 500) -> Work:
-    """Iterations of as many rows through the second pair of networks."""
+    """Prepares iterations of the convolutional GAN with the same numbers of rows."""
     return _iterations(convolutional_noise_gan(_example_noise(window)), num_iterations, window)
 
 
@@ -55,14 +55,14 @@ def _iterations(gan: NoiseGAN, num_iterations: int, window: int) -> Work:
 
 
 def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator:
-    """An untrained simulator of the paper's size; its speed does not depend on its weights."""
+    """Builds an untrained simulator of the paper's size. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
     networks = NoiseGAN(build_generator(window), build_discriminator(window))
     return EnhancedSimulator(SquareWaveSimulator(waves), build_enhancer(window, hidden_units), networks)
 
 
 def enhance_and_noise(num_windows: int, **size: int) -> Work:
-    """Enhancer and generated noise on coarse windows that are there, in memory."""
+    """Prepares the enhancement of existing coarse windows and the generation of their noise, in memory."""
     made = simulator(**size)
     coarse = made.generate_coarse(num_windows)
 
@@ -75,13 +75,13 @@ def enhance_and_noise(num_windows: int, **size: int) -> Work:
 
 
 def generate(num_windows: int, **size: int) -> Work:
-    """`EnhancedSimulator.generate`, coarse simulator included, in memory."""
+    """Prepares `EnhancedSimulator.generate`, including the coarse simulator, in memory."""
     made = simulator(**size)
     return lambda: made.generate(num_windows), num_windows
 
 
 def generate_to_parquet(num_windows: int, **size: int) -> Work:
-    """`EnhancedSimulator.generate_to_parquet`; the file goes to a temporary folder."""
+    """Prepares `EnhancedSimulator.generate_to_parquet` into a temporary folder."""
     made, folder = simulator(**size), tempfile.TemporaryDirectory()
 
     def run() -> None:
@@ -91,20 +91,20 @@ def generate_to_parquet(num_windows: int, **size: int) -> Work:
 
 
 def generate_any(**size: int) -> Work:
-    """The same for a number of windows that each repetition is told; it warms up on 2 chunks."""
+    """Prepares the same for a number of windows that each repetition receives. The warm-up generates 2 chunks."""
     made, folder = simulator(**size), tempfile.TemporaryDirectory()
     return lambda number=5_000: made.generate_to_parquet(os.path.join(folder.name, "windows.parquet"), number), 1
 
 
 def load_simulator(**size: int) -> Work:
-    """`EnhancedSimulator.load`, checksums included."""
+    """Prepares `EnhancedSimulator.load`, including the verification of checksums."""
     folder = tempfile.TemporaryDirectory()
     simulator(**size).save(os.path.join(folder.name, "saved"))
     return lambda: EnhancedSimulator.load(os.path.join(folder.name, "saved")), 1
 
 
 def load_networks(**size: int) -> Work:
-    """The comparison: `keras.saving.load_model` on the same three files, nothing checked."""
+    """Prepares the comparison: `keras.saving.load_model` on the same three files, without verification."""
     folder = tempfile.TemporaryDirectory()
     simulator(**size).save(os.path.join(folder.name, "saved"))
     names = ("enhancer", "generator", "discriminator")
@@ -112,14 +112,14 @@ def load_networks(**size: int) -> Work:
 
 
 def matrix_product(size: int = 3_200) -> Work:
-    """The machine's limit for generation: a large float32 matrix product, counted in floating-point operations."""
+    """Prepares the limit of the machine for generation: a large float32 matrix product, in floating-point operations."""
     matrix = tf.random.normal((size, size), seed=0)
     product = tf.function(lambda: tf.matmul(matrix, matrix)[0, 0])
     return lambda: product().numpy(), 2 * size**3
 
 
 def copy(num_bytes: int = 548_000_000) -> Work:
-    """The machine's limit for the enhancer's training: `num_bytes` read and written in all, by every core, into no new memory."""
+    """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without allocating memory."""
     num_cores = os.cpu_count() or 1
     source, target = (np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2))
     pool = ThreadPoolExecutor(num_cores)

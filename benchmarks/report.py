@@ -1,4 +1,4 @@
-"""The results as text: a line of the terminal's table, and the README's table."""
+"""Formats the results as text, for the terminal and for the table of the README."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from enhsim_tf.reproduce.publish.results import fill_parts
 
 
 def line_of(row: dict) -> str:
-    """A row of the table."""
+    """Formats a row for the terminal."""
     if "skipped" in row:
         return f"{row['work']:60} {row['comparison']:28} skipped: {row['skipped']}"
     if "growth" in row:
@@ -25,13 +25,13 @@ def line_of(row: dict) -> str:
 
 
 def markdown(results: list[dict]) -> str:
-    """The comparisons as Markdown tables, one for each file of results, with what they were measured on."""
+    """Formats the comparisons as Markdown tables, one for each result file, with the description of the machine."""
     return "\n\n".join(_table(each) for each in results)
 
 
 def _table(results: dict) -> str:
     lines = [
-        "| work | ours | compared with | ours / theirs: median (range) | bar | | page faults, ours / theirs |",
+        "| work | enhsim_tf | compared with | time of enhsim_tf / comparison: median (range) | target | | page faults, enhsim_tf / comparison |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in results["rows"]:
@@ -55,7 +55,7 @@ def _few(number: float) -> str:
 
 
 def machine_in_words(about: dict) -> str:
-    """The machine in a sentence."""
+    """Describes the machine in a sentence."""
     sets = [
         each
         for each in ("avx2", "avx_vnni", "avx512f", "avx512_vnni", "avx512_bf16", "amx_tile")
@@ -69,12 +69,12 @@ def machine_in_words(about: dict) -> str:
 
 
 def file_of(about: dict) -> str:
-    """The file of the results on a machine."""
+    """Returns the name of the result file for a machine."""
     return "results_avx2.json" if about.get("as_without_avx512") else "results.json"
 
 
 def with_words(results: dict) -> list[dict]:
-    """Kept rows with what is put together from the others put together anew: the same numbers, in today's words."""
+    """Recomputes the rows that are derived from other rows, so that they have the same numbers and the current wording."""
     measured = [row for row in results["rows"] if row.get("of") != "reproduction"]
     return measured + [{"of": "reproduction", **row} for row in reproduction(measured, bar_of_reproduction(results["machine"]))]
 

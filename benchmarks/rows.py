@@ -1,7 +1,7 @@
-"""The rows of the table: what is compared with what, how often, and the bar it has to reach.
+"""The rows of the benchmark table: the compared implementations, the number of repetitions, and the target for each ratio.
 
-Ways that are compared take turns, repetition by repetition, so that a machine that slows down slows all of them. A ratio
-is that of two neighbours in time; the median and the range of those ratios are reported.
+The compared implementations alternate, so that a change in the speed of the machine affects all of them. Each ratio is computed
+from two consecutive measurements. The table reports the median and the range of the ratios.
 """
 
 import dataclasses
@@ -19,14 +19,16 @@ from benchmarks.machine import has_avx512
 from benchmarks.worker import Worker
 
 PARAMETERS = 13_697_400
-TRAFFIC = 10 * 4 * PARAMETERS  # bytes a step: weights read twice, gradients written, Adam reads four arrays and writes three
-MOST_FAULTS = 2_000_000  # minor page faults of a full reproduce
-WINDOW_FLOP = 2 * (500 * 500 + 500 * 3_200 + 3_200 * 3_200 + 3_200 * 500)  # of a window through the enhancer
+TRAFFIC = (
+    10 * 4 * PARAMETERS
+)  # bytes for each step: weights are read twice, gradients written once; Adam reads four arrays and writes three
+MOST_FAULTS = 2_000_000  # maximum number of minor page faults of a full reproduction
+WINDOW_FLOP = 2 * (500 * 500 + 500 * 3_200 + 3_200 * 3_200 + 3_200 * 500)  # operations of the enhancer for one window
 
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """How much is done: the full budget, or a quick one that only shows that everything runs."""
+    """Numbers of repetitions and sizes, for a full measurement or for a quick run that only shows that everything works."""
 
     repetitions: int = 7
     steps: int = 40
@@ -35,7 +37,7 @@ class Budget:
     windows: int = 4_096
     sizes: tuple[int, ...] = (100, 1_000, 10_000, 100_000, 1_000_000)
     lengths: tuple[int, ...] = (125, 250, 500, 1_000, 2_000)
-    size: dict = dataclasses.field(default_factory=dict)  # of the networks, where it is not the paper's
+    size: dict = dataclasses.field(default_factory=dict)  # size of the networks, if it differs from the paper's
     gan_size: dict = dataclasses.field(default_factory=dict)
 
 
@@ -43,28 +45,28 @@ QUICK = Budget(2, 2, 1, 1, 64, (10, 40), (125, 250), {"window": 125, "hidden_uni
 
 
 def spread(values: list[float]) -> dict[str, float]:
-    """Median and range."""
+    """Returns the median and the range of values."""
     return {"median": float(np.median(values)), "low": float(min(values)), "high": float(max(values))}
 
 
 def in_turns(ways: dict[str, Callable[[], float]], repetitions: int) -> dict[str, list[float]]:
-    """Calls the ways one after another, again and again; what each returned."""
+    """Calls the functions alternately, and returns the results of each."""
     found = {name: [] for name in ways}
     for repetition in range(repetitions):
-        for name in list(ways)[:: 1 if repetition % 2 else -1]:  # no way always follows the same other
+        for name in list(ways)[:: 1 if repetition % 2 else -1]:  # reverses the order each time, so that none always follows the same other
             found[name].append(ways[name]())
     return found
 
 
 @dataclasses.dataclass(frozen=True)
 class Turns:
-    """What workers that took turns found, each by the name of the way.
+    """Measurements of workers that alternated, by the name of the implementation.
 
     Args:
-        seconds: Seconds a unit of work, a number for each repetition.
-        peaks: Peaks of memory in MB.
-        faults: Minor page faults a unit of work, median over repetitions.
-        skipped: Why a way was skipped.
+        seconds: Seconds for each unit of work, one number for each repetition.
+        peaks: Peak memory in MB.
+        faults: Minor page faults for each unit of work, median over the repetitions.
+        skipped: Reasons why implementations were skipped.
     """
 
     seconds: dict[str, list[float]]
@@ -73,7 +75,7 @@ class Turns:
     skipped: dict[str, str]
 
     def compare(self, work: str, comparison: str, unit: str, bar: float | None, ours: str = "ours", words: str | None = None) -> dict:
-        """The row of one comparison, skipped or measured."""
+        """Returns the row of a comparison, which may have been skipped."""
         words = words or comparison
         if comparison in self.skipped:
             return {"work": work, "comparison": words, "skipped": self.skipped[comparison], "unit": unit, "bar": bar}
@@ -82,14 +84,14 @@ class Turns:
         return compared(work, self.seconds[ours], words, self.seconds[comparison], unit, bar, **more)
 
     def limited(self, work: str, comparison: str, limit: str, units: float, bar: float | None, ours: str = "ours", **about: object) -> dict:
-        """The row of a comparison with a limit of the machine, which was measured for one byte or one operation."""
+        """Returns the row of a comparison with a limit of the machine, which was measured for one byte or one operation."""
         floor = [units * each for each in self.seconds[limit]]
         more = {"peak_mb": self.peaks[ours], "faults": self.faults[ours]}
         return compared(work, self.seconds[ours], comparison, floor, "ms", bar, limit=about, **more)
 
 
 def workers_in_turns(workers: dict[str, Worker], repetitions: int) -> Turns:
-    """Lets the workers repeat their work in turns."""
+    """Lets the workers repeat their work alternately."""
     skipped = {name: worker.skipped for name, worker in workers.items() if worker.skipped}
     seconds = in_turns({name: worker.repeat for name, worker in workers.items() if name not in skipped}, repetitions)
     peaks = {name: workers[name].close() for name in seconds}
@@ -97,7 +99,7 @@ def workers_in_turns(workers: dict[str, Worker], repetitions: int) -> Turns:
 
 
 def compared(work: str, ours: list[float], comparison: str, theirs: list[float] | None, unit: str, bar: float | None, **more) -> dict:
-    """A row: times in the unit (ms or s), the ratio ours / theirs, and whether it is at most the bar."""
+    """Returns a row: the times in ms or s, the ratio of enhsim_tf to the comparison, and whether it is at most the target."""
     factor = {"ms": 1e3, "s": 1.0}[unit]
     row = {"work": work, "unit": unit, "ours": spread([factor * each for each in ours]), "comparison": comparison}
     if theirs is not None:
@@ -108,7 +110,7 @@ def compared(work: str, ours: list[float], comparison: str, theirs: list[float] 
 
 
 def enhancer(budget: Budget) -> Iterator[dict]:
-    """One training step of the enhancer."""
+    """Benchmarks a training step of the enhancer."""
     given = {"num_steps": budget.steps, **budget.size}
     workers = {
         "ours": Worker("ours", "enhancer_step", **given),
@@ -124,7 +126,7 @@ def enhancer(budget: Budget) -> Iterator[dict]:
 
 
 def gan(budget: Budget) -> Iterator[dict]:
-    """One adversarial iteration, without and with the dropout variants."""
+    """Benchmarks an iteration of the paper's GAN, with and without dropout."""
     for dropout, bars in ((0.0, (0.25, 0.65)), (0.3, (0.5, None))):
         given = {"num_iterations": budget.iterations, "dropout": dropout, **budget.gan_size}
         workers = {
@@ -139,7 +141,7 @@ def gan(budget: Budget) -> Iterator[dict]:
 
 
 def second(budget: Budget) -> Iterator[dict]:
-    """One adversarial iteration of the second generator, beside one of the paper's networks."""
+    """Benchmarks an iteration of the convolutional GAN against an iteration of the paper's GAN."""
     given = {"num_iterations": budget.iterations}
     window = {name: value for name, value in budget.gan_size.items() if name == "window"}
     workers = {
@@ -151,7 +153,7 @@ def second(budget: Budget) -> Iterator[dict]:
 
 
 def generation(budget: Budget) -> Iterator[dict]:
-    """Windows made, in memory and to Parquet; milliseconds a window."""
+    """Benchmarks the generation of windows in memory and to Parquet, in milliseconds for each window."""
     given = {"num_windows": budget.windows, **budget.size}
     workers = {name: Worker("ours", name, **given) for name in ("enhance_and_noise", "generate", "generate_to_parquet")}
     workers |= {"predict": Worker("keras_plain", "enhance_and_noise", **given), "product": Worker("ours", "matrix_product")}
@@ -167,14 +169,14 @@ def generation(budget: Budget) -> Iterator[dict]:
 
 
 def loading(budget: Budget) -> Iterator[dict]:
-    """Loading a saved simulator."""
+    """Benchmarks the loading of a saved simulator."""
     workers = {name: Worker("ours", name, **budget.size) for name in ("load_simulator", "load_networks")}
     found = workers_in_turns(workers, budget.repetitions)
     yield found.compare("loading a simulator", "load_networks", "s", None, "load_simulator", "load_model, three files")
 
 
 def starting(budget: Budget) -> Iterator[dict]:
-    """Commands that need no network."""
+    """Benchmarks the start of commands that need no network."""
 
     def timed(*arguments: str) -> Callable[[], float]:
         def run() -> float:
@@ -199,7 +201,7 @@ def starting(budget: Budget) -> Iterator[dict]:
 
 
 def growth(budget: Budget) -> Iterator[dict]:
-    """Time of generation against the number of windows, and of training against the window's length; memory of each."""
+    """Measures time and memory of generation against the number of windows, and of training against the window length."""
     windows = []
     for number in budget.sizes:
         worker = Worker("ours", "generate_any", **budget.size)
@@ -221,7 +223,7 @@ def growth(budget: Budget) -> Iterator[dict]:
 
 
 def reproduce(budget: Budget) -> Iterator[dict]:
-    """The whole command, every stage anew, in a process of its own: its time and its page faults, which have a bar."""
+    """Measures the time and the page faults of a full reproduction in a separate process, without cached stages."""
     with tempfile.TemporaryDirectory() as folder:
         out, cache = os.path.join(folder, "figures"), os.path.join(folder, "cache")
         command = [sys.executable, "-m", "enhsim_tf.reproduce", "--out", out, "--cache", cache]
@@ -229,7 +231,7 @@ def reproduce(budget: Budget) -> Iterator[dict]:
         smoke = ["--budget", "smoke"] if budget.size else []
         done = subprocess.run([*command, *smoke], stdout=subprocess.DEVNULL, env=os.environ | Worker.processor, check=False)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    if done.returncode not in (0, 1):  # 1: a verdict changed
+    if done.returncode not in (0, 1):  # exit code 1 means that a verdict changed
         raise RuntimeError(f"Expected a run of reproduce. Received: exit code {done.returncode}.")
     faults = after.ru_minflt - before.ru_minflt
     yield {
@@ -245,7 +247,7 @@ def reproduce(budget: Budget) -> Iterator[dict]:
 
 
 def bar_of_reproduction(about: dict) -> float:
-    """The bar on a machine: without AVX-512 plain Keras computes with TensorFlow's plain kernels, and more is asked."""
+    """Returns the target for a machine. It is stricter without AVX-512, where plain Keras uses TensorFlow's slower kernels."""
     return 0.33 if has_avx512(about) and not about.get("as_without_avx512") else 0.18
 
 

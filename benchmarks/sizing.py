@@ -1,4 +1,4 @@
-"""How large a cluster a data set needs: `python -m benchmarks.sizing` draws and projects from what `benchmarks.fleet` measured.
+"""Estimates the cluster size for a data set from the results of `benchmarks.fleet`: `python -m benchmarks.sizing`.
 
 It fills the tables of docs/sizing.md and draws `figures/fleet_sizing`; nothing is measured here.
 """
@@ -25,7 +25,7 @@ GIB, MB = 2**30, 1e6
 
 
 def medians(found: dict) -> dict[str, dict[str, float]]:
-    """The median over repetitions of what each row measured."""
+    """Returns the median over the repetitions of each row."""
     return {
         name: {key: float(np.median([each[key] for each in rows])) for key in rows[0] if rows[0][key] is not None}
         for name, rows in found["rows"].items()
@@ -33,7 +33,7 @@ def medians(found: dict) -> dict[str, dict[str, float]]:
 
 
 def projected(found: dict, cores: int, num_windows: int = WINDOWS) -> dict[str, float]:
-    """What a data set would take on so many cores like those measured, one worker each.
+    """Projects the cost of a data set to a number of cores like the measured ones, with one worker on each core.
 
     A core gives what one of two workers gave side by side, once running. Nothing else is thought to slow it down; what
     would have to keep up is said beside it.
@@ -59,7 +59,7 @@ def projected(found: dict, cores: int, num_windows: int = WINDOWS) -> dict[str, 
 
 
 def bars(found: dict) -> Iterator[tuple[str, str, bool]]:
-    """Each bar, what was measured, and whether it is reached."""
+    """Returns each target with the measured value, and whether the target is reached."""
     rows, large = found["rows"], found["large"]
     ratios = [two["windows_a_second"] / one["windows_a_second"] for one, two in zip(rows[ONE], rows[TWO], strict=True)]
     yield "two workers against one, at least 1.6 times the rate", spread(ratios, "{:.2f}"), bool(np.median(ratios) >= 1.6)
@@ -76,13 +76,13 @@ def bars(found: dict) -> Iterator[tuple[str, str, bool]]:
 
 
 def spread(values: list[float], form: str) -> str:
-    """The median with its range."""
+    """Formats a median with its range."""
     low, middle, high = (form.format(value) for value in (min(values), np.median(values), max(values)))
     return f"{middle} ({low} to {high})"
 
 
 def tables(found: dict) -> dict[str, str]:
-    """The generated parts of docs/sizing.md."""
+    """Returns the generated parts of docs/sizing.md."""
     lines = [
         "| | windows a second, whole run | once running | first shard after | memory: driver, largest worker |",
         "|---|---|---|---|---|",
@@ -111,7 +111,7 @@ def tables(found: dict) -> dict[str, str]:
 
 
 def parts_table(found: dict) -> str:
-    """Where a worker's time goes."""
+    """Returns the table of the time that a worker spends on each part of its work."""
     parts = found[PARTS]
     whole = sum(parts["seconds_a_window"].values())
     lines = ["| part | ms a window | share |", "|---|---|---|"]
@@ -126,7 +126,7 @@ def parts_table(found: dict) -> str:
 
 
 def projection_table(found: dict) -> str:
-    """What a thousand million windows would take."""
+    """Returns the table of the projected cost of 10^9 windows."""
     lines = [
         "| | cores | 10^9 windows take | core-hours | to be written | shards to be recorded |",
         "|---|---|---|---|---|---|",
@@ -157,7 +157,7 @@ def _plain(number: float) -> str:
 
 
 def draw_sizing(found: dict) -> matplotlib.figure.Figure:
-    """Rates side by side, where the time goes, and the projection."""
+    """Draws the rates, the distribution of the time over the parts of the work, and the projection."""
     rows, parts = found["rows"], found[PARTS]["seconds_a_window"]
     most, whole = max(parts, key=parts.get), sum(parts.values())
     hours = {name: projected(found, cores)["hours"] for name, cores in CLUSTERS.items()}

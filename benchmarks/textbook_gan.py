@@ -1,7 +1,7 @@
-"""The textbook GAN loop: `predict`, then three `train_on_batch`.
+"""Comparison: the textbook GAN loop, with one call of `predict` and three calls of `train_on_batch` in each iteration.
 
-It needs legacy Keras. Under Keras 3 "compile, freeze, compile the stack" freezes the discriminator for good; the loop
-would be quick and wrong. That it learns here is checked before anything is timed.
+The loop needs legacy Keras. In Keras 3, setting `trainable = False` before compiling the combined model freezes the
+discriminator permanently, so the loop would be fast but wrong. Before the timing, a check ensures that the discriminator learns.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from tf_keras import layers
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> tuple[Callable[[], object], int]:
-    """Iterations of 200 real, 200 generated and 200 judged rows."""
+    """Prepares iterations with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
     generator = keras.Sequential(
         [
             keras.Input((16,)),
@@ -54,5 +54,5 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
     before = [weight.copy() for weight in discriminator.get_weights()]
     run()
     if all(np.array_equal(*pair) for pair in zip(before, discriminator.get_weights(), strict=True)):
-        raise RuntimeError("Expected a discriminator that learns. Received: one that stands still.")
+        raise RuntimeError("Expected a discriminator that learns. Received: unchanged weights.")
     return run, num_iterations

@@ -1,4 +1,4 @@
-"""The enhancer in PyTorch with its fused Adam. An optional extra: `pip install -e ".[benchmarks]"`."""
+"""Comparison: the enhancer in PyTorch with its fused Adam. It needs `pip install -e ".[benchmarks]"`."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ import torch
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> tuple[Callable[[], object], int]:
-    """Steps of 15 windows drawn in random order."""
+    """Prepares training steps of 15 windows in random order."""
     widths = (window, window, hidden_units, hidden_units, window)
     stack = []
     for number, (inputs, outputs) in enumerate(zip(widths[:-1], widths[1:], strict=True)):

@@ -1,8 +1,8 @@
-"""One way of doing a work, alone in a process: it repeats when it is told to and says how long that took.
+"""Runs one implementation in a separate process, and times it on request.
 
-`python -m benchmarks.worker MODULE FUNCTION JSON`: the function gets the settings and returns what to repeat and how many
-units of work one repetition is. Each line on standard input asks for a repetition; each answer is a line of JSON.
-A process of its own gives each way its own libraries, its own threads and its own peak of memory.
+In `python -m benchmarks.worker MODULE FUNCTION JSON`, the function receives the settings and returns a `Work`. Each line on
+standard input requests a repetition, and each answer is a line of JSON. The separate process gives each implementation its
+own libraries, threads and peak memory.
 """
 
 import importlib
@@ -19,15 +19,16 @@ COMMAND = (sys.executable, "-m", "benchmarks.worker")
 
 
 class Worker:
-    """A way of doing a work, in a process of its own.
+    """An implementation in a separate process.
+
+    The process inherits the user's environment with the variables of `Worker.processor`. Comparisons also receive the variables
+    of `Worker.of_comparisons`, see `benchmarks.machine`. The attribute `faults` holds the number of minor page faults for each
+    unit of work, one number for each repetition.
 
     Args:
         module: Module of this package.
-        function: Its function, which prepares the work.
-        **settings: What the function gets, in plain JSON types.
-
-    The worker runs in the user's environment, with `Worker.processor` on top, and a comparison with `Worker.of_comparisons`
-    besides (see `benchmarks.machine`). `faults` holds the minor page faults a unit of work, a number for each repetition.
+        function: Function of the module that prepares the work.
+        **settings: Arguments of the function, of JSON types.
     """
 
     processor: ClassVar[dict[str, str]] = {}
@@ -43,7 +44,7 @@ class Worker:
         self.skipped: str | None = self._answer().get("skipped")
 
     def repeat(self, argument: int | None = None) -> float:
-        """Does one repetition, of the size `argument` where the work takes one; seconds a unit of work."""
+        """Runs one repetition, of size `argument` if the work has one, and returns the seconds for each unit of work."""
         self._process.stdin.write("\n" if argument is None else f"{argument}\n")
         self._process.stdin.flush()
         answer = self._answer()
@@ -51,7 +52,7 @@ class Worker:
         return answer["seconds"]
 
     def close(self) -> float:
-        """Ends the process; its peak of memory in MB."""
+        """Ends the process and returns its peak memory in MB."""
         if self.skipped:
             return 0.0
         self._process.stdin.close()
@@ -67,15 +68,15 @@ class Worker:
 
 
 def peak_mb() -> float:
-    """Peak of this process's resident memory in MB."""
+    """Returns the peak resident memory of this process in MB."""
     with open("/proc/self/status", encoding="ascii") as status:
         return next(int(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1024
 
 
 def main(module: str, function: str, settings: str) -> None:
-    """Prepares the work, does it once to warm up, then a repetition for each line of input."""
+    """Prepares the work, runs it once as a warm-up, and then once for each line of input."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # whatever a library prints is no answer
+    os.dup2(2, 1)  # output of libraries must not mix with the answers
     try:
         run, units = getattr(importlib.import_module(f"benchmarks.{module}"), function)(**json.loads(settings))
     except ImportError as error:
@@ -88,7 +89,7 @@ def main(module: str, function: str, settings: str) -> None:
         began, faults = time.perf_counter(), minor_faults()
         timed = run(*arguments)
         seconds, faults = time.perf_counter() - began, minor_faults() - faults
-        if isinstance(timed, tuple):  # a work may hold the clock itself
+        if isinstance(timed, tuple):  # the work has measured its own time
             seconds, faults = timed
         answers.write(json.dumps({"seconds": seconds / units, "faults": faults / units}) + "\n")
     answers.write(json.dumps({"peak_mb": peak_mb()}) + "\n")

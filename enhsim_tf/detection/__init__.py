@@ -1,4 +1,4 @@
-"""Detectors, injected anomalies, thresholds and the measures that judge them (title and abstract of the paper).
+"""Anomaly detectors, injected anomalies, thresholds and performance measures (title and abstract of the paper).
 
-This package knows windows, and nothing of simulators.
+This package works on windows of telemetry. It does not depend on simulators.
 """

@@ -1,23 +1,26 @@
-"""Detectors that are networks: what an autoencoder cannot reconstruct is strange. Keras is imported when one is trained."""
+"""Anomaly detectors that use the reconstruction error of an autoencoder (title and abstract of the paper).
+
+Keras is imported only when a detector is trained.
+"""
 
 import numpy as np
 
 
 class DenseAutoencoder:
-    """A dense autoencoder; its score is the mean square of what it cannot reconstruct.
+    """Anomaly detector that uses the mean squared reconstruction error of a dense autoencoder.
 
     Args:
-        num_hidden: Units of the hidden layers.
-        num_code: Units of the code.
-        epochs: Passes over the windows.
-        seed: Seed of the weights and of the order of the windows.
+        num_hidden: Number of units in each hidden layer.
+        num_code: Number of units in the bottleneck layer.
+        epochs: Number of training epochs.
+        seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
     def __init__(self, num_hidden: int = 128, num_code: int = 16, epochs: int = 30, seed: int = 0):
         self.num_hidden, self.num_code, self.epochs, self.seed = num_hidden, num_code, epochs, seed
 
     def fit(self, windows: np.ndarray) -> "DenseAutoencoder":
-        """Trains it to reconstruct the windows."""
+        """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
         from enhsim_tf.keras_tools.training import dense_stack, fit_windows
 
         self._mean, self._scale = np.mean(windows), np.std(windows)
@@ -28,7 +31,7 @@ class DenseAutoencoder:
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Mean squared reconstruction error, in units of the training variance."""
+        """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
         scaled = self._scaled(windows)
         return np.mean((np.asarray(self._network(scaled)) - scaled) ** 2, axis=1)
 
@@ -37,17 +40,17 @@ class DenseAutoencoder:
 
 
 class ConvolutionalAutoencoder:
-    """A convolutional autoencoder; its score is the mean square of what it cannot reconstruct.
+    """Anomaly detector that uses the mean squared reconstruction error of a convolutional autoencoder.
 
-    Two convolutions and their transposes, of stride 4: every sixteen samples become four numbers. What it knows is
-    local, and the same at every place of a window.
+    The encoder has two convolutions of stride 4, which compress every sixteen samples to `num_code` numbers. The decoder has
+    the corresponding transposed convolutions. The network is local and translation-invariant.
 
     Args:
-        filters: Filters of the outer convolutions.
-        width: Samples of each kernel.
-        num_code: Numbers that sixteen samples are narrowed to.
-        epochs: Passes over the windows.
-        seed: Seed of the weights and of the order of the windows.
+        filters: Number of filters of the outer convolutions.
+        width: Width of each filter in samples.
+        num_code: Number of channels of the bottleneck layer.
+        epochs: Number of training epochs.
+        seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
     stride = 4
@@ -56,7 +59,7 @@ class ConvolutionalAutoencoder:
         self.filters, self.width, self.num_code, self.epochs, self.seed = filters, width, num_code, epochs, seed
 
     def fit(self, windows: np.ndarray) -> "ConvolutionalAutoencoder":
-        """Trains it to reconstruct the windows."""
+        """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
         from enhsim_tf.keras_tools.training import fit_windows
 
         self._mean, self._scale = np.mean(windows), np.std(windows)
@@ -66,17 +69,17 @@ class ConvolutionalAutoencoder:
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Mean squared reconstruction error, in units of the training variance."""
+        """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
         from enhsim_tf.keras_tools.training import predict_windows
 
         scaled = self._scaled(windows)
         return np.mean((predict_windows(self._network, scaled, 1_024) - scaled) ** 2, axis=1)
 
-    def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a name
+    def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.keras_tools.backend import keras
         from enhsim_tf.keras_tools.training import seeded_initialiser
 
-        missing = -samples % self.stride**2  # zeros at the end, taken away again
+        missing = -samples % self.stride**2  # number of zeros that are appended to a window and removed from the output
         layers, kernels = keras.layers, [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)]
         options = {"strides": self.stride, "padding": "same"}
         return keras.Sequential(

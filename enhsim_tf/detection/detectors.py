@@ -1,7 +1,7 @@
-"""Anomaly detectors behind one interface: `fit(windows)` on nominal telemetry, `score(windows)`, higher is stranger.
+"""Anomaly detectors without neural networks, and trivial controls (title and abstract of the paper, which trains no detector).
 
-What the paper's title is about and its text never trains. A detector never sets its own threshold: whoever uses it
-does, on held-out windows of the kind it was trained on. `DETECTORS` names them all, `CONTROLS` what they must beat.
+All detectors have the interface `Detector`: `fit(windows)` takes nominal windows, and `score(windows)` returns one score for each
+window, where higher is more anomalous. `registry` lists all detectors by name.
 """
 
 import numpy as np
@@ -11,39 +11,42 @@ from enhsim_tf.realism.window_features import window_features
 
 
 class LimitCheck:
-    """How far a window leaves the range that telemetry was seen in: the check that every ground station runs.
+    """Limit check, as it is common in ground stations: the distance by which a window leaves the range of the training samples.
 
     Args:
-        low: Quantile of all training samples that is the lower limit.
-        high: Quantile that is the upper one.
+        low: Quantile of the training samples that defines the lower limit.
+        high: Quantile of the training samples that defines the upper limit.
     """
 
     def __init__(self, low: float = 0.001, high: float = 0.999):
         self.low, self.high = low, high
 
     def fit(self, windows: np.ndarray) -> "LimitCheck":
-        """Sets the limits."""
+        """Computes the limits from nominal windows."""
         self._limits = np.quantile(windows, [self.low, self.high])
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """The largest distance outside the limits, in the telemetry's unit; below zero the margin that was left."""
+        """Returns the largest distance outside the limits, in the unit of the telemetry.
+
+        The score of a window within the limits is negative: its magnitude is the remaining margin.
+        """
         return np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
 
 
 class PCAResidual:
-    """Energy of a window outside the principal components of the training windows, also known as Sub-PCA.
+    """Residual of a window outside the principal components of the training windows, also known as Sub-PCA.
 
     Args:
-        num_components: Components that count as nominal.
-        seed: Seed of the randomised solver.
+        num_components: Number of principal components.
+        seed: Seed for the randomised solver.
     """
 
     def __init__(self, num_components: int = 20, seed: int = 0):
         self.num_components, self.seed = num_components, seed
 
     def fit(self, windows: np.ndarray) -> "PCAResidual":
-        """Learns the components."""
+        """Computes the principal components of nominal windows."""
         from sklearn.decomposition import PCA
 
         with threadpool_limits(1):
@@ -51,71 +54,71 @@ class PCAResidual:
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Mean square of what the components leave."""
+        """Returns the mean squared residual of each window."""
         with threadpool_limits(1):
             return np.mean((windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1)
 
 
 class NearestNeighbours:
-    """Mean Euclidean distance of a window to the training windows nearest to it.
+    """Mean Euclidean distance of a window to its nearest training windows.
 
     Args:
-        num_neighbours: How many of them.
+        num_neighbours: Number of nearest training windows.
     """
 
     def __init__(self, num_neighbours: int = 5):
         self.num_neighbours = num_neighbours
 
     def fit(self, windows: np.ndarray) -> "NearestNeighbours":
-        """Remembers the windows."""
+        """Stores the nominal windows."""
         from sklearn.neighbors import NearestNeighbors
 
         self._index = NearestNeighbors(n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute")
-        self._mean = np.mean(windows, dtype=np.float64)  # a large offset would cost the distances their last digits
+        self._mean = np.mean(windows, dtype=np.float64)  # subtracted, because a large offset would reduce the precision of the distances
         self._index.fit(windows - self._mean)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """The mean distance, in the telemetry's unit times the root of the samples."""
+        """Returns the mean distance, in the unit of the telemetry times the square root of the number of samples."""
         with threadpool_limits(1):
             return self._index.kneighbors(windows - self._mean)[0].mean(axis=1)
 
 
 class IsolationForestOnFeatures:
-    """An isolation forest (Liu, Ting and Zhou 2008) on fourteen features of each window.
+    """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`.
 
     Args:
-        num_trees: Trees of the forest.
-        seed: Seed of the forest.
+        num_trees: Number of trees.
+        seed: Seed for the trees.
     """
 
     def __init__(self, num_trees: int = 200, seed: int = 0):
         self.num_trees, self.seed = num_trees, seed
 
     def fit(self, windows: np.ndarray) -> "IsolationForestOnFeatures":
-        """Grows the forest."""
+        """Fits the forest to nominal windows."""
         from sklearn.ensemble import IsolationForest
 
         self._forest = IsolationForest(n_estimators=self.num_trees, random_state=self.seed).fit(window_features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """The forest's anomaly score."""
+        """Returns the anomaly score of the forest."""
         return -self._forest.score_samples(window_features(windows))
 
 
 class OneClassSVMOnFeatures:
-    """A one-class support vector machine (Schölkopf 2001) on fourteen standardised features of each window.
+    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`.
 
     Args:
-        nu: Largest share of the training windows that may lie outside.
+        nu: Upper bound on the share of training windows outside the decision boundary.
     """
 
     def __init__(self, nu: float = 0.01):
         self.nu = nu
 
     def fit(self, windows: np.ndarray) -> "OneClassSVMOnFeatures":
-        """Draws the border around the features."""
+        """Fits the decision boundary to nominal windows."""
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
         from sklearn.svm import OneClassSVM
@@ -125,58 +128,58 @@ class OneClassSVMOnFeatures:
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Distance outside the border, below zero inside."""
+        """Returns the signed distance from the decision boundary, which is negative inside."""
         with threadpool_limits(1):
             return -self._machine.decision_function(window_features(windows))
 
 
 class RandomScore:
-    """Control: a score that knows nothing. Each call draws on.
+    """Control: random scores, independent of the windows. Each call continues the random sequence.
 
     Args:
-        seed: Seed of the draws.
+        seed: Seed for the scores.
     """
 
     def __init__(self, seed: int = 0):
         self._rng = np.random.default_rng(seed)
 
     def fit(self, windows: np.ndarray) -> "RandomScore":
-        """Learns nothing."""
+        """Does nothing, because this control has no parameters to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Uniform draws from 0 to 1."""
+        """Returns random numbers that are uniformly distributed between 0 and 1."""
         return self._rng.random(len(windows))
 
 
 class LargestStep:
-    """Control of one line: the largest absolute first difference. What it finds was no hard anomaly (Wu and Keogh 2021)."""
+    """Control: the largest absolute first difference. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
 
     def fit(self, windows: np.ndarray) -> "LargestStep":
-        """Learns nothing."""
+        """Does nothing, because this control has no parameters to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """The largest step, in the telemetry's unit."""
+        """Returns the largest absolute first difference of each window, in the unit of the telemetry."""
         return np.abs(np.diff(windows, axis=1)).max(axis=1)
 
 
 class MovingDeviation:
-    """Control of one line: the largest standard deviation in a short stretch.
+    """Control: the largest moving standard deviation.
 
     Args:
-        width: Samples of the stretch.
+        width: Width of the moving window in samples.
     """
 
     def __init__(self, width: int = 25):
         self.width = width
 
     def fit(self, windows: np.ndarray) -> "MovingDeviation":
-        """Learns nothing."""
+        """Does nothing, because this control has no parameters to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """The largest deviation over the places of the stretch, in the telemetry's unit."""
+        """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
         centred = np.asarray(windows, np.float64) - np.mean(windows, axis=1, keepdims=True, dtype=np.float64)
         sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0))), axis=2)
         mean, square = (sums[:, :, self.width :] - sums[:, :, : -self.width]) / self.width

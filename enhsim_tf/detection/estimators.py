@@ -1,4 +1,4 @@
-"""Adapter for anomaly detectors of other libraries, such as scikit-learn and PyOD (the application that the paper's title promises)."""
+"""Adapter for anomaly detectors of other libraries, such as scikit-learn and PyOD (title and abstract of the paper)."""
 
 from typing import Any
 

@@ -1,8 +1,9 @@
-"""The experiment that the paper's title asks for: does what detectors were trained on make them robust on real telemetry?
+"""Evaluation of detectors on real telemetry, as a function of their training data (title and abstract of the paper).
 
-Arms (what detectors are trained on), detectors and anomalies are given; out come tables. Every detector sets its threshold
-on held-out windows of its own arm. If arm and reality were exchangeable, it would alarm on real nominal windows at the rate
-it was set for: what it alarms above that is the gap between simulation and reality, and no other choice can hide it.
+An arm of the experiment is a kind of training data, for example windows of the enhanced simulator. Each detector is trained on
+one arm, and its threshold is set on held-out windows of the same arm. If the arm and real telemetry were exchangeable, the
+false-alarm rate on real nominal windows would be at most the nominal rate. The excess over that rate measures the gap between
+simulation and reality.
 """
 
 import dataclasses
@@ -16,22 +17,22 @@ from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inj
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.telemetry.windows import cut_windows
 
-PREVALENCE = 0.02  # share of anomalous windows that precision is stated for
+PREVALENCE = 0.02  # share of anomalous windows for which precision is stated
 
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """The real side of the experiment, the same for all arms.
+    """Real telemetry on which all arms are evaluated.
 
     Args:
-        nominal: Real nominal windows that share no sample, in the order of time; false alarms are counted on them.
-        reference: Other real nominal windows, whose scores set the threshold for recall at the real rate.
-        anomalous: From a kind and a severity to windows, made of real nominal ones by `injections.inject`.
+        nominal: Real nominal windows without overlaps, in the order of time, on which false alarms are counted.
+        reference: Other real nominal windows. Recall at the real rate uses a threshold from their scores.
+        anomalous: Maps a kind and a severity to anomalous windows, which `anomalies.inject` made from real nominal windows.
         trace: A continuous trace with anomalies of every kind, or None.
-        labels: Which samples of the trace are anomalous.
-        rate: False-alarm rate that thresholds are set for.
-        stride: Samples from one scored window of the trace to the next.
-        max_buffer: Largest buffer of VUS-PR in samples, for example a period of the signal.
+        labels: Boolean array that marks the anomalous samples of the trace, or None.
+        rate: Nominal false-alarm rate of the thresholds.
+        stride: Number of samples from one scored window of the trace to the next.
+        max_buffer: Largest buffer length of VUS-PR in samples, for example a period of the signal.
     """
 
     nominal: np.ndarray
@@ -54,19 +55,23 @@ def make_trial(
     trace_severity: float = 4.0,
     **settings: float,
 ) -> Trial:
-    """Puts anomalies of every kind and severity into real nominal telemetry, with draws that know no arm.
+    """Creates a trial by injecting anomalies of every kind and severity into real nominal telemetry.
 
-    Each window takes one of the three durations in turn; the same windows and places serve every kind and severity.
+    The random numbers are independent of the arms. The three durations alternate between windows. All kinds and severities use
+    the same windows and positions.
 
     Args:
         nominal: Real nominal windows, shape `(windows, samples)`, in the order of time.
         reference: Other real nominal windows.
         trace: A continuous real nominal trace, or None.
-        noise_sd: Standard deviation of the real noise: the unit of severity.
-        seed: Seed of the places.
-        num_anomalous: Anomalous windows of each kind and severity, spread evenly over the nominal ones.
+        noise_sd: Standard deviation of the real noise, which is the unit of severity.
+        seed: Seed for the positions.
+        num_anomalous: Number of anomalous windows for each kind and severity, evenly spaced over the nominal windows.
         trace_severity: Severity of the anomalies in the trace.
         **settings: Further fields of `Trial`.
+
+    Returns:
+        The trial.
     """
     chosen = nominal[np.linspace(0, len(nominal) - 1, min(num_anomalous, len(nominal))).astype(int)]
     durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
@@ -100,19 +105,19 @@ def evaluate_arm(
     num_blocks: int = 10,
     on_detector: Callable[[int], None] | None = None,
 ) -> dict[str, list[dict]]:
-    """Trains every detector on one arm and judges it on real telemetry.
+    """Trains every detector on one arm and evaluates it on real telemetry.
 
     Args:
-        training: Windows of the arm to learn from, shape `(windows, samples)`.
-        held_out: Further windows of the arm, which set the threshold.
-        trial: The real side.
-        detectors: From a name to what makes the untrained detector from a seed.
-        seed: Seed of the detectors.
-        num_blocks: Consecutive blocks of time that false alarms are counted in.
-        on_detector: Called after each detector with how many are done.
+        training: Training windows of the arm, shape `(windows, samples)`.
+        held_out: Further windows of the arm, on which the threshold is set.
+        trial: Real telemetry for the evaluation.
+        detectors: Maps a name to a factory, which takes a seed and returns an unfitted detector.
+        seed: Seed for the detectors.
+        num_blocks: Number of consecutive blocks of time for which false alarms are counted separately.
+        on_detector: Called after each detector with the number of completed detectors.
 
     Returns:
-        Rows of three tables: `alarms` (detector, block, alarms, windows), `recall` (detector, kind, severity, recall,
+        The rows of three tables: `alarms` (detector, block, alarms, windows), `recall` (detector, kind, severity, recall,
         recall_at_real_rate, auc_roc, auc_pr) and `traces` (detector, vus_pr).
     """
     tables: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
@@ -145,13 +150,13 @@ def evaluate_arm(
 
 
 def score_trace(detector: Detector, trace: np.ndarray, window: int, stride: int) -> np.ndarray:
-    """A score for each sample: the mean score of the windows that it lies in.
+    """Scores each sample of a trace by the mean score of the windows that contain it.
 
     Args:
         detector: A fitted detector.
-        trace: Telemetry of shape `(samples,)`, at least a window long.
-        window: Samples of a window.
-        stride: Samples from one window to the next.
+        trace: Telemetry of shape `(samples,)`.
+        window: Number of samples in a window.
+        stride: Number of samples from one window to the next.
 
     Returns:
         Scores of shape `(samples,)`.
@@ -166,12 +171,14 @@ def score_trace(detector: Detector, trace: np.ndarray, window: int, stride: int)
 
 
 def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
-    """A score for each sample: the mean over the windows that it lies in; samples behind the last window take its score.
+    """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
+
+    Samples after the end of the last window receive the score of the last window.
 
     Args:
         scores: Score of each window, shape `(windows,)`.
-        begins: First sample of each, rising from 0 in steps of a window at most.
-        window: Samples of a window.
+        begins: First sample of each window, in ascending order. It starts at 0, with steps of at most `window`.
+        window: Number of samples in a window.
         num_samples: Length of the series.
 
     Returns:
@@ -187,22 +194,35 @@ def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_s
 
 
 def mix_real_and_simulated(simulated: np.ndarray, real: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
-    """Windows of which a share is real: the mixing curve's arms (Jaufmann et al.).
+    """Mixes simulated and real windows, for the arms of the mixing curve (Jaufmann et al.).
 
     Args:
         simulated: Simulated windows.
-        real: As many real ones.
-        share: Share that is real, from 0 to 1.
-        rng: Owner of the order.
+        real: The same number of real windows.
+        share: Share of real windows in the mixture, from 0 to 1.
+        rng: Random number generator for the order of the windows.
+
+    Returns:
+        The mixture, of the same shape, in random order.
+
+    Raises:
+        InputError: If the share is not between 0 and 1, or if the numbers of windows differ.
     """
     if not 0 <= share <= 1 or len(simulated) != len(real):
-        raise InputError(f"Expected a share from 0 to 1 and as many windows of both. Received: {share}, {len(simulated)} and {len(real)}.")
+        raise InputError(f"Expected a share from 0 to 1 and equal numbers of windows. Received: {share}, {len(simulated)} and {len(real)}.")
     num_real = round(share * len(real))
     return rng.permutation(np.concatenate([real[:num_real], simulated[num_real:]]))
 
 
 def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
-    """False-alarm rate of each detector, from the rows of `alarms`."""
+    """Computes the false-alarm rate of each detector.
+
+    Args:
+        rows: Rows of the table `alarms`, see `evaluate_arm`.
+
+    Returns:
+        A dictionary from the name of a detector to its false-alarm rate.
+    """
     names = dict.fromkeys(row["detector"] for row in rows)
     return {
         name: sum(row["alarms"] for row in rows if row["detector"] == name) / sum(row["windows"] for row in rows if row["detector"] == name)

@@ -1,4 +1,4 @@
-"""The interface that all anomaly detectors share (the application that the paper's title promises)."""
+"""The interface that all anomaly detectors share (title and abstract of the paper)."""
 
 from typing import Protocol, runtime_checkable
 

@@ -1,7 +1,7 @@
-"""How well scores find anomalies: thresholds, rates and areas, as functions of scores. Higher scores are stranger.
+"""Thresholds and performance measures of anomaly detectors, as functions of their scores (title and abstract of the paper).
 
-An alarm is a score above the threshold, never at it. No score is adjusted by the labels ("point adjustment"): after that
-a random score looks good.
+Higher scores are more anomalous. A score raises an alarm if it is strictly above the threshold. Scores are never adjusted by
+the labels ("point adjustment"), because that makes even random scores look good.
 """
 
 import numpy as np
@@ -10,62 +10,72 @@ from enhsim_tf.common.errors import InputError
 
 
 def threshold(scores: np.ndarray, rate: float) -> float:
-    """The threshold that nominal scores exceed at no more than a rate, with the finite sample paid for (split conformal).
+    """Computes the split conformal threshold for a false-alarm rate, with the finite-sample conformal correction.
 
-    Of `n` scores it is the one of rank `ceil((n + 1) (1 - rate))`. If a further score is exchangeable with these, it
-    lies above with a probability of `rate` at most, and of `1 / (n + 1)` less at least.
+    The threshold is the score of rank `ceil((n + 1) (1 - rate))` among `n` scores. If a new score is exchangeable with these,
+    the probability that it exceeds the threshold is at most `rate`. If there are no ties, the probability is also at least
+    `rate - 1 / (n + 1)`.
 
     Args:
         scores: Scores of held-out nominal windows.
-        rate: False-alarm rate to keep, between 0 and 1.
+        rate: Largest acceptable false-alarm rate, between 0 and 1.
 
     Returns:
-        The threshold; infinite if there are fewer scores than `1 / rate - 1`, which cannot keep the rate otherwise.
+        The threshold. It is infinite if there are fewer than `1 / rate - 1` scores, because no finite threshold then
+        guarantees the rate.
 
     Raises:
-        InputError: If the rate is not between 0 and 1 or there is no score.
+        InputError: If the rate is not between 0 and 1, or if there are no scores.
     """
     if not 0 < rate < 1 or len(scores) == 0:
-        raise InputError(f"Expected a rate between 0 and 1, and scores. Received: rate={rate} and {len(scores)} scores.")
-    rank = int(np.ceil((len(scores) + 1) * (1 - rate) - 1e-9))  # the rounding of 1 - rate must not cost a rank
+        raise InputError(f"Expected a rate between 0 and 1, and at least one score. Received: rate={rate} and {len(scores)} scores.")
+    rank = int(np.ceil((len(scores) + 1) * (1 - rate) - 1e-9))  # the rounding of 1 - rate must not increase the rank
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
 
 
 def false_alarm_rate(nominal_scores: np.ndarray, threshold: float) -> float:
-    """Share of nominal scores above the threshold."""
+    """Returns the share of nominal scores above the threshold."""
     return float(np.mean(np.asarray(nominal_scores) > threshold))
 
 
 def recall(anomalous_scores: np.ndarray, threshold: float) -> float:
-    """Share of anomalous scores above the threshold."""
+    """Returns the share of anomalous scores above the threshold."""
     return float(np.mean(np.asarray(anomalous_scores) > threshold))
 
 
 def recall_at_real_rate(real_scores: np.ndarray, anomalous_scores: np.ndarray, rate: float = 0.01) -> float:
-    """Recall at the threshold that real nominal scores set: how well the order is, whatever the training arm's threshold.
+    """Computes the recall at the real rate, that is at a threshold that is set on real nominal windows.
+
+    This recall measures how well a detector separates nominal from anomalous windows. It does not depend on the threshold
+    from the detector's own training arm.
 
     Args:
-        real_scores: Scores of real nominal windows, apart from those that the false-alarm rate is reported on.
+        real_scores: Scores of real nominal windows, which are not those for which the false-alarm rate is reported.
         anomalous_scores: Scores of anomalous windows.
-        rate: False-alarm rate of the threshold.
+        rate: Nominal false-alarm rate of the threshold.
     """
     return recall(anomalous_scores, threshold(real_scores, rate))
 
 
 def auc_roc(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> float:
-    """Area under the ROC curve: the share of pairs in the right order, ties for half."""
+    """Area under the ROC curve (AUC): the probability that an anomalous window scores higher than a nominal one.
+
+    Ties count as one half.
+    """
     from sklearn.metrics import roc_auc_score
 
     return float(roc_auc_score(*_labelled(nominal_scores, anomalous_scores)))
 
 
 def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarray, prevalence: float = 0.02) -> float:
-    """Area under the precision-recall curve (average precision), as if anomalies were a given share of all windows.
+    """Area under the precision-recall curve (average precision) for a given share of anomalous windows.
+
+    The windows are weighted such that the anomalous windows have this share of the total weight.
 
     Args:
         nominal_scores: Scores of nominal windows.
         anomalous_scores: Scores of anomalous windows.
-        prevalence: Share of anomalous windows that the weights stand for; a random score reaches about this.
+        prevalence: Share of anomalous windows. It is also the expected value of this measure for random scores.
     """
     from sklearn.metrics import average_precision_score
 
@@ -75,45 +85,49 @@ def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarra
 
 
 def gap_closed(rate: float, simulated_rate: float, real_rate: float) -> float:
-    """Share of the gap between simulation and reality that an arm closes: 0 as the coarse simulation, 1 as real telemetry.
+    """Computes the share of the gap between simulation and reality that an arm closes.
+
+    The share is 0 if the arm has the false-alarm rate of the coarse simulation, and 1 if it has that of real telemetry.
 
     Args:
-        rate: False-alarm rate of the arm, on real nominal windows.
-        simulated_rate: That of detectors trained on the coarse simulation.
-        real_rate: That of detectors trained on real nominal windows.
+        rate: False-alarm rate of detectors trained on the arm, on real nominal windows.
+        simulated_rate: False-alarm rate of detectors trained on the coarse simulation.
+        real_rate: False-alarm rate of detectors trained on real telemetry.
 
     Returns:
-        The share; above 1 if the arm has fewer false alarms than real training, nan if there is no gap.
+        The share. It is above 1 if the arm gives fewer false alarms than training on real telemetry, and NaN if there is no gap.
     """
     return float((simulated_rate - rate) / (simulated_rate - real_rate)) if simulated_rate != real_rate else float("nan")
 
 
 def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers: int | None = None) -> float:
-    """Volume under the surface of precision, recall and buffer length (Paparrizos et al. 2022), over all thresholds.
+    """Volume under the surface of precision, recall and buffer length (VUS-PR, Paparrizos et al. 2022), over all thresholds.
 
-    A buffer of length `l` around each anomalous range forgives a score that comes a little early or late: a sample at a
-    distance `d <= l / 2` of the nearest range counts as `sqrt(1 - d / l)` of an anomalous one. With these soft labels
-    and the samples at or above a threshold (the alarms),
+    A buffer of length `l` around each anomalous range tolerates scores that rise slightly early or late. A sample at a
+    distance `d <= l / 2` from the nearest range has the soft label `sqrt(1 - d / l)`; an anomalous sample has the soft label
+    1. The alarms are the samples whose scores are at or above a threshold. Then
 
         precision  = soft labels in alarms / alarms
-        recall     = min(1, soft labels in alarms / P) * share of the ranges that have an alarm, in their buffers or inside
+        recall     = min(1, soft labels in alarms / P) * share of the ranges with an alarm inside or in their buffers
         P          = anomalous samples + half the soft labels in the alarms within buffers
 
-    The area for one buffer is the sum of precision times the step of recall, as in average precision; the volume is the
-    mean of the areas. `P` is that of the authors' benchmark TSB-AD. Their paper of 2022 puts half of all buffers
-    into it, alarms or none; then even alarms at exactly the labelled samples miss recall.
+    The area for one buffer length is the sum of precision times the increase of recall, as in average precision. The volume is
+    the mean of the areas over the buffer lengths. The definition of `P` is that of the authors' benchmark TSB-AD. Their paper of
+    2022 adds half of the soft labels of all buffers instead, with or without alarms. Under that definition, even alarms at
+    exactly the labelled samples do not reach a recall of 1.
 
     Args:
-        labels: Which samples are anomalous, shape `(samples,)`.
+        labels: Boolean array that marks the anomalous samples, shape `(samples,)`.
         scores: Score of each sample, of the same shape.
-        max_buffer: Largest buffer length in samples, for example the dominant period; one for all that is compared.
-        num_buffers: How many lengths from 0 to `max_buffer`, evenly spread; all of them if None.
+        max_buffer: Largest buffer length in samples, for example the dominant period. Use the same value for all detectors that
+            are compared.
+        num_buffers: Number of evenly spaced buffer lengths from 0 to `max_buffer`. None uses all of them.
 
     Returns:
-        The volume, from 0 to 1. A random score reaches about the mean soft label.
+        The volume, from 0 to 1. Its expected value for random scores is about the mean soft label.
 
     Raises:
-        InputError: If no sample is anomalous, a score is not a number, the shapes differ or the buffer is negative.
+        InputError: If no sample is anomalous, if a score is NaN, if the shapes differ, or if `max_buffer` is negative.
     """
     labels, scores = np.asarray(labels, bool), np.asarray(scores, np.float64)
     if labels.shape != scores.shape or labels.ndim != 1 or not labels.any() or np.isnan(scores).any() or max_buffer < 0:
@@ -122,9 +136,9 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers:
             f"Received: shapes {labels.shape} and {scores.shape}, {labels.sum()} anomalous, {np.isnan(scores).sum()} nan, max_buffer={max_buffer}."
         )
     order = np.argsort(-scores, kind="stable")
-    last = np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)  # of each group of equal scores: where a threshold may lie
+    last = np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)  # the last of each group of equal scores, where a threshold may lie
     alarms = last + 1
-    group = np.empty(len(scores), int)  # of each sample: the first threshold that alarms on it
+    group = np.empty(len(scores), int)  # for each sample, the index of the first threshold at which it raises an alarm
     group[order] = np.searchsorted(last, np.arange(len(scores)))
     core = np.cumsum(labels[order])[last]
     distance, edges = _distance(labels), np.flatnonzero(np.diff(labels, prepend=False, append=False)).reshape(-1, 2)
@@ -145,7 +159,7 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers:
 
 
 def _distance(labels: np.ndarray) -> np.ndarray:
-    """Samples from each sample to the nearest anomalous one."""
+    """Returns the distance of each sample from the nearest anomalous sample, in samples."""
     places, far = np.arange(len(labels)), 2 * len(labels)
     before = np.maximum.accumulate(np.where(labels, places, -far))
     after = np.minimum.accumulate(np.where(labels, places, far)[::-1])[::-1]
@@ -153,5 +167,5 @@ def _distance(labels: np.ndarray) -> np.ndarray:
 
 
 def _labelled(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and scores in one array each."""
+    """Concatenates the scores and returns them with their labels, 0 for nominal and 1 for anomalous."""
     return np.repeat([0, 1], [len(nominal_scores), len(anomalous_scores)]), np.concatenate([nominal_scores, anomalous_scores])

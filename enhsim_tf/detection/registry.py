@@ -1,4 +1,4 @@
-"""Names and factories of all anomaly detectors (the application that the paper's title promises).
+"""Names and factories of all anomaly detectors (title and abstract of the paper).
 
 To add a detector, write its class in a module of this package and add one line to `BUILT_IN`. A detector of another
 library is added at run time with `register`. This module imports nothing slow, so that the command line can list the

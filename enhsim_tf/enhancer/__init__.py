@@ -1,4 +1,4 @@
-"""The enhancing network (section 2.2): from coarse windows to smooth ones, the pairs it learns from, and where not to trust it.
+"""The enhancing network (section 2.2 of the paper), its training pairs, and a score for inputs outside its training range.
 
-This package knows nothing of noise or detectors.
+This package does not depend on the noise or the detectors.
 """

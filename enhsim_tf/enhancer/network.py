@@ -1,6 +1,6 @@
-"""Network one, step 3 of the paper's pipeline: the wide MLP that maps coarse windows to smooth ones (section 2.2).
+"""The paper's enhancing network, a wide multilayer perceptron that maps coarse windows to smooth ones (section 2.2, Figure 3).
 
-It knows windows and nothing of noise or of where windows come from.
+The functions work on arrays of windows. They do not depend on the noise, or on how the windows were obtained.
 """
 
 import numpy as np
@@ -15,25 +15,26 @@ def build_enhancer(
     """Builds the paper's enhancing network, Figure 3: Dense layers of 500, 3,200, 3,200 and 500 units.
 
     Args:
-        window: Samples of a window, the width of the first and the last layer.
-        hidden_units: Units of each hidden layer.
+        window: Number of samples in a window, which is the width of the first and of the last layer.
+        hidden_units: Number of units in each hidden layer.
         num_hidden: Number of hidden layers.
-        seed: Seed of the weights.
-        initialiser: Keras name of the weights' initialiser.
+        seed: Seed for the initial weights.
+        initialiser: Keras name of the weight initialiser.
 
     Returns:
-        An uncompiled Keras model from shape `(windows, window)` to the same; 13,697,400 parameters by default.
+        An uncompiled Keras model whose input and output have the shape `(windows, window)`. With the default arguments it
+        has 13,697,400 parameters.
     """
     return dense_stack(window, (window, *[hidden_units] * num_hidden, window), seed, "enhancer", initialiser)
 
 
 def enhance(model: keras.Model, coarse: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
-    """Maps coarse windows to enhanced ones (step 5).
+    """Maps coarse windows to enhanced windows (step 5 of the paper's pipeline).
 
     Args:
         model: The enhancing network.
         coarse: Coarse windows, shape `(windows, samples)`.
-        batch_size: Windows a call of the network.
+        batch_size: Number of windows in each call of the network.
 
     Returns:
         float32 array of shape `(windows, samples)`.

@@ -1,7 +1,7 @@
-"""Says where an enhanced simulator cannot be trusted: how far a coarse window is from those its enhancer was trained on.
+"""Out-of-range score: how far a coarse window lies from the enhancer's training windows (an addition to section 2.2 of the paper).
 
-It looks at coarse windows alone, so it costs no network and needs no truth. What it cannot know is whether the coarse
-simulator itself is right.
+The score is computed from coarse windows only. It needs neither a network nor the true telemetry. It cannot detect an
+error of the coarse simulator itself.
 """
 
 import os
@@ -13,33 +13,37 @@ from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import load_npz
 
-_CHUNK = 2_048  # windows scored at a time
-_MOST_REMEMBERED = 10_000  # training windows whose coordinates are kept
-_MOST_BYTES = 2**28  # of a saved score; they are a thousand times smaller
+_CHUNK = 2_048  # number of windows scored at a time
+_MAX_KEPT = 10_000  # maximum number of training windows whose coordinates are kept
+_MAX_FILE_BYTES = 2**28  # upper limit for the size of a saved score; actual files are about a thousand times smaller
 _FITTED = ("mean", "unit", "components", "coordinates")
 
 
 class OutOfRange:
-    """Distance of a coarse window to the training windows, in which directions that training never took count in full.
+    """Distance of a coarse window from the training windows, weighting the residual outside their PCA subspace by 1.
 
-    The principal components of the training windows that explain most of their variance split a window in two: what
-    they leave, about which the enhancer learned nothing, and its coordinates, within which the enhancer interpolates from
-    the nearest training window. The score is
+    A principal component analysis (PCA) of the training windows splits each window into two parts: its coordinates in the
+    subspace of the leading components, and the residual outside that subspace. The enhancer has learned nothing about
+    residual directions. Within the subspace, it interpolates between training windows. The score is
 
-        sqrt(mean square of what is left + weight * mean square to the nearest training window's coordinates) / unit
+        sqrt(mean squared residual + weight * mean squared distance to the nearest training window's coordinates) / unit
 
-    with the standard deviation of the training windows as unit. Its zero is not reached: nominal windows have a small
-    score of their own. For a limit, take `detection.threshold` of the scores of held-out nominal windows.
+    where `unit` is the standard deviation of the training windows. Nominal windows have a small positive score rather than
+    zero. To obtain a limit, apply `enhsim_tf.detection.metrics.threshold` to the scores of held-out nominal windows.
 
-    Why this one, judged by the rank correlation with the true error of the paper's enhancer, over degraded modes of all
-    severities and over waves in other proportions and phases: what the components leave is as good in the degraded
-    modes, but alone it does not see nominal waves in proportions and phases that training never had. The distance to the
-    nearest training window sees those, and ranks the degraded modes worse: it counts in full a shift along directions
-    that the enhancer follows well. The Mahalanobis distance among the components falls where most modes get worse.
+    The form was chosen among four candidates by their rank correlation with the true error of the paper's enhancer, over
+    degraded modes of all severities and over square waves with other proportions and phases:
+
+    - The residual alone ranks degraded modes equally well, but it does not respond to nominal waves in proportions and
+      phases that are absent from training.
+    - The distance to the nearest training window alone responds to those, but it ranks degraded modes worse, because it
+      gives full weight to shifts along directions that the enhancer follows well.
+    - The Mahalanobis distance within the subspace decreases when most of the degraded modes become more severe.
 
     Args:
         explained: Share of the training windows' variance that the components explain, between 0 and 1.
-        weight: Of the distance within the components, from 0 to 1; 1 makes it about the nearest-neighbour distance.
+        weight: Weight of the distance within the subspace, from 0 to 1. With 1, the score is approximately the distance to the
+            nearest training window.
 
     Example:
     >>> out_of_range = OutOfRange().fit(coarse_training_windows)
@@ -53,21 +57,21 @@ class OutOfRange:
         self.explained, self.weight = explained, weight
 
     def fit(self, coarse_windows: np.ndarray) -> "OutOfRange":
-        """Learns the range.
+        """Fits the principal components and stores the coordinates of the training windows.
 
         Args:
-            coarse_windows: The enhancer's training windows, shape `(windows, samples)`; those that repeat count once.
+            coarse_windows: The enhancer's training windows, shape `(windows, samples)`. Duplicate windows are counted once.
 
         Returns:
-            The fitted score.
+            This object, fitted.
 
         Raises:
-            InputError: If there are fewer than two different windows or a value is not finite.
+            InputError: If there are fewer than two distinct windows, or if a value is not finite.
         """
         windows = _checked(coarse_windows)
         distinct = np.unique(windows, axis=0)
         if len(distinct) < 2:
-            raise InputError(f"Expected at least two different coarse windows. Received: {len(distinct)} of {len(windows)}.")
+            raise InputError(f"Expected at least two distinct coarse windows. Received: {len(distinct)} of {len(windows)}.")
         self._mean = distinct.mean(axis=0)
         centred = distinct - self._mean
         self._unit = np.sqrt(np.mean(centred**2))
@@ -75,18 +79,23 @@ class OutOfRange:
             _, values, directions = np.linalg.svd(centred, full_matrices=False)
             share = np.cumsum(values**2) / np.sum(values**2)
             self._components = directions[: np.searchsorted(share, self.explained) + 1].copy()
-            coordinates = centred[:: -(-len(centred) // _MOST_REMEMBERED)] @ self._components.T
+            coordinates = centred[:: -(-len(centred) // _MAX_KEPT)] @ self._components.T
         self._coordinates = coordinates.astype(np.float32)
         return self
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
-        """One score a window, float64 of shape `(windows,)`: 0 or little in range, around 1 as far as training is wide.
+        """Computes the score of each window.
 
         Args:
             coarse_windows: Coarse windows, shape `(windows, samples)`.
 
+        Returns:
+            float64 array of shape `(windows,)`. Windows within the training range score close to 0. A window that is one
+            standard deviation of the training windows away scores about 1.
+
         Raises:
-            InputError: If it was not fitted, the windows have another length or a value is not finite.
+            InputError: If the score is not fitted, if the windows differ in length from the training windows, or if a value
+                is not finite.
         """
         self._check_fitted()
         windows = _checked(coarse_windows, len(self._mean))
@@ -104,10 +113,13 @@ class OutOfRange:
         return np.sqrt((left + self.weight * nearest) / windows.shape[1]) / self._unit
 
     def save(self, path: str | os.PathLike) -> None:
-        """Saves to one `.npz` file, well below a megabyte for an enhancer's usual number of training windows.
+        """Saves the fitted score to an `.npz` file, which is usually much smaller than one megabyte.
+
+        Args:
+            path: The file.
 
         Raises:
-            InputError: If it was not fitted.
+            InputError: If the score is not fitted.
         """
         self._check_fitted()
         with replace_file(path) as temporary, open(temporary, "wb") as file:
@@ -115,17 +127,20 @@ class OutOfRange:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> "OutOfRange":
-        """Loads what `save` wrote; nothing in the file is executed.
+        """Loads a score that `save` wrote. No code in the file is executed.
+
+        Args:
+            path: The file.
 
         Raises:
-            InputError: If `save` did not write the file.
+            InputError: If the file was not written by `save`.
         """
         try:
             kept = load_npz(path, _MOST_BYTES)
             loaded = cls(float(kept["explained"]), float(kept["weight"]))
             for name in _FITTED:
                 setattr(loaded, f"_{name}", kept[name])
-            loaded._score(np.zeros((1, len(loaded._mean))))  # whether they fit together
+            loaded._score(np.zeros((1, len(loaded._mean))))  # fails if the shapes of the arrays do not match
         except (ValueError, KeyError, TypeError, IndexError) as error:
             raise InputError(f"Expected a file written by OutOfRange.save. Received: {path} ({type(error).__name__}).") from None
         return loaded

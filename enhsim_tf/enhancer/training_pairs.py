@@ -1,7 +1,8 @@
-"""Pairs of windows, steps 3 and 4 of the paper's pipeline: what the coarse simulator says and what the telemetry says.
+"""Training pairs of the enhancer: coarse windows and telemetry windows of the same times (section 2.2, steps 3 and 4 of the pipeline).
 
-In the paper both run on one clock and at one level for ever. A real channel drifts away from both; then the simulator
-is set to each window, as one that runs beside a vehicle would be, and the pair says how.
+In the paper, the simulator and the telemetry share one clock and one level at all times. The clock and the level of a
+real channel drift. For such a channel, the simulator's clock, level and amplitude are fitted to each window, as they would
+be for a simulator that runs beside a vehicle. The fitted values are stored with the pair.
 """
 
 import dataclasses
@@ -14,19 +15,20 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows
 
-MIN_GAIN = 0.1  # of the simulator's own amplitude: below it a window shows nothing that a network could learn a shape from
+MIN_GAIN = 0.1  # in units of the simulator's amplitude; windows with a smaller fitted gain are too flat to train on
 
 
 @dataclasses.dataclass(frozen=True)
 class Pairs:
-    """Windows of the coarse simulator and of the telemetry at the same times.
+    """Windows of the coarse simulator and windows of the telemetry at the same times.
 
     Args:
-        coarse: Coarse windows at the simulator's own level, float32 of shape `(windows, samples)`.
-        target: The telemetry, same shape.
-        shift: What is added to the simulator's level to meet each window, in the telemetry's unit, shape `(windows,)`.
-        gain: By what its amplitude is multiplied, shape `(windows,)`.
-        time_s: When each window begins on the series' clock, in seconds, shape `(windows,)`.
+        coarse: Coarse windows at the simulator's own level and amplitude, float32 of shape `(windows, samples)`.
+        target: Telemetry windows, same shape.
+        shift: Offset that is added to the simulator's output to match each telemetry window, in the unit of the telemetry,
+            shape `(windows,)`.
+        gain: Factor that multiplies the simulator's output to match each telemetry window, shape `(windows,)`.
+        time_s: Start time of each window on the clock of the series, in seconds, shape `(windows,)`.
     """
 
     coarse: np.ndarray
@@ -40,48 +42,56 @@ class Pairs:
 
     @property
     def coarse_rescaled(self) -> np.ndarray:
-        """The coarse windows at the level and amplitude of the telemetry's."""
+        """The coarse windows, rescaled to the level and amplitude of the telemetry windows."""
         return apply_shift_and_gain(self.coarse, self.shift, self.gain)
 
     @property
     def target_in_unit(self) -> np.ndarray:
-        """The telemetry at the simulator's own level and amplitude: what the enhancer learns."""
+        """The telemetry windows, rescaled to the simulator's level and amplitude. These are the enhancer's training targets."""
         return ((self.target - self.shift[:, None]) / self.gain[:, None]).astype(np.float32)
 
     def drop_flat(self) -> "Pairs":
-        """Those windows that follow the simulator: a window without its motion has no shape to learn.
+        """Drops the windows whose fitted gain is below `MIN_GAIN` (0.1), because flat telemetry shows no shape to learn.
+
+        Returns:
+            The remaining pairs.
 
         Raises:
-            InputError: If there is none.
+            InputError: If no pair remains.
         """
         follows = self.gain >= MIN_GAIN
         if not follows.any():
             raise InputError(
-                f"Expected windows that follow the coarse simulator. Received: none of {len(self)}. Give another simulator, or telemetry that moves."
+                "Expected windows that follow the coarse simulator. "
+                f"Received: none of {len(self)} with a gain of {MIN_GAIN} or more. Use another simulator, or telemetry that is not constant."
             )
         return Pairs(**{field.name: getattr(self, field.name)[follows] for field in dataclasses.fields(self)})
 
 
 def apply_shift_and_gain(windows: np.ndarray, shift: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """Windows moved to a level and amplitude each, float32 of the same shape `(windows, samples)`.
+    """Multiplies each window by its gain and then adds its shift.
 
     Args:
-        windows: Windows at the simulator's own level.
-        shift: What is added to each, shape `(windows,)`.
-        gain: What each is multiplied by first, shape `(windows,)`.
+        windows: Windows at the simulator's own level and amplitude, shape `(windows, samples)`.
+        shift: Offset of each window, shape `(windows,)`.
+        gain: Factor of each window, shape `(windows,)`.
+
+    Returns:
+        float32 array of shape `(windows, samples)`.
     """
     return (shift[:, None] + gain[:, None] * windows).astype(np.float32)
 
 
 def split_end(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry], list[Telemetry]]:
-    """Splits the end off a series.
+    """Splits a series into its beginning and its end.
 
     Args:
-        parts: Stretches of one series, in the order of time.
-        share: Share of the samples at the end, from 0 to below 1; 0 gives everything twice.
+        parts: Contiguous parts of one series, in the order of time.
+        share: Share of the samples that belong to the end, at least 0 and below 1. With 0, both returned lists hold the
+            whole series.
 
     Returns:
-        The stretches without their last samples, and the stretches of those.
+        The parts of the beginning, and the parts of the end.
     """
     if not share:
         return list(parts), list(parts)
@@ -96,62 +106,69 @@ def split_end(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry]
 
 
 def num_window_starts(parts: Sequence[Telemetry], window: int) -> int:
-    """At how many samples a whole window can begin."""
+    """Returns the number of samples at which a complete window can start.
+
+    Args:
+        parts: Contiguous parts of one series.
+        window: Number of samples in a window.
+    """
     return sum(max(0, len(part) - window + 1) for part in parts)
 
 
 def random_window_starts(parts: Sequence[Telemetry], window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
-    """Random places for windows, every sample that begins a whole one as likely as any other.
+    """Draws window starts uniformly from all samples at which a complete window can start, with replacement.
 
     Args:
-        parts: Stretches of one series.
-        window: Samples of a window.
+        parts: Contiguous parts of one series.
+        window: Number of samples in a window.
         num_windows: Number of windows.
-        rng: Owner of the draws.
+        rng: Random number generator.
 
     Returns:
         Integers below `num_window_starts`, shape `(num_windows,)`.
 
     Raises:
-        InputError: If no stretch is as long as a window.
+        InputError: If every part is shorter than a window.
     """
     places = num_window_starts(parts, window)
     if not places:
         longest = max((len(part) for part in parts), default=0)
-        raise InputError(f"Expected at least one window of {window} samples in a piece. Received: {longest}. Give a longer series.")
+        raise InputError(
+            f"Expected a contiguous part of at least {window} samples. Received: {longest}. Use a longer series or a shorter window."
+        )
     return rng.integers(0, places, num_windows)
 
 
 def evenly_spaced_starts(parts: Sequence[Telemetry], window: int, num_windows: int) -> np.ndarray:
-    """Places spread evenly over the stretches, in the order of time.
+    """Returns window starts that are evenly spaced over the series, in the order of time.
 
     Args:
-        parts: Stretches of one series.
-        window: Samples of a window.
-        num_windows: Number of places, at most; none comes twice.
+        parts: Contiguous parts of one series.
+        window: Number of samples in a window.
+        num_windows: Maximum number of starts. A series with fewer possible starts returns each of them once.
     """
     places = num_window_starts(parts, window)
     return np.unique(np.linspace(0, places - 1, min(num_windows, places)).astype(np.int64))
 
 
 def cut_windows_from_parts(parts: Sequence[Telemetry], places: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cuts windows out of the stretches of a series.
+    """Cuts windows out of a series that consists of several contiguous parts.
 
     Args:
-        parts: Stretches of one series, on one clock.
-        places: Where each window begins, counted over the stretches as `num_window_starts` counts.
-        window: Samples of a window.
+        parts: Contiguous parts of one series, on one clock.
+        places: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
+        window: Number of samples in a window.
 
     Returns:
-        The windows, float32 of shape `(windows, samples)`, and when each begins in seconds, shape `(windows,)`.
+        The windows, float32 of shape `(windows, samples)`, and their start times in seconds, shape `(windows,)`.
 
     Raises:
-        InputError: If no whole window begins at one of the places.
+        InputError: If an index is out of range.
     """
     places, usable = np.asarray(places), [part for part in parts if len(part) >= window]
     firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
     if len(places) and not 0 <= places.min() <= places.max() < firsts[-1]:
-        raise InputError(f"Expected places from 0 to before {firsts[-1]}. Received: from {places.min()} to {places.max()}.")
+        raise InputError(f"Expected window starts from 0 to before {firsts[-1]}. Received: from {places.min()} to {places.max()}.")
     which = np.searchsorted(firsts, places, "right") - 1
     windows, time_s = np.empty((len(places), window), np.float32), np.empty(len(places))
     for number, part in enumerate(usable):
@@ -163,15 +180,15 @@ def cut_windows_from_parts(parts: Sequence[Telemetry], places: np.ndarray, windo
 
 
 def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, places: np.ndarray, window: int, follow: bool = False) -> Pairs:
-    """Cuts paired windows.
+    """Cuts telemetry windows out of a series, and simulates the coarse windows of the same times.
 
     Args:
-        parts: Stretches of one series, on one clock.
+        parts: Contiguous parts of one series, on one clock.
         coarse: The coarse simulator.
-        places: Where each window begins, counted over the stretches as `num_window_starts` counts.
-        window: Samples of a window.
-        follow: Whether the simulator is set to the clock, level and amplitude of each window, by correlation and least
-            squares; else it runs on as it is configured.
+        places: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
+        window: Number of samples in a window.
+        follow: Whether to fit the simulator to each telemetry window: its clock by cross-correlation, its level and
+            amplitude by least squares. If False, the simulator runs as configured.
     """
     target, time_s = cut_windows_from_parts(parts, places, window)
     times = time_s[:, None] + parts[0].interval_s * np.arange(window)
@@ -181,35 +198,38 @@ def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, places: n
     return Pairs(windows, target, *_least_squares(windows, target), time_s)
 
 
-def align_to_enhanced(pairs: Pairs, coarse: np.ndarray, shapes: np.ndarray) -> Pairs:
-    """Sets the simulator to each window again, by what its windows look like once they are enhanced.
+def align_to_enhanced(pairs: Pairs, coarse: np.ndarray, enhanced: np.ndarray) -> Pairs:
+    """Realigns phase, offset and gain of each pair, using the enhanced waveform instead of the square wave.
 
-    A square wave tells the clock by its edges alone; the enhanced shape tells it by every sample.
+    A square wave carries phase information only at its edges, whereas the enhanced waveform carries it at every sample.
 
     Args:
-        pairs: Pairs that follow the telemetry.
+        pairs: Pairs whose simulator was fitted to the telemetry.
         coarse: Coarse windows at every phase of a period, shape `(phases, samples)`.
-        shapes: The same windows enhanced, same shape.
+        enhanced: The same windows after enhancement, same shape.
 
     Returns:
-        Pairs of the same telemetry with the coarse windows, shifts and gains whose shapes correlate best with it.
+        Pairs with the same telemetry. Each has the coarse window whose enhanced waveform correlates best with the telemetry,
+        and the shift and gain of that waveform by least squares.
     """
-    centred = shapes - shapes.mean(axis=1, keepdims=True, dtype=np.float64)
+    centred = enhanced - enhanced.mean(axis=1, keepdims=True, dtype=np.float64)
     length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
-    agreement = pairs.target @ (centred / np.where(length > 0, length, 1.0)).T  # a centred shape sees no level
+    agreement = (
+        pairs.target @ (centred / np.where(length > 0, length, 1.0)).T
+    )  # the waveforms are centred, so the level of the telemetry has no effect
     best = np.argmax(agreement, axis=1)
-    return Pairs(coarse[best], pairs.target, *_least_squares(shapes[best], pairs.target), pairs.time_s)
+    return Pairs(coarse[best], pairs.target, *_least_squares(enhanced[best], pairs.target), pairs.time_s)
 
 
 def ridge(learnt: Pairs, pairs: Pairs) -> np.ndarray:
-    """Ridge regression from coarse windows to the telemetry, at the level of each window: the linear rival of the enhancer.
+    """Predicts telemetry windows by ridge regression on coarse windows, the linear baseline for the enhancer.
 
     Args:
-        learnt: What it learns from; windows without the simulator's motion are left out.
-        pairs: Whose coarse windows it takes.
+        learnt: Training pairs. Flat windows are dropped, see `Pairs.drop_flat`.
+        pairs: Pairs whose telemetry is predicted, from their coarse windows, shifts and gains.
 
     Returns:
-        Its windows of the telemetry, float32 of shape `(windows, samples)`.
+        Predicted telemetry, float32 of shape `(windows, samples)`.
     """
     from sklearn.linear_model import Ridge
 
@@ -219,11 +239,15 @@ def ridge(learnt: Pairs, pairs: Pairs) -> np.ndarray:
 
 
 def window_errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Root-mean-square error of each window in units of its target's standard deviation; NaN where that is flat, which says nothing.
+    """Computes the normalised root-mean-square error (NRMSE) of each window.
 
     Args:
-        windows: What should follow the target, shape `(windows, samples)`.
-        target: The telemetry, same shape.
+        windows: Predicted windows, shape `(windows, samples)`.
+        target: Telemetry windows, same shape.
+
+    Returns:
+        The root-mean-square error of each window, divided by the standard deviation of its target, shape `(windows,)`. It is
+        NaN for constant targets, for which the quotient is undefined.
     """
     deviation = target.std(axis=1, dtype=np.float64)
     error = np.sqrt(np.mean((windows - target) ** 2, axis=1, dtype=np.float64))
@@ -231,7 +255,7 @@ def window_errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def _least_squares(coarse: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shift and gain of each coarse window that bring it nearest to its target; a window without an edge gets gain 0."""
+    """Returns the shift and the gain of each coarse window by least squares. A constant coarse window gets a gain of 0."""
     coarse_mean, target_mean = (each.mean(axis=1, dtype=np.float64) for each in (coarse, target))
     centred = coarse - coarse_mean[:, None]
     power = np.sum(centred**2, axis=1)
@@ -241,16 +265,16 @@ def _least_squares(coarse: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, 
 
 
 def paired_windows(telemetry: Telemetry, coarse: SquareWaveSimulator, offsets: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coarse and true windows of the same times (steps 3 and 4).
+    """Returns the coarse windows and the telemetry windows of the same times (steps 3 and 4 of the paper's pipeline).
 
     Args:
-        telemetry: The true series.
+        telemetry: The telemetry.
         coarse: The coarse simulator.
         offsets: First sample of each window, shape `(windows,)`.
-        window: Samples of a window.
+        window: Number of samples in a window.
 
     Returns:
-        `(coarse, true)`, two float32 arrays of shape `(windows, window)`.
+        `(coarse, target)`, two float32 arrays of shape `(windows, window)`.
     """
     times = telemetry.offset_s + telemetry.interval_s * (np.asarray(offsets)[:, None] + np.arange(window))
     return coarse.simulate(times), cut_windows(telemetry.values, offsets, window)

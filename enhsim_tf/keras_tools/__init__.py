@@ -1,4 +1,4 @@
-"""TensorFlow's start, training loops and fast operations. No other package imports Keras or TensorFlow directly.
+"""TensorFlow's start-up, training loops and fast operations for the networks of sections 2.2 and 2.3 of the paper.
 
-This package knows arrays and networks, and nothing of telemetry.
+All other packages import Keras and TensorFlow from here. This package does not depend on telemetry.
 """

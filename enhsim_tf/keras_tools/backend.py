@@ -1,8 +1,8 @@
-"""Starts TensorFlow, in one place: `from enhsim_tf.keras_tools.backend import keras, tf`.
+"""Starts TensorFlow for the networks of sections 2.2 and 2.3: `from enhsim_tf.keras_tools.backend import keras, tf`.
 
-Every module that holds a network imports both from here, so that commands, worker processes, notebooks and programs which
-use the package as a library compute with the same settings (`tensorflow_settings`), and none of TensorFlow's start-up
-messages reaches the user. If TensorFlow was imported before, it keeps the settings that it started with.
+Every module with a network imports Keras and TensorFlow from here. Commands, worker processes, notebooks and programs that
+use the package as a library therefore share the same settings (see `tensorflow_settings`), and TensorFlow's start-up
+messages are suppressed. If TensorFlow was imported earlier, it keeps the settings with which it started.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ from enhsim_tf.keras_tools.tensorflow_settings import SETTINGS, apply_settings
 
 @contextlib.contextmanager
 def _standard_error_silenced() -> Iterator[None]:
-    """Turns the file descriptor itself away: TensorFlow writes to it before any of its own log levels counts."""
+    """Redirects the file descriptor of standard error, because TensorFlow writes to it before its log level takes effect."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -31,7 +31,7 @@ def _standard_error_silenced() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _garbage_collection_paused() -> Iterator[None]:
-    """Rests the garbage collector, which would walk again and again over all that is imported, and that stays."""
+    """Pauses the garbage collector, which would repeatedly traverse the imported objects although none of them is garbage."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -47,14 +47,15 @@ def _start() -> None:
     with _standard_error_silenced(), _garbage_collection_paused():
         import tensorflow
 
-        tensorflow.config.list_physical_devices()  # the messages about devices come with the first look at them
-    tensorflow.get_logger().setLevel("ERROR")  # its warnings are about how often a graph is built, and name no remedy a user has
+        tensorflow.config.list_physical_devices()  # the first call prints messages about devices
+    tensorflow.get_logger().setLevel("ERROR")  # hides warnings about retraced graphs, which users cannot act on
 
 
 def _check_backend(expected: str, received: str) -> None:
     if received != SETTINGS["KERAS_BACKEND"]:
         raise InputError(
-            f"{expected} tensorflow. Received: {received}. The networks are trained by TensorFlow's operations: choose it, or unset the variable."
+            f"{expected} tensorflow. Received: {received}. The networks are trained with TensorFlow operations: "
+            "set the variable to tensorflow, or unset it."
         )
 
 

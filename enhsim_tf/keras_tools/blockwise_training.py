@@ -1,17 +1,18 @@
-"""Training of a stack of wide Dense layers by Adam, a block of rows of each kernel at a time.
+"""Cache-efficient training of wide Dense layers, such as those of the paper's enhancer (section 2.2), by Adam.
 
-A training step of the enhancer is bound by memory: its widest kernel has 10.24 million weights, 41 MB. Keras computes the
-kernel's whole gradient, writes it to memory, and reads it again for the update. But the gradient of a Dense kernel is a
-product of two small matrices, the layer's inputs and the gradient of its outputs, so that any rows of it can be computed
-when they are needed. Here a kernel is held in blocks of some megabytes, and for each block in turn
+Memory bandwidth limits a training step of the enhancer: its widest kernel has 10.24 million weights, or 41 MB. Keras
+computes the gradient of the whole kernel, writes it to memory, and reads it again for the update. However, the gradient of a
+Dense kernel is a product of two small matrices, the layer's inputs and the gradient of its outputs. Any block of its rows
+can therefore be computed when it is needed. This module splits each kernel into blocks of a few megabytes, and performs
+three operations for one block after the other:
 
     the gradient of the layer's inputs     below = upstream @ block^T         with the weights before the update
     the gradient of the block              gradient = inputs[:, rows]^T @ upstream
     Adam's update of the block             `fused_adam.apply_adam`
 
-follow each other, so that a block and its gradient are still in the processor's cache when the update reads them. The
-mathematics is that of `keras.Model.fit` with `keras.optimizers.Adam`; only the order of the sums differs, and with it their
-rounding: a product with a kernel is the sum of the products with its blocks.
+The block and its gradient are thus still in the processor's cache when the update reads them. The mathematics is the same as
+that of `keras.Model.fit` with `keras.optimizers.Adam`. Only the order of summation differs, and therefore the rounding,
+because a product with a kernel is computed as the sum of the products with its blocks.
 """
 
 import math
@@ -24,13 +25,13 @@ from enhsim_tf.keras_tools.backend import keras, tf
 from enhsim_tf.keras_tools.fused_adam import apply_adam
 
 BLOCK_BYTES = 5_200_000
-"""Size of a block: a few of them and their moments fit into a processor's cache, and the operations on one take a millisecond."""
+"""Maximum size of a block. A few blocks of this size, with their moments, fit into a processor's cache."""
 
 _ACTIVATIONS = (keras.activations.relu, keras.activations.linear)
 
 
 class _Weight(NamedTuple):
-    """A weight, or a block of one, with the moments of Adam."""
+    """A weight, or a block of a weight, with its moments in Adam."""
 
     value: tf.Variable
     momentum: tf.Variable
@@ -42,7 +43,7 @@ def _weight_of(values: np.ndarray) -> _Weight:
 
 
 class _BlockedDense:
-    """A Dense layer whose kernel is held in blocks of rows."""
+    """A Dense layer whose kernel is stored in blocks of rows."""
 
     def __init__(self, layer: keras.layers.Dense):
         self.layer, self.is_relu = layer, layer.activation is keras.activations.relu
@@ -52,7 +53,7 @@ class _BlockedDense:
         self.bias, self.num_rows = _weight_of(bias), [block.value.shape[0] for block in self.blocks]
 
     def parts_of(self, inputs: tf.Tensor) -> list[tf.Tensor]:
-        """The columns of the inputs that each block is multiplied with."""
+        """Splits the inputs into the columns by which the individual blocks are multiplied."""
         return tf.split(inputs, self.num_rows, axis=1)
 
     def __call__(self, inputs: tf.Tensor) -> tf.Tensor:
@@ -63,26 +64,28 @@ class _BlockedDense:
     def update(
         self, inputs: tf.Tensor, outputs: tf.Tensor, upstream: tf.Tensor, adam: keras.optimizers.Adam, is_first: bool
     ) -> tf.Tensor | None:
-        """Moves the weights, and returns the gradient of the inputs; the first layer's is not needed."""
+        """Updates the weights and returns the gradient of the inputs, or None for the first layer, where it is not needed."""
         if self.is_relu:
             upstream = tf.where(outputs > 0, upstream, 0.0)
         before, belows = [upstream], []
         for part, block in zip(self.parts_of(inputs), self.blocks, strict=True):
-            with tf.control_dependencies(before):  # one block after the other, else all gradients are computed first
+            with tf.control_dependencies(
+                before
+            ):  # processes the blocks one after the other; otherwise all gradients would be computed first
                 gradient = tf.matmul(part, upstream, transpose_a=True)
                 belows += [] if is_first else [tf.matmul(upstream, block.value, transpose_b=True)]
-            with tf.control_dependencies(belows[-1:]):  # from the weights as they were
+            with tf.control_dependencies(belows[-1:]):  # the gradient of the inputs needs the weights before the update
                 before = [apply_adam(adam, *block, gradient)]
         apply_adam(adam, *self.bias, tf.reduce_sum(upstream, axis=0))
         return None if is_first else tf.concat(belows, axis=1)
 
     def write_back(self) -> None:
-        """Gives the Keras layer the trained weights."""
+        """Copies the trained weights to the Keras layer."""
         self.layer.set_weights([np.concatenate([block.value.numpy() for block in self.blocks]), self.bias.value.numpy()])
 
 
 def is_wide_dense_stack(network: keras.Model) -> bool:
-    """Whether a model is a stack of Dense layers, relu or linear, with a kernel that is larger than a block."""
+    """Returns whether a model is a stack of relu or linear Dense layers, at least one with a kernel larger than `BLOCK_BYTES`."""
     if type(network) is not keras.Sequential:
         return False
     return all(map(_is_plain_dense, network.layers)) and any(
@@ -99,10 +102,10 @@ def _is_plain_dense(layer: keras.layers.Layer) -> bool:
 
 
 class BlockwiseTraining(keras.Model):
-    """What `fit` is called on in place of a wide stack of Dense layers; `write_back` gives that its trained weights.
+    """A model that is trained instead of a wide stack of Dense layers. After `fit`, `write_back` copies the weights back.
 
     Args:
-        network: A model for which `is_wide_dense_stack` holds.
+        network: A model for which `is_wide_dense_stack` returns True.
     """
 
     def __init__(self, network: keras.Sequential):
@@ -110,11 +113,11 @@ class BlockwiseTraining(keras.Model):
         self._stack = _Stack(network.layers)
 
     def call(self, inputs: tf.Tensor) -> tf.Tensor:
-        """What the network computes."""
+        """Computes the outputs of the network."""
         return self._stack.forward(inputs)[-1]
 
     def train_step(self, data: tuple[tf.Tensor, tf.Tensor]) -> dict[str, tf.Tensor]:
-        """A step of training on a batch; Keras calls it."""
+        """Runs one training step on a batch. Keras calls this method."""
         inputs, targets = data
         activations = self._stack.forward(inputs)
         outputs = activations[-1]
@@ -127,26 +130,26 @@ class BlockwiseTraining(keras.Model):
         return {metric.name: metric.result() for metric in self.metrics}
 
     def write_back(self) -> None:
-        """Gives the network the trained weights."""
+        """Copies the trained weights to the network."""
         for layer in self._stack.layers:
             layer.write_back()
 
 
 class _Stack:
-    """The layers, in an object that Keras does not look into: their variables are none of the model's."""
+    """The layers, wrapped in an object that Keras does not inspect, so that their variables are not tracked by the model."""
 
     def __init__(self, layers: Sequence[keras.layers.Dense]):
         self.layers = [_BlockedDense(layer) for layer in layers]
 
     def forward(self, inputs: tf.Tensor) -> list[tf.Tensor]:
-        """The inputs, and the outputs of each layer."""
+        """Returns a list of the inputs and the outputs of each layer."""
         activations = [inputs]
         for layer in self.layers:
             activations.append(layer(activations[-1]))
         return activations
 
     def update(self, activations: list[tf.Tensor], upstream: tf.Tensor, adam: keras.optimizers.Adam) -> None:
-        """Moves all weights by one step of Adam, from the last layer to the first."""
+        """Updates all weights by one step of Adam, from the last layer to the first."""
         for number in reversed(range(len(self.layers))):
             upstream = self.layers[number].update(*activations[number : number + 2], upstream, adam, number == 0)
         adam.iterations.assign_add(1)

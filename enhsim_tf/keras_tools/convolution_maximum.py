@@ -1,36 +1,45 @@
-"""The discriminator's first layers, Conv1D + relu (+ Dropout) + the global maximum, as one differentiable function.
+"""The first layers of the paper's discriminator (section 2.3, Figure 10) as one fast, differentiable function.
 
-The same numbers as the Keras layers in about a third of the time. For a row x, filter k and frame t let
-`y[t, k] = frame[t] @ kernel[:, k]`; four facts make it cheap:
+The layers are Conv1D with relu, optionally Dropout, and GlobalMaxPooling1D. The function returns the same numbers as the
+Keras layers in about a third of the time. Let `y[t, k] = frame[t] @ kernel[:, k]` for one row, where a frame is the part of
+the row under filter k at position t. Four properties reduce the cost:
 
-- relu and the bias grow with their argument, so they commute with the maximum: `max_t relu(y[t, k] + b[k])` is
-  `relu(max_t y[t, k] + b[k])`. They then touch one number a filter instead of 121.
-- a dropped product is 0 and relu is never below 0, so dropping at a rate p means leaving frames out of the maximum:
-  `relu(max over kept t of y[t, k] + b[k]) / (1 - p)`.
-- the gradient of a maximum reaches the winning frames alone: with `g = dL/dout` where the filter fires, else 0, and n
-  winners, `dL/dy[t, k] = g[k] / n[k]` at the winners, else 0. The kernel's gradient is therefore `sum over rows of
-  g[k] / n[k] * (sum of the winning frames)`; that last sum, and n, come from one product of `[frame, 1]` with the
-  winners, which needs no gradient. The rows get `dL/dy @ kernel^T`, added up where frames overlap.
-- y of 200 rows takes 48 MB. Ten rows at a time it never leaves the processor's cache.
+- Adding the bias and applying relu are monotonic, so they commute with the maximum: `max_t relu(y[t, k] + b[k])` equals
+  `relu(max_t y[t, k] + b[k])`. They are thus applied to one number for each filter instead of 121.
+- Dropout sets outputs of relu to 0, and relu is never negative. Dropout at rate p is therefore the same as excluding frames
+  from the maximum: `relu(max over kept t of y[t, k] + b[k]) / (1 - p)`.
+- The gradient of a maximum is nonzero only at the frames that attain it. Let `g = dL/dout` where relu is active and 0
+  elsewhere, and let n be the number of frames that attain the maximum. Then `dL/dy[t, k] = g[k] / n[k]` at these frames and
+  0 elsewhere. The gradient of the kernel is `sum over rows of g[k] / n[k] * (sum of these frames)`. That sum and n are
+  computed in the forward pass, by one product of `[frame, 1]` with the indicator of these frames. The gradient of the rows
+  is `dL/dy @ kernel^T`, summed where frames overlap.
+- For 200 rows, y takes 48 MB. Ten rows at a time, it fits into the processor's cache.
 
-Inside a `tf.function` the gradient that nobody asks for is not computed: nothing hangs on its products.
+In a `tf.function`, gradients that are not requested are not computed, because TensorFlow prunes operations without effect.
 """
 
 from enhsim_tf.keras_tools.backend import keras, tf
 
-_USUAL = (keras.activations.relu, "valid", (1,), 1, True)  # activation, padding, dilation, groups, bias of the Conv1D
-_ROWS = 10  # of a block, whose products take 2.4 MB at 500 filters
+_SUPPORTED = (keras.activations.relu, "valid", (1,), 1, True)  # activation, padding, dilation, groups and use_bias of the Conv1D
+_BLOCK_ROWS = 10  # number of rows in a block, whose products take 2.4 MB with 500 filters
 
 
 def num_layers_computed(layers: list[keras.layers.Layer]) -> int:
-    """How many of a model's first layers `convolution_maximum` computes: 2, 3 with Dropout, or 0 if they have another form."""
+    """Returns how many of a model's first layers `convolution_maximum` can replace.
+
+    Args:
+        layers: The layers of the model.
+
+    Returns:
+        2 for Conv1D and GlobalMaxPooling1D, 3 with Dropout between them, and 0 if the layers are not supported.
+    """
     convolution, pooling = keras.layers.Conv1D, keras.layers.GlobalMaxPooling1D
     for form in ([convolution, pooling], [convolution, keras.layers.Dropout, pooling]):
         first, *_, last = found = layers[: len(form)]
         if [type(layer) for layer in found] == form:
-            usual = (first.activation, first.padding, first.dilation_rate, first.groups, first.use_bias) == _USUAL
+            is_supported = (first.activation, first.padding, first.dilation_rate, first.groups, first.use_bias) == _SUPPORTED
             one_channel = first.data_format == last.data_format == "channels_last" and first.kernel.shape[1] == 1
-            return len(form) if usual and one_channel and first.kernel_size[0] % first.strides[0] == 0 else 0
+            return len(form) if is_supported and one_channel and first.kernel_size[0] % first.strides[0] == 0 else 0
     return 0
 
 
@@ -40,17 +49,17 @@ def convolution_maximum(
     """Computes `GlobalMaxPooling1D()(Dropout(rate)(Conv1D(filters, width, stride, activation="relu")(rows)))`.
 
     Args:
-        rows: float32 of shape `(rows, samples)`, the one channel; the number of rows is known.
-        kernel: float32 of shape `(width, filters)`; the width is a multiple of the stride.
+        rows: float32 of shape `(rows, samples)`, with a single channel and a static number of rows.
+        kernel: float32 of shape `(width, filters)`. The width must be a multiple of the stride.
         bias: float32 of shape `(filters,)`.
-        stride: Samples from one frame to the next.
-        rate: Share of the products that are dropped, to the nearest 1/65,536; 0 for no dropout.
-        seed: Two integers that the dropped products are drawn from; needed for a rate above 0.
+        stride: Stride of the convolution in samples.
+        rate: Dropout rate, rounded to a multiple of 1/65,536. 0 means no dropout.
+        seed: Seed for the dropout, an integer tensor of shape `(2,)`. It is required if the rate is above 0.
 
     Returns:
         float32 of shape `(rows, filters)`.
     """
-    blocks = [rows[first : first + _ROWS] for first in range(0, rows.shape[0], _ROWS)]
+    blocks = [rows[first : first + _BLOCK_ROWS] for first in range(0, rows.shape[0], _BLOCK_ROWS)]
     seeds = tf.unstack(tf.random.split(seed, len(blocks))) if rate else [None] * len(blocks)
     highest = [_block(block, kernel, bias, stride, rate, seed) for block, seed in zip(blocks, seeds, strict=True)]
     return tf.concat(highest, axis=0) / (1 - rate)
@@ -59,18 +68,18 @@ def convolution_maximum(
 def _block(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rate: float, seed: tf.Tensor | None) -> tf.Tensor:
     (width, filters), (num_rows, samples) = kernel.shape, rows.shape
     num_frames = (samples - width) // stride + 1
-    num_parts = width // stride  # of a frame, each `stride` samples long
-    num_stretches = num_frames - 1 + num_parts  # of a row, as long as a part
+    num_parts = width // stride  # number of parts of a frame, each `stride` samples long
+    num_row_parts = num_frames - 1 + num_parts  # number of parts of a row, of the same length
 
     def frames_of(rows: tf.Tensor) -> tf.Tensor:
-        stretches = tf.reshape(rows[:, : num_stretches * stride], (num_rows, num_stretches, stride))
-        return tf.concat([stretches[:, part : part + num_frames] for part in range(num_parts)], axis=2)
+        row_parts = tf.reshape(rows[:, : num_row_parts * stride], (num_rows, num_row_parts, stride))
+        return tf.concat([row_parts[:, part : part + num_frames] for part in range(num_parts)], axis=2)
 
     def add_frames(frames: tf.Tensor) -> tf.Tensor:
         parts = tf.split(frames, num_parts, axis=2)
         placed = [tf.pad(part, ((0, 0), (number, num_parts - 1 - number), (0, 0))) for number, part in enumerate(parts)]
-        left_over = samples - num_stretches * stride
-        return tf.pad(tf.reshape(tf.add_n(placed), (num_rows, num_stretches * stride)), ((0, 0), (0, left_over)))
+        left_over = samples - num_row_parts * stride
+        return tf.pad(tf.reshape(tf.add_n(placed), (num_rows, num_row_parts * stride)), ((0, 0), (0, left_over)))
 
     @tf.custom_gradient
     def forward(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor) -> tuple:
@@ -100,7 +109,7 @@ def _block(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rat
 
 
 def _kept(shape: tf.TensorShape, rate: float, seed: tf.Tensor) -> tf.Tensor:
-    """True at a share 1 - `rate` of the places; two draws come out of each 32 random bits, which are dear."""
+    """Draws a mask that is True with probability 1 - `rate`. Random bits are expensive, so 32 of them give two elements."""
     number = shape.num_elements()
     words = tf.random.stateless_uniform(((number + 1) // 2,), seed, minval=None, maxval=None, dtype=tf.uint32)
     draws = tf.reshape(tf.bitcast(words, tf.uint16), (-1,))[:number]

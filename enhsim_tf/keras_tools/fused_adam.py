@@ -1,14 +1,15 @@
-"""Adam in one pass over memory.
+"""Adam as one fused operation, for training the networks of sections 2.2 and 2.3 of the paper.
 
-A step of the wide enhancer is bound by how often its 13.7 million weights travel between memory and processor. Keras'
-Adam is about ten operations, each a pass over arrays of that size; TensorFlow has one that reads gradient, moments and
-weights once and writes moments and weights once. The mathematics is the same:
+Memory bandwidth limits a training step of the enhancer with its 13.7 million weights. Adam in Keras consists of about ten
+operations, each of which reads and writes arrays of that size. TensorFlow has a fused operation, which reads the gradient,
+the moments and the weights once, and writes the moments and the weights once. The mathematics is the same:
 
     m += (1 - beta_1) * (g - m)      v += (1 - beta_2) * (g^2 - v)
     w -= learning_rate * sqrt(1 - beta_2^t) / (1 - beta_1^t) * m / (sqrt(v) + epsilon)
 
-The one difference is that the operation computes 1 - beta_2 from a float32 beta_2, which gives 0.99998713 of 0.001.
-That scales v and is taken out of the learning rate and epsilon, so the weights move as under Keras' Adam.
+There is one difference. The fused operation computes 1 - beta_2 from beta_2 in float32, which for beta_2 = 0.999 gives
+0.001 times 0.99998713. The factor scales v. The learning rate and epsilon are corrected for it, so that the weights change as with
+Adam in Keras.
 """
 
 import numpy as np
@@ -17,19 +18,22 @@ from enhsim_tf.keras_tools.backend import keras, tf
 
 
 def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSchedule, **settings: object) -> keras.optimizers.Adam:
-    """Keras' Adam, whose update of a variable is one operation.
+    """Creates a Keras Adam optimiser that updates each variable by one fused operation.
 
-    The update is replaced on this one object: for Keras, and in a saved model, it stays a plain Adam.
+    Only the update method of this object is replaced. Keras treats and saves it as a standard Adam optimiser.
 
     Args:
         learning_rate: The learning rate, or a schedule of it.
-        **settings: Other settings of Keras' Adam, where they are not its defaults.
+        **settings: Further arguments of `keras.optimizers.Adam`.
+
+    Returns:
+        The optimiser.
     """
     adam = keras.optimizers.Adam(learning_rate, **settings)
 
     def update_step(gradient: tf.Tensor, variable: tf.Variable, learning_rate: tf.Tensor) -> None:
         index = adam._get_variable_index(variable)
-        # Keras wraps TensorFlow's variables; the operation wants the handles of those
+        # the fused operation needs the handles of the TensorFlow variables, which Keras wraps
         held = (getattr(each, "_value", each) for each in (variable, adam._momentums[index], adam._velocities[index]))
         apply_adam(adam, *held, gradient, learning_rate)
 
@@ -45,17 +49,20 @@ def apply_adam(
     gradient: tf.Tensor,
     learning_rate: tf.Tensor | None = None,
 ) -> tf.Operation:
-    """Updates a variable and its two moments by one operation; the optimiser's count of iterations stays as it is.
+    """Updates a variable and its two moments by one fused operation. It does not advance the optimiser's iteration counter.
 
     Args:
-        adam: The optimiser whose settings and count of iterations are used.
+        adam: The optimiser, whose settings and iteration counter are used.
         weight: The variable.
-        momentum: Its first moment.
-        velocity: Its second moment.
-        gradient: Its gradient.
-        learning_rate: The learning rate; None takes the optimiser's at this iteration.
+        momentum: First moment of the gradient.
+        velocity: Second moment of the gradient.
+        gradient: The gradient.
+        learning_rate: The learning rate. None uses the optimiser's learning rate at the current iteration.
+
+    Returns:
+        The operation.
     """
-    # beta_2 as float32 gives another 1 - beta_2, see above
+    # corrects for the rounding of beta_2 to float32, see the docstring of this module
     rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
     step = tf.cast(adam.iterations + 1, tf.float32)
     rate = adam.learning_rate if learning_rate is None else learning_rate

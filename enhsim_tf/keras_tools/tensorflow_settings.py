@@ -1,11 +1,11 @@
-"""The settings that TensorFlow is started with where the user has not chosen others. It imports nothing that is slow.
+"""Default settings for TensorFlow, which trains the networks of sections 2.2 and 2.3. This module imports nothing slow.
 
-- oneDNN's kernels are switched on. TensorFlow does so itself on processors with AVX-512 and leaves them off on all others,
-  where its plain kernels take up to three times as long.
-- glibc keeps memory that TensorFlow frees. By default it returns every block above 32 MB to the system, which then clears
-  the same pages again for each gradient of the enhancer's widest layer.
+- The kernels of oneDNN are enabled. By default, TensorFlow enables them only on processors with AVX-512. On other
+  processors, its own kernels take up to three times as long.
+- The C library glibc keeps the memory that TensorFlow frees. By default, it returns every block above 32 MB to the operating
+  system, which then has to clear the same pages again for each gradient of the enhancer's widest layer.
 
-A variable that the user has set keeps its value: see `docs/environment.md`.
+Variables that the user has set keep their values, see `docs/environment.md`.
 """
 
 import os
@@ -13,35 +13,38 @@ import sys
 from collections.abc import Mapping
 
 SETTINGS = {"TF_ENABLE_ONEDNN_OPTS": "1", "TF_CPP_MIN_LOG_LEVEL": "2", "KERAS_BACKEND": "tensorflow"}
-"""Environment variables that are set where the user has not set them."""
+"""Environment variables, and the values that they receive if the user has not set them."""
 ALLOCATOR = ("MALLOC_", "GLIBC_TUNABLES")
-"""How the names begin of the variables by which a user tells glibc how to treat memory."""
+"""Prefixes of the environment variables that configure the memory allocator of glibc."""
 
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # parameters of glibc's mallopt
 _LARGEST_INT = 2**31 - 1
 
 
 def missing_settings(environment: Mapping[str, str]) -> dict[str, str]:
-    """The settings of `SETTINGS` that an environment leaves open; an empty value counts as none."""
+    """Returns the items of `SETTINGS` that are not set in an environment. An empty value counts as not set."""
     return {name: value for name, value in SETTINGS.items() if not environment.get(name)}
 
 
 def keep_freed_memory() -> bool:
-    """Tells glibc to keep memory that was freed; returns whether it does so now.
+    """Configures glibc to keep memory that was freed.
 
-    It does nothing where the user has set a variable of the allocator, and where the C library is not glibc.
+    The function has no effect if the user has set a variable that configures the allocator, or if the C library is not glibc.
+
+    Returns:
+        Whether the setting was changed.
     """
     if not sys.platform.startswith("linux") or any(name.startswith(ALLOCATOR) for name in os.environ):
         return False
     import ctypes
 
     library = ctypes.CDLL(None)
-    if not hasattr(library, "gnu_get_libc_version"):  # musl has no such function, and no such settings
+    if not hasattr(library, "gnu_get_libc_version"):  # the C library is another one, such as musl, which lacks these settings
         return False
     return bool(library.mallopt(_M_MMAP_MAX, 0)) and bool(library.mallopt(_M_TRIM_THRESHOLD, _LARGEST_INT))
 
 
 def apply_settings() -> None:
-    """Sets what is missing in this process's environment, from which its child processes inherit it, and the allocator."""
+    """Sets the missing environment variables, which child processes inherit, and configures the memory allocator."""
     os.environ |= missing_settings(os.environ)
     keep_freed_memory()

@@ -1,4 +1,4 @@
-"""Training and prediction for networks from windows to windows, and the builders that both networks share."""
+"""Training and prediction of networks that map windows to windows, such as the enhancer of section 2.2 of the paper."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,19 +10,27 @@ from enhsim_tf.keras_tools.fused_adam import fused_adam
 
 
 def seeded_initialiser(name: str, seed: int) -> keras.initializers.Initializer:
-    """An initialiser by its Keras name, for example `he_uniform`, that draws from `seed`."""
+    """Creates a Keras initialiser with a seed.
+
+    Args:
+        name: Keras name of the initialiser, for example `he_uniform`.
+        seed: The seed.
+    """
     return type(keras.initializers.get(name))(seed=seed)
 
 
 def dense_stack(window: int, units: Sequence[int], seed: int, name: str, initialiser: str = "he_uniform") -> keras.Sequential:
-    """A stack of Dense layers, relu on all but the last, each with an initialiser and a seed of its own.
+    """Builds a stack of Dense layers with relu activations, except for the last layer, which is linear.
 
     Args:
-        window: Samples of an input window.
-        units: Units of each layer.
-        seed: Seed of the weights.
+        window: Number of samples in an input window.
+        units: Number of units of each layer.
+        seed: Seed for the initial weights, from which each layer derives its own.
         name: Name of the model.
-        initialiser: Keras name of the weights' initialiser.
+        initialiser: Keras name of the weight initialiser.
+
+    Returns:
+        An uncompiled Keras model.
     """
     model = keras.Sequential([keras.Input((window,))], name=name)
     for number, width in enumerate(units):
@@ -52,23 +60,21 @@ def fit_windows(
     jit_compile: bool = False,
     loss: str = "mean_squared_error",
 ) -> dict[str, np.ndarray]:
-    """Fits a model from windows to windows by Adam, with the mean squared error as loss.
-
-    The order of the windows is drawn from `seed`, anew in each epoch.
+    """Trains a model that maps windows to windows, by Adam. The windows are shuffled in each epoch.
 
     Args:
-        model: A model from `(windows, samples)` to the same.
+        model: A Keras model whose input and output have the shape `(windows, samples)`.
         inputs: Input windows, float32 of shape `(windows, samples)`.
         targets: Target windows of the same shape.
-        epochs: Passes over the windows.
-        batch_size: Windows a step.
-        seed: Seed of the order.
+        epochs: Number of epochs.
+        batch_size: Number of windows in each training step.
+        seed: Seed for the shuffling.
         learning_rate: Adam's learning rate, or a schedule of it.
         validation: Held-out `(inputs, targets)`, or None.
         callbacks: Keras callbacks.
-        verbose: Keras' progress bar: 0 none, 1 a bar.
-        jit_compile: Whether XLA compiles the step. With the fused Adam there is little left for it to fuse, and it costs
-            seconds of compilation.
+        verbose: Verbosity of Keras: 0 is silent, 1 shows a progress bar.
+        jit_compile: Whether to compile the training step with XLA. This takes seconds and gains little, because the update of
+            the weights is already fused.
         loss: Keras name of the loss.
 
     Returns:
@@ -86,7 +92,7 @@ def fit_windows(
         validation_data=held_out,
         callbacks=list(callbacks),
         verbose=verbose,
-        shuffle=False,  # the data set shuffles, with its own seed
+        shuffle=False,  # `batches` has already shuffled the windows
     )
     if trained is not model:
         trained.write_back()
@@ -94,10 +100,10 @@ def fit_windows(
 
 
 class EpochProgress(keras.callbacks.Callback):
-    """Calls a function with the epochs that are done, the part of the one under way included, after each step.
+    """Keras callback that reports the number of completed epochs, with fractions, after each training step.
 
     Args:
-        on_progress: The function.
+        on_progress: Function that receives the number.
     """
 
     def __init__(self, on_progress: Callable[[float], None]):
@@ -105,22 +111,25 @@ class EpochProgress(keras.callbacks.Callback):
         self._on_progress, self._epoch = on_progress, 0
 
     def on_epoch_begin(self, epoch: int, logs: dict | None = None) -> None:
-        """Notes which epoch it is, counted from 0."""
+        """Stores the index of the epoch, which starts at 0."""
         self._epoch = epoch
 
     def on_train_batch_end(self, batch: int, logs: dict | None = None) -> None:
-        """Says how far it is after a step, counted from 0."""
+        """Reports the progress after a training step, whose index starts at 0."""
         self._on_progress(self._epoch + (batch + 1) / self.params["steps"])
 
 
 def batches(inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_size: int) -> tf.data.Dataset:
-    """Pairs of input and target windows, batch after batch, epoch after epoch.
+    """Creates a data set of batches of input and target windows, for all epochs.
 
     Args:
         inputs: Input windows, float32 of shape `(windows, samples)`.
         targets: Target windows of the same shape.
         orders: Order of the windows in each epoch, integers of shape `(epochs, windows)`.
-        batch_size: Windows a batch; the last of an epoch may have fewer.
+        batch_size: Number of windows in a batch. The last batch of an epoch may be smaller.
+
+    Returns:
+        A data set of pairs `(inputs, targets)`.
     """
     inputs, targets = tf.constant(inputs), tf.constant(targets)
     rows = tf.data.Dataset.from_tensor_slices(orders).flat_map(lambda order: tf.data.Dataset.from_tensor_slices(order).batch(batch_size))
@@ -128,19 +137,19 @@ def batches(inputs: np.ndarray, targets: np.ndarray, orders: np.ndarray, batch_s
 
 
 def _without_autotuning(data: tf.data.Dataset) -> tf.data.Dataset:
-    """The data set without its tuning thread, whose naps double up to a minute: dropping the data set waits for the last one."""
+    """Disables autotuning of a data set. Its thread sleeps for up to a minute, and deleting the data set waits for the thread."""
     options = tf.data.Options()
     options.autotune.enabled = False
     return data.with_options(options)
 
 
 def predict_windows(model: keras.Model, inputs: np.ndarray, batch_size: int) -> np.ndarray:
-    """What `model.predict` gives, without its data pipeline: the batches are slices, written to where they belong.
+    """Returns the same as `model.predict`, but faster, because it slices the inputs instead of building a data pipeline.
 
     Args:
         model: A Keras model.
-        inputs: float32 array whose first axis counts the rows.
-        batch_size: Rows a call of the model.
+        inputs: float32 array, whose first axis is the batch axis.
+        batch_size: Number of rows in each call of the model.
 
     Returns:
         The model's output for all rows.

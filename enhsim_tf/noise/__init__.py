@@ -1,4 +1,4 @@
-"""The noise (section 2.3): its extraction, the paper's GAN, the convolutional GAN, and surrogates that are fitted to it.
+"""The noise (section 2.3 of the paper): extraction, the paper's GAN, a convolutional GAN, and classical noise models as baselines.
 
-This package knows windows of noise, and nothing of telemetry, simulators or detectors.
+This package works on windows of noise. It does not depend on telemetry, simulators or detectors.
 """

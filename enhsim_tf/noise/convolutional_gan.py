@@ -1,16 +1,16 @@
-"""A second pair of networks for the noise, beside the paper's: a generator that can fill the space, a judge that can see it.
+"""A convolutional generator with full-rank output, and a discriminator on summary statistics (an alternative GAN for section 2.3).
 
-The paper's generator turns 16 numbers into 500 samples, so its windows lie on a sheet of few dimensions, and its
-discriminator looks at nothing but the largest response of each filter. Here
+The paper's generator maps 16 numbers to 500 samples, so its windows lie near a low-dimensional manifold. The paper's
+discriminator receives only the largest response of each convolution filter. The networks of this module differ as follows:
 
-- the generator convolves white noise, sample after sample: every sample has a draw of its own, and any length is one
-  piece. Rare large values come from a path that sees one sample at a time; what changes over many windows, such as the
-  scale, comes from slow latent channels through an exponential gain.
-- the discriminator judges a window by what a stationary process is known by: its scale, moments, correlations and
-  threshold exceedances, its spectrum, each as far as real windows vary in it, and the maximum, mean and power of filter
-  responses on the window at unit scale.
+- The generator convolves white noise, so that every sample has a random input of its own. It generates a series of any
+  length without seams. A path that processes one sample at a time produces rare large values. Slow latent channels with an
+  exponential gain produce changes over many windows, for example of the scale.
+- The discriminator receives summary statistics that characterise a stationary process: scale, moments, autocorrelations,
+  threshold exceedances and spectrum. Each statistic is standardised by its variation over real windows. The discriminator
+  also receives the maximum, the mean and the power of filter responses to the window at unit scale.
 
-Both are trained by `noise_gan.NoiseGAN` as the paper's are.
+`enhsim_tf.noise.gan.NoiseGAN` trains these networks with the same algorithm as the paper's networks.
 """
 
 import numpy as np
@@ -21,30 +21,30 @@ from enhsim_tf.noise.gan import NoiseGAN
 
 layers, ops = keras.layers, keras.ops
 
-SLOW_SAMPLES = (500.0, 2_000.0, 8_000.0)  # correlation times of the slow channels: from a window to sixteen
-_THRESHOLDS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 9.0)  # of the exceedances, in standard deviations
-_LAGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)  # of the autocorrelation, in samples
-_NUM_BANDS, _NUM_PARTS = 25, 5  # bands of the spectrum; parts of a window whose scales are compared
-_LEAST_DEVIATION = 0.003  # a statistic that hardly varies is not blown up
-_TINY = 1e-6
+SLOW_SAMPLES = (500.0, 2_000.0, 8_000.0)  # correlation times of the slow channels in samples, from 1 to 16 of the paper's windows
+_THRESHOLDS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 9.0)  # for the exceedances, in standard deviations
+_LAGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)  # for the autocorrelation, in samples
+_NUM_BANDS, _NUM_PARTS = 25, 5  # number of frequency bands; number of parts of a window whose scales are computed
+_MIN_DEVIATION = 0.003  # added to standard deviations, so that nearly constant statistics are not amplified
+_TINY = 1e-6  # keeps logarithms and square roots finite
 
 
 def build_convolutional_generator(
     channels: int = 8, width: int = 21, num_white: int = 4, num_slow: int = len(SLOW_SAMPLES), rare_units: int = 8, seed: int = 0
 ) -> keras.Model:
-    """Builds the generator.
+    """Builds the convolutional generator.
 
     Args:
-        channels: Channels of the two convolutions.
-        width: Samples under a filter, odd.
-        num_white: White channels of the latent series.
-        num_slow: Slow channels, which come after them.
-        rare_units: Units of the path that sees one sample at a time.
-        seed: Seed of the weights.
+        channels: Number of channels of each of the two convolutions.
+        width: Width of each filter in samples, odd.
+        num_white: Number of white-noise channels of the latent series.
+        num_slow: Number of slow channels of the latent series, which follow the white-noise channels.
+        rare_units: Number of units of the path that processes one sample at a time.
+        seed: Seed for the initial weights.
 
     Returns:
-        An uncompiled Keras model from shape `(rows, samples + 2 (width - 1), num_white + num_slow)` to `(rows, samples, 1)`,
-        for any number of samples.
+        An uncompiled Keras model, whose input has the shape `(rows, samples + 2 (width - 1), num_white + num_slow)` and whose
+        output has the shape `(rows, samples, 1)`, for any number of samples.
     """
 
     def kernel(number: int) -> keras.Initializer:
@@ -52,11 +52,12 @@ def build_convolutional_generator(
 
     latent = keras.Input((None, num_white + num_slow))
     white = latent[:, :, :num_white]
-    aligned = layers.Cropping1D(width - 1)(latent)  # to the samples that the convolutions leave
+    aligned = layers.Cropping1D(width - 1)(latent)  # keeps the samples that remain after the convolutions
     shaped = white
     for number in (400, 401):
         shaped = layers.Conv1D(channels, width, activation="leaky_relu", kernel_initializer=kernel(number))(shaped)
-    # units that fire at one to four standard deviations, and large when they do: tails that begin small grow too slowly
+    # Units that become active at one to four standard deviations. Their squares start large, because heavy tails that start
+    # small grow too slowly during training.
     rarely = keras.initializers.RandomUniform(-4.0, -1.0, seed=seed * 1000 + 402)
     rare = layers.Dense(rare_units, "relu", kernel_initializer=kernel(403), bias_initializer=rarely)(aligned[:, :, :num_white])
     paths = layers.Concatenate()([shaped, aligned[:, :, :num_white], rare, 2 * rare * rare])
@@ -71,21 +72,23 @@ def build_convolutional_generator(
 def build_statistics_discriminator(
     noise_windows: np.ndarray, filters: int = 32, width: int = 20, stride: int = 4, seed: int = 0
 ) -> keras.Model:
-    """Builds the discriminator.
+    """Builds the discriminator on summary statistics.
 
-    Each statistic is centred on its mean over real windows, divided by its standard deviation there, and its tails are
-    drawn in by an inverse hyperbolic sine. Where the scale of windows varies by five per cent, a discriminator that saw
-    the scale itself would have to learn to look at the second digit, and did not within the paper's 1,000 iterations.
+    Each statistic is standardised by its mean and its standard deviation over real windows, and its tails are compressed by
+    an inverse hyperbolic sine. The standardisation is necessary because some statistics vary little. For example, where the
+    scale of real windows varies by five per cent, a discriminator that received the scale itself did not learn to use that
+    variation within the paper's 1,000 iterations.
 
     Args:
         noise_windows: Real noise at unit scale, shape `(windows, samples)`.
-        filters: Filters of its convolution.
-        width: Samples under a filter.
-        stride: Samples from one position of a filter to the next.
-        seed: Seed of the weights.
+        filters: Number of filters of the convolution.
+        width: Width of each filter in samples.
+        stride: Stride of the convolution in samples.
+        seed: Seed for the initial weights.
 
     Returns:
-        An uncompiled Keras model from shape `(windows, samples, 1)` to `(windows, 1)`, the probability of being real.
+        An uncompiled Keras model, whose input has the shape `(windows, samples, 1)`. Its output of shape `(windows, 1)` is the
+        probability that a window is real.
     """
 
     def dense(units: int, number: int, activation: str = "leaky_relu") -> layers.Layer:
@@ -95,7 +98,7 @@ def build_statistics_discriminator(
     rows = keras.Input((window, 1))
     statistics, unit, spectrum = _statistics(layers.Flatten()(rows))
     on_real = predict_windows(keras.Model(rows, statistics), np.asarray(noise_windows, np.float32)[:, :, None], 1_024)
-    mean, deviation = on_real.mean(axis=0, dtype=np.float64), on_real.std(axis=0, dtype=np.float64) + _LEAST_DEVIATION
+    mean, deviation = on_real.mean(axis=0, dtype=np.float64), on_real.std(axis=0, dtype=np.float64) + _MIN_DEVIATION
     statistics = layers.Normalization(mean=mean.tolist(), variance=np.square(deviation).tolist())(statistics)
 
     convolution = layers.Conv1D(
@@ -112,7 +115,7 @@ def build_statistics_discriminator(
 
 
 def _statistics(values: keras.KerasTensor) -> tuple[keras.KerasTensor, keras.KerasTensor, keras.KerasTensor]:
-    """What a stationary process is known by, the window at unit scale, and its logarithmic spectrum.
+    """Computes the summary statistics of each window, the window at unit scale, and its log power spectrum.
 
     Args:
         values: Windows of shape `(windows, samples)`.
@@ -132,7 +135,7 @@ def _statistics(values: keras.KerasTensor) -> tuple[keras.KerasTensor, keras.Ker
     window = values.shape[1]
     scale = ops.sqrt(mean(values * values) + _TINY)
     unit = values / scale
-    square = unit * unit  # powers by products: a power's gradient takes logarithms
+    square = unit * unit  # products instead of powers, because the gradient of a power computes logarithms
     steps = ops.diff(values, axis=1)
     bends = ops.diff(steps, axis=1)
     moments = [mean(values), ops.log(scale), mean(square * unit), ops.log(mean(square * square)), ops.log(mean(ops.abs(unit)) + _TINY)]
@@ -149,19 +152,23 @@ def _statistics(values: keras.KerasTensor) -> tuple[keras.KerasTensor, keras.Ker
 
 
 def convolutional_noise_gan(noise_windows: np.ndarray, num_iterations: int = 1_000, seed: int = 0) -> NoiseGAN:
-    """Both networks, untrained, with the settings that they are trained with.
+    """Builds a `NoiseGAN` with both convolutional networks, untrained, and with the settings for their training.
 
-    The learning rates stay constant for six tenths of the iterations and then fall along a cosine to a twentieth.
+    The learning rates are constant for the first 60 % of the iterations. They then decay along a cosine to 5 % of their
+    initial values.
 
     Args:
-        noise_windows: The noise to learn, shape `(windows, samples)`, in the telemetry's unit.
-        num_iterations: Iterations that they will be trained for.
-        seed: Seed of the weights and of every draw in training.
+        noise_windows: Real noise windows, shape `(windows, samples)`, in the unit of the telemetry.
+        num_iterations: Number of iterations of the planned training, which determines the learning-rate schedule.
+        seed: Seed for the initial weights and for all random numbers in training.
+
+    Returns:
+        The untrained GAN.
     """
 
     def falling(rate: float, steps: int) -> keras.optimizers.schedules.LearningRateSchedule:
-        steps = max(1, steps)  # none are asked for where the noise stays untrained
-        constant = min(round(0.6 * steps), steps - 1)  # a "warm-up" that begins where it ends; Keras wants a step to fall in
+        steps = max(1, steps)  # there are no steps if the noise is to remain untrained
+        constant = min(round(0.6 * steps), steps - 1)  # Keras requires at least one decay step
         return keras.optimizers.schedules.CosineDecay(rate, steps - constant, 0.05, warmup_target=rate, warmup_steps=constant)
 
     scale = float(np.std(noise_windows, dtype=np.float64))
@@ -169,7 +176,7 @@ def convolutional_noise_gan(noise_windows: np.ndarray, num_iterations: int = 1_0
         build_convolutional_generator(seed=seed),
         build_statistics_discriminator(np.asarray(noise_windows) / scale, seed=seed),
         learning_rate=falling(0.002, num_iterations),
-        discriminator_learning_rate=falling(0.001, 2 * num_iterations),  # it takes two steps an iteration
+        discriminator_learning_rate=falling(0.001, 2 * num_iterations),  # the discriminator takes two steps in each iteration
         beta_1=0.5,
         averaging=0.98,
         scale=scale,

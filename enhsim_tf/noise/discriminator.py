@@ -14,20 +14,21 @@ def build_discriminator(
     seed: int = 0,
     initialiser: str = "he_uniform",
 ) -> keras.Sequential:
-    """Builds the paper's discriminator, Figure 10: one convolution, its maximum, narrowing to one sigmoid neuron.
+    """Builds the paper's discriminator, Figure 10: a convolution, global max pooling, a narrow Dense layer and a sigmoid output.
 
     Args:
-        window: Samples of a window.
-        filters: Filters of the convolution.
-        width: Samples under a filter.
-        stride: Samples from one position of a filter to the next.
-        narrow_units: Units of the layer before the last.
-        dropout: Share dropped after the convolution and after the narrow layer; 0 leaves the layers out.
-        seed: Seed of the weights.
-        initialiser: Keras name of the weights' initialiser.
+        window: Number of samples in a window.
+        filters: Number of filters of the convolution.
+        width: Width of each filter in samples.
+        stride: Stride of the convolution in samples.
+        narrow_units: Number of units of the narrow Dense layer.
+        dropout: Dropout rate after the convolution and after the narrow layer. With 0, there are no dropout layers.
+        seed: Seed for the initial weights.
+        initialiser: Keras name of the weight initialiser.
 
     Returns:
-        An uncompiled Keras model from shape `(windows, window, 1)` to `(windows, 1)`, the probability of being real.
+        An uncompiled Keras model, whose input has the shape `(windows, window, 1)`. Its output of shape `(windows, 1)` is the
+        probability that a window is real.
     """
     kernels = [seeded_initialiser(initialiser, seed * 1000 + number) for number in (200, 201, 202)]
 

@@ -1,4 +1,4 @@
-"""Extraction of the noise: what a moving average leaves of telemetry (section 2.3, Figure 8)."""
+"""Noise extraction: the residual of telemetry around its moving average (section 2.3, Figure 8)."""
 
 import numpy as np
 
@@ -6,20 +6,22 @@ from enhsim_tf.common.errors import InputError
 
 
 def extract_noise(values: np.ndarray, width: int = 25) -> tuple[np.ndarray, np.ndarray]:
-    """Splits a series into its centred moving average and the noise around it (paper, section 2.3).
+    """Splits a series into its centred moving average and the residual noise (section 2.3 of the paper).
 
-    The paper cites pandas' rolling mean. The `width - 1` samples at the edges that have no full average are cut.
-    White noise of variance s^2 leaves noise of variance s^2 (1 - 1 / width).
+    Like the paper, this function uses the rolling mean of pandas. It drops the `width // 2` samples at each end, for which
+    the moving average is incomplete. If the series contains white noise of variance s^2, the extracted noise has the
+    variance s^2 (1 - 1 / width).
 
     Args:
         values: Series of shape `(samples,)`.
         width: Width of the moving average in samples, odd.
 
     Returns:
-        `(noise, average)`, float32 arrays of shape `(samples - width + 1,)`; both begin at sample `width // 2`.
+        `(noise, average)`, two float32 arrays of shape `(samples - width + 1,)`. Their first element belongs to sample
+        `width // 2` of the series.
 
     Raises:
-        InputError: If the width is even, below 3 or longer than the series.
+        InputError: If the width is even, smaller than 3 or larger than the length of the series.
     """
     import pandas as pd
 
@@ -33,5 +35,9 @@ def extract_noise(values: np.ndarray, width: int = 25) -> tuple[np.ndarray, np.n
 
 
 def noise_unit(noise: np.ndarray) -> float:
-    """The scale at which noise has a standard deviation of 0.1, well inside the range of a tanh generator."""
+    """Returns the unit in which the noise has a standard deviation of 0.1, well within the range of a tanh generator.
+
+    Args:
+        noise: Noise of any shape.
+    """
     return float(np.std(noise, dtype=np.float64)) / 0.1

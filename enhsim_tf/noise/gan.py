@@ -1,7 +1,7 @@
-"""Network two, steps 7 to 9 of the paper's pipeline: an adversarial pair that learns noise (section 2.3).
+"""Adversarial training of the noise generator and its discriminator (section 2.3, Figure 11; steps 7 to 9 of the pipeline).
 
-It knows windows of noise and nothing of telemetry. Outside, windows have the shape `(windows, samples)`; between the
-two networks `(windows, samples, 1)`.
+The module works on windows of noise and does not depend on telemetry. The methods of `NoiseGAN` take and return windows of
+shape `(windows, samples)`. The networks take and return the shape `(windows, samples, 1)`.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,34 +18,39 @@ from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.noise.latent import Latent
 
 Schedule = keras.optimizers.schedules.LearningRateSchedule
-REAL, GENERATED = 1.0, 0.0  # the tags of section 2.3
+REAL, GENERATED = 1.0, 0.0  # the labels ("tags" in section 2.3)
 
 
 class NoiseGAN:
-    """The generator and the discriminator, trained against each other (paper, Figure 11).
+    """Generative adversarial network (GAN) for noise, trained as in Figure 11 of the paper.
 
-    Keras 3 reads `trainable` when a training step is built, not when a model is compiled; "compile, freeze, compile the
-    stack" therefore freezes the discriminator for ever. Here each step names the weights it moves, so "frozen" means
-    what the paper means.
+    In each iteration, the discriminator is trained on real and generated rows, and then the generator is trained through the
+    frozen discriminator. The usual recipe for the second part, "compile the discriminator, set `trainable = False`, compile
+    the combined model", does not work in Keras 3. There, `trainable` is read when a training step is built rather than when a
+    model is compiled, so the discriminator would never be trained. Here, each update lists the weights that it changes.
 
     Args:
-        generator: From `(rows, latent)` to `(rows, window, 1)`, as `build_generator` makes it; None builds the paper's.
-        discriminator: From `(rows, window, 1)` to `(rows, 1)`, as `build_discriminator` makes it; None builds the paper's.
-        batch_size: Rows of real and rows of generated noise a step.
-        learning_rate: Adam's learning rate or a schedule of it, for both networks.
-        latent_span: The latent vector is standard normal times this.
-        mixed_batch: One discriminator update on real and generated rows together, instead of two in turn.
-        generated_in_training_mode: Whether the rows shown to the discriminator come from batch normalisation in training
-            mode instead of inference mode.
-        scale: The noise is divided by this for the networks and multiplied by it afterwards.
-        seed: Seed of every draw in training, and of the networks built here.
-        slow_samples: For a generator that convolves: correlation time, in samples, of each slow channel of its latent
-            series; they come after the white channels.
-        discriminator_learning_rate: Adam's learning rate for the discriminator, which takes two steps an iteration; None
-            for the same.
-        beta_1: Adam's decay of the first moment, for both networks.
-        averaging: Decay of a moving average over the generator's weights, which takes their place when training ends;
-            0 for none.
+        generator: Model from shape `(rows, latent)` to `(rows, window, 1)`, see `build_generator`. None builds the paper's
+            generator.
+        discriminator: Model from shape `(rows, window, 1)` to `(rows, 1)`, see `build_discriminator`. None builds the paper's
+            discriminator.
+        batch_size: Number of real rows, and number of generated rows, in each iteration.
+        learning_rate: Adam's learning rate, or a schedule of it, for both networks.
+        latent_span: Standard deviation of the latent vector's elements, which are normally distributed.
+        mixed_batch: Whether to update the discriminator once, on a batch of real and generated rows, instead of twice, on one
+            batch of each.
+        generated_in_training_mode: Whether the generator runs in training mode when it generates rows for the
+            discriminator's update. This affects batch normalisation.
+        scale: Unit of the noise. Noise is divided by it before it reaches the networks, and generated noise is multiplied
+            by it.
+        seed: Seed for all random numbers in training, and for the networks that are built here.
+        slow_samples: Only for a convolutional generator: the correlation time, in samples, of each slow channel of its latent
+            series. The slow channels follow the white-noise channels.
+        discriminator_learning_rate: Adam's learning rate, or a schedule of it, for the discriminator, which takes two steps in
+            each iteration. None uses `learning_rate`.
+        beta_1: Adam's decay rate for the first moment, for both networks.
+        averaging: Decay rate of a moving average of the generator's weights. At the end of training, the average replaces the
+            weights. With 0, no average is computed.
     """
 
     def __init__(
@@ -77,27 +82,27 @@ class NoiseGAN:
         self.discriminator_optimizer.build(self.discriminator.trainable_variables)
         self.generator_optimizer.build(self.generator.trainable_variables)
         self.seeds = keras.random.SeedGenerator(seed)
-        self.record_seeds = keras.random.SeedGenerator(seed + 1)  # of their own: recording more often changes no training
+        self.record_seeds = keras.random.SeedGenerator(seed + 1)  # separate, so that the frequency of records does not affect training
         self._step = tf.function(self.train_step)
 
     def train_step(self, noise: tf.Tensor) -> None:
-        """One iteration of Figure 11: the discriminator learns, then the generator through the frozen discriminator.
+        """Runs one iteration of Figure 11: updates the discriminator, and then the generator through the frozen discriminator.
 
         Args:
-            noise: All real rows, float32 of shape `(windows, window, 1)`; a batch is drawn from them.
+            noise: All real rows, float32 of shape `(windows, window, 1)`. A batch is drawn from them.
         """
-        # equal amounts of real and generated rows
+        # equal numbers of real and generated rows
         real = self._draw_rows(noise, self.seeds)
         generated = self.generator(self._draw_latent(self.seeds), training=self.generated_in_training_mode)
 
-        # the discriminator learns to tell them apart: real rows are tagged 1, generated rows 0
+        # train the discriminator to distinguish them: real rows have the label 1, generated rows the label 0
         if self.mixed_batch:
             self._update_discriminator(tf.concat([real, generated], 0), tf.concat([self._tags(REAL), self._tags(GENERATED)], 0))
         else:
             self._update_discriminator(real, self._tags(REAL))
             self._update_discriminator(generated, self._tags(GENERATED))
 
-        # the generator learns through the combined model: the tags are reversed, only its own weights move
+        # train the generator through the combined model: its rows have the label 1, and only its weights are updated
         self._update_generator()
 
     def _update_discriminator(self, rows: tf.Tensor, tags: tf.Tensor) -> None:
@@ -115,7 +120,7 @@ class NoiseGAN:
         self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
 
     def _discriminate(self, rows: tf.Tensor) -> tf.Tensor:
-        """The discriminator in training mode, its first layers by the fast path where they are what that computes."""
+        """Applies the discriminator in training mode, with the fast implementation of its first layers where that applies."""
         number = num_layers_computed(self.discriminator.layers)
         if not number:
             return self.discriminator(rows, training=True)
@@ -149,19 +154,20 @@ class NoiseGAN:
 
         Args:
             windows: Real noise, float32 of shape `(windows, samples)`.
-            num_iterations: Iterations of `train_step`.
-            record_every: Iterations between two records.
-            on_record: Called with the iteration and this object at each record.
-            verbose: Whether to show a progress bar; None shows one on a terminal only.
-            on_iteration: Called after each iteration with how many are done.
+            num_iterations: Number of iterations, that is, of calls of `train_step`.
+            record_every: Number of iterations between two records of the history.
+            on_record: Called at each record with the iteration and this object.
+            verbose: Whether to show a progress bar. With None, the bar is shown only on a terminal.
+            on_iteration: Called after each iteration with the number of completed iterations.
 
         Returns:
-            The history, one entry a record, the first before training: `iteration`, and for `real` and `generated` rows
-            `accuracy_*` (share judged rightly) and `loss_*` (binary cross-entropy).
+            The history, with one element for each record. The first record is made before training. The keys are
+            `iteration`, `accuracy_real`, `accuracy_generated` (share of rows that the discriminator classifies correctly),
+            `loss_real` and `loss_generated` (binary cross-entropy).
         """
         noise = tf.constant(np.asarray(windows, np.float32)[:, :, None] / self.scale)
         history = []
-        disable = None if verbose is None else not verbose  # None: tqdm looks whether there is a terminal
+        disable = None if verbose is None else not verbose  # with None, tqdm shows the bar only on a terminal
         with progress(total=num_iterations, desc="noise GAN", unit="iteration", disable=disable) as bar:
             for iteration in range(num_iterations + 1):
                 if iteration % record_every == 0 or iteration == num_iterations:
@@ -173,12 +179,12 @@ class NoiseGAN:
                     bar.update()
                     if on_iteration is not None:
                         on_iteration(iteration + 1)
-        if num_iterations:  # the average over no iterations is nought
+        if num_iterations:  # with zero iterations the weight average is zero, so skip it
             self.generator_optimizer.finalize_variable_values(self.generator.trainable_variables)
         return {key: np.array([record[key] for record in history]) for key in history[0]}
 
     def _evaluate(self, noise: tf.Tensor) -> dict[str, float]:
-        """Accuracy and loss of the discriminator on a fresh batch of each kind, in inference mode."""
+        """Returns accuracy and loss of the discriminator in inference mode, on a new batch of each kind."""
         real = self._draw_rows(noise, self.record_seeds)
         generated = self.generator(self._draw_latent(self.record_seeds), training=False)
         record = {}
@@ -189,39 +195,45 @@ class NoiseGAN:
         return record
 
     def generate(self, num_windows: int, seed: int | np.random.Generator, batch_size: int = 1_024) -> np.ndarray:
-        """Generates noise (step 9), float32 of shape `(num_windows, samples)`; the same seed gives the same.
+        """Generates windows of noise (step 9 of the paper's pipeline).
 
         Args:
             num_windows: Number of windows.
-            seed: Seed of the latent vectors, or a generator that draws them and goes on from where it stands.
-            batch_size: Windows a call of the network.
+            seed: Seed for the latent vectors, or a random number generator, whose state advances. The same seed gives the same
+                noise.
+            batch_size: Number of windows in each call of the network.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`.
         """
         latent = self.latent.sample(num_windows, np.random.default_rng(seed))
         noise = predict_windows(self.generator, latent, batch_size)[:, :, 0]
         return noise * np.float32(self.scale)
 
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Generates one series of noise of any length, without seams, float32 of shape `(num_samples,)`.
+        """Generates one series of noise of any length, without seams.
 
-        A generator that convolves makes it in one piece. Any other makes windows: those that overlap by half are faded into
-        each other with weights whose squares add up to one, so that the variance of independent windows stays.
+        A convolutional generator generates the series directly. Any other generator generates windows that overlap by half.
+        They are cross-faded with weights whose squares sum to one, which preserves the variance of independent windows.
 
-        The paper's generator repeats itself: after the paper's 1,000 iterations all of its windows hold one fixed pattern,
-        about half of their power, so that the series correlates at about 0.5 with itself every half window.
+        The windows of the paper's generator are not independent. After the paper's 1,000 iterations, they all contain the
+        same fixed pattern, which has about half of their power. A cross-faded series therefore has an autocorrelation of
+        about 0.5 at multiples of half a window.
 
         Args:
             num_samples: Length of the series.
-            seed: Seed of the latent vectors, or a generator that draws them.
+            seed: Seed for the latent vectors, or a random number generator, whose state advances.
+
+        Returns:
+            float32 array of shape `(num_samples,)`.
         """
         rng = np.random.default_rng(seed)
         if self.latent.is_series:
-            stretches = self.latent.series_chunks(num_samples, rng)
-            return np.concatenate([np.asarray(self.generator.predict_on_batch(each))[0, :, 0] for each in stretches]) * np.float32(
-                self.scale
-            )
+            chunks = self.latent.series_chunks(num_samples, rng)
+            return np.concatenate([np.asarray(self.generator.predict_on_batch(each))[0, :, 0] for each in chunks]) * np.float32(self.scale)
         window = self.discriminator.input_shape[1]
         hop, num_windows = window // 2, num_overlapping(num_samples, window)
-        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # fade^2 of two windows half a window apart adds up to 1
+        fade = np.sin(np.pi * (np.arange(window) + 0.5) / window)  # the values of fade^2 at a distance of half a window sum to 1
         series, total = np.zeros((2, window + (num_windows - 1) * hop))
         for begin, rough in zip(hop * np.arange(num_windows), self.generate(num_windows, rng), strict=True):
             series[begin : begin + window] += fade * rough
@@ -229,10 +241,10 @@ class NoiseGAN:
         return (series / np.sqrt(total))[:num_samples].astype(np.float32)
 
     def get_config(self) -> dict:
-        """The settings that `generate` needs, as plain JSON types."""
+        """Returns the settings that `generate` needs, as JSON types."""
         return {"latent_span": self.latent.span, "slow_samples": list(self.latent.slow_samples), "scale": self.scale}
 
 
 def num_overlapping(num_samples: int, window: int) -> int:
-    """How many windows, each half a window after the one before, cover a series."""
+    """Returns the number of windows, each starting half a window after the previous one, that cover a series."""
     return 1 + max(0, -(-(num_samples - window) // (window // 2)))

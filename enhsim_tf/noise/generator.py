@@ -10,15 +10,16 @@ def build_generator(
     """Builds the paper's generator, Figure 9: Dense 64, BatchNormalization, Dense 500, Reshape.
 
     Args:
-        window: Samples of a window.
-        latent: Elements of the latent vector.
-        hidden_units: Units of the first layer.
-        activation: Activation of the last Dense layer; tanh keeps the noise within -1 and 1.
-        seed: Seed of the weights.
-        initialiser: Keras name of the weights' initialiser.
+        window: Number of samples in a window.
+        latent: Number of elements of the latent vector.
+        hidden_units: Number of units of the first layer.
+        activation: Activation of the last Dense layer. With tanh, the noise lies between -1 and 1.
+        seed: Seed for the initial weights.
+        initialiser: Keras name of the weight initialiser.
 
     Returns:
-        An uncompiled Keras model from shape `(windows, latent)` to `(windows, window, 1)`.
+        An uncompiled Keras model, whose input has the shape `(windows, latent)` and whose output has the shape
+        `(windows, window, 1)`.
     """
     first, last = (seeded_initialiser(initialiser, seed * 1000 + number) for number in (100, 101))
     return keras.Sequential(

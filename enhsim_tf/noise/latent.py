@@ -1,6 +1,6 @@
-"""What a generator of noise starts from: latent vectors as in the paper, or latent series for one that convolves.
+"""Latent inputs of a noise generator: vectors as in the paper (section 2.3), or series for a convolutional generator.
 
-Each is drawn in two ways that have the same distribution: inside a training step, and by NumPy for generating.
+There are two implementations with the same distribution: TensorFlow operations for the training step, and NumPy for generation.
 """
 
 import math
@@ -10,18 +10,22 @@ import numpy as np
 
 from enhsim_tf.keras_tools.backend import keras, tf
 
-_CHUNK_SAMPLES = 100_000  # samples of a series made at a time
+_CHUNK_SAMPLES = 100_000  # number of samples of a series that are generated at a time
 
 
 def standard_normal(shape: Sequence[int], seed: tf.Tensor) -> tf.Tensor:
-    """Draws from the standard normal distribution by the Box-Muller transform, float32 of the given shape.
+    """Draws from the standard normal distribution by the Box-Muller transform.
 
-    TensorFlow's own operation computes the same transform number by number; here logarithm, sine and cosine are those of
-    whole arrays, which takes half the time. A training step of the convolutional generator draws 1.5 million numbers.
+    TensorFlow's own operation computes the same transform one number at a time. The vectorised logarithm, sine and cosine
+    used here take half the time, which matters because a training step of the convolutional generator draws 1.5 million
+    numbers.
 
     Args:
-        shape: Shape of the draws.
-        seed: Two integers.
+        shape: Shape of the result.
+        seed: Seed, an integer tensor of shape `(2,)`.
+
+    Returns:
+        float32 tensor of the given shape.
     """
     number = math.prod(shape)
     first, second = tf.unstack(tf.random.stateless_uniform((2, -(-number // 2)), seed))
@@ -30,17 +34,18 @@ def standard_normal(shape: Sequence[int], seed: tf.Tensor) -> tf.Tensor:
 
 
 class Latent:
-    """Latent draws of the shape that a generator takes.
+    """Draws latent inputs of the shape that a generator requires.
 
-    A generator of input shape `(elements,)` gets standard normal vectors (paper, section 2.3). One of input shape
-    `(None, channels)` gets series: white channels, then slow ones, each a stationary Gaussian process whose correlation
-    falls by e in its own number of samples. From a slow channel comes what changes over many windows, such as the scale.
+    A generator of input shape `(elements,)` receives normally distributed vectors (section 2.3 of the paper). A generator of
+    input shape `(None, channels)` receives series, which consist of white-noise channels followed by slow channels. A slow
+    channel is a stationary Gaussian process whose autocorrelation decays exponentially, by a factor of e in its correlation
+    time. Slow channels allow the generator to produce changes over many windows, for example of the scale.
 
     Args:
         generator: The generator.
-        window: Samples of a window that it makes.
-        span: White draws are standard normal times this.
-        slow_samples: Correlation time of each slow channel in samples.
+        window: Number of samples in a generated window.
+        span: Standard deviation of the vectors and of the white-noise channels.
+        slow_samples: Correlation time of each slow channel, in samples.
     """
 
     def __init__(self, generator: keras.Model, window: int, span: float = 1.0, slow_samples: Sequence[float] = ()):
@@ -53,11 +58,20 @@ class Latent:
             self._shape = (window + self._margin, self._shape[1])
             rate, place = 1 / np.array(self.slow_samples), np.arange(self._shape[0])[:, None]
             steps = np.where(place > 0, np.sqrt(1 - np.exp(-2 * rate)), 1.0)
-            # x_t = d^t sum of s_k d^-k e_k: a sum in place of a recursion; d^-k stays below exp(samples / correlation)
+            # The recursion of an AR(1) process with decay d, written as a cumulative sum: x_t = d^t * sum of s_k d^-k e_k.
+            # It does not overflow, because d^-k stays below exp(samples / correlation time).
             self._rise, self._fall = (tf.constant(each, tf.float32) for each in (steps * np.exp(place * rate), np.exp(-place * rate)))
 
     def draw(self, num_rows: int, seeds: keras.random.SeedGenerator) -> tf.Tensor:
-        """Draws for a training step, of shape `(num_rows, *input shape)`."""
+        """Draws latent inputs in a training step.
+
+        Args:
+            num_rows: Number of rows.
+            seeds: Source of seeds, whose state advances.
+
+        Returns:
+            float32 tensor of shape `(num_rows, *input shape)`.
+        """
         if not self.is_series:
             return self.span * keras.random.normal((num_rows, *self._shape), seed=seeds)
         draws = standard_normal((num_rows, *self._shape), seeds.next())
@@ -68,26 +82,38 @@ class Latent:
         return tf.concat([self.span * draws[:, :, :num_white], slow], 2)
 
     def sample(self, num_rows: int, rng: np.random.Generator) -> np.ndarray:
-        """Draws for generating windows, float32 of shape `(num_rows, *input shape)`, row after row."""
+        """Draws latent inputs for the generation of windows. The first rows do not depend on the number of rows.
+
+        Args:
+            num_rows: Number of rows.
+            rng: Random number generator.
+
+        Returns:
+            float32 array of shape `(num_rows, *input shape)`.
+        """
         return self._filter_slow_channels(rng.standard_normal((num_rows, *self._shape), np.float32))
 
     def series_chunks(self, num_samples: int, rng: np.random.Generator) -> Iterator[np.ndarray]:
-        """Yields the latent series for a series of noise, stretch after stretch, each of shape `(1, samples + margin, channels)`.
+        """Yields the latent series for one series of noise in chunks, each of shape `(1, samples + margin, channels)`.
 
-        A stretch begins with the last samples of the one before, as many as the generator consumes: its outputs join
-        as if they had been made in one piece.
+        The convolutions shorten each chunk by `margin` samples. Each chunk therefore starts with the last `margin` samples of
+        the previous chunk, so that the generator's outputs join without seams.
+
+        Args:
+            num_samples: Length of the series of noise.
+            rng: Random number generator.
         """
         before, state = np.empty((1, 0, self._shape[1]), np.float32), None
         for first in range(0, num_samples, _CHUNK_SAMPLES):
             length = min(_CHUNK_SAMPLES, num_samples - first) + self._margin - before.shape[1]
             draws = self._filter_slow_channels(rng.standard_normal((1, length, self._shape[1]), np.float32), state)
             state = draws[:, -1]
-            stretch = np.concatenate([before, draws], axis=1)
-            before = stretch[:, stretch.shape[1] - self._margin :]
-            yield stretch
+            chunk = np.concatenate([before, draws], axis=1)
+            before = chunk[:, chunk.shape[1] - self._margin :]
+            yield chunk
 
     def _filter_slow_channels(self, draws: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
-        """White channels times the span, and the slow ones as they go on from their last values, or anew."""
+        """Scales the white-noise channels and filters the slow channels, which continue from `state` if it is given."""
         from scipy.signal import lfilter
 
         num_white = self._shape[-1] - len(self.slow_samples)

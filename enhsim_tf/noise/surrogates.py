@@ -1,7 +1,4 @@
-"""Environmental noise, step 6 of the paper's pipeline: what a moving average leaves of telemetry.
-
-Also the plain noises that are fitted to it, against which a learned noise has to prove itself.
-"""
+"""Classical noise models that are fitted to extracted noise: the baselines for the paper's GAN (section 2.3)."""
 
 from collections.abc import Sequence
 
@@ -11,11 +8,11 @@ from enhsim_tf.common.errors import InputError
 
 
 class GaussianNoise:
-    """Independent Gaussian noise of the standard deviation of the noise it is fitted to: the plainest surrogate.
+    """White Gaussian noise with the standard deviation of the real noise, the simplest baseline.
 
     Args:
-        standard_deviation: In the telemetry's unit.
-        window: Samples of a window.
+        standard_deviation: Standard deviation, in the unit of the telemetry.
+        window: Number of samples in a window.
     """
 
     def __init__(self, standard_deviation: float, window: int):
@@ -27,7 +24,7 @@ class GaussianNoise:
         return cls(np.std(windows, dtype=np.float64), windows.shape[1])
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws noise, float32 of shape `(num_windows, samples)`; the same seed draws the same."""
+        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise."""
         return self._draw((num_windows, self.window), seed)
 
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
@@ -39,17 +36,18 @@ class GaussianNoise:
 
 
 class GaussianAutoregression:
-    """Gaussian noise of the spectrum of the noise it is fitted to: an autoregression of the order that AIC chooses.
+    """Gaussian autoregressive noise with the spectrum of the real noise.
 
-    What a spectrum and an autocorrelation can see of noise, and nothing else of it.
+    The order is chosen by the Akaike information criterion (AIC). The model reproduces the second-order properties of the
+    noise, that is its spectrum and autocorrelation, and no others.
 
     Args:
-        coefficients: Of the last sample, of the one before it and so on; an empty sequence is white noise.
-        innovation_sd: Standard deviation of what is new at each sample, in the telemetry's unit.
-        window: Samples of a window.
+        coefficients: Autoregressive coefficients, from lag 1 upwards. An empty sequence gives white noise.
+        innovation_sd: Standard deviation of the innovations, in the unit of the telemetry.
+        window: Number of samples in a window.
 
     Raises:
-        InputError: If the coefficients grow without bound.
+        InputError: If the coefficients do not belong to a stationary process.
     """
 
     def __init__(self, coefficients: Sequence[float], innovation_sd: float, window: int):
@@ -58,16 +56,16 @@ class GaussianAutoregression:
 
     @classmethod
     def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
-        """Fits to noise windows by least squares of the forward and the backward prediction (Burg 1975), pooled over the windows.
+        """Fits the model to noise windows by Burg's method (1975), with the prediction errors pooled over the windows.
 
-        Burg's coefficients are stationary whatever the noise, and windows of any length weigh the same at each lag.
+        Burg's method minimises the squared forward and backward prediction errors. It always gives a stationary process.
 
         Args:
             windows: Noise windows of shape `(windows, samples)`.
             max_order: The largest order that AIC may choose.
 
         Raises:
-            InputError: If the windows are not longer than the largest order, or stand still.
+            InputError: If the windows are not longer than `max_order`, or if they are constant.
         """
         if windows.shape[1] <= max_order:
             raise InputError(f"Expected windows of more samples than max_order={max_order}. Received: {windows.shape[1]} samples.")
@@ -87,7 +85,10 @@ class GaussianAutoregression:
         return cls(coefficients, np.sqrt(variance), windows.shape[1])
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws noise, float32 of shape `(num_windows, samples)`, stationary from its first sample on; the same seed draws the same."""
+        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise.
+
+        Each window is stationary from its first sample on.
+        """
         return self._draw((num_windows, self.window), seed)
 
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
@@ -100,22 +101,23 @@ class GaussianAutoregression:
         draws = np.random.default_rng(seed).standard_normal(shape)
         innovations, whitening = self.innovation_sd * draws, np.concatenate([[1.0], -self.coefficients])
         start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
-        for place in range(start.shape[1]):  # each of the first samples is predicted from as many as there are before it
+        for place in range(start.shape[1]):  # each of the first samples is predicted from all earlier ones
             past, sd = self._start[place]
             start[:, place] = start[:, :place][:, ::-1] @ past + sd * draws[:, place]
-        if start.size:  # so that the filter answers with that start
+        if start.size:  # the innovations for which the filter returns these first samples
             innovations[:, : start.shape[1]] = lfilter(whitening, [1.0], start, axis=1)
         return lfilter([1.0], whitening, innovations, axis=1).astype(np.float32)
 
 
 def _lower_orders(coefficients: np.ndarray, innovation_sd: float) -> list[tuple[np.ndarray, float]]:
-    """Coefficients and error of the best prediction from the last 0, 1, ... samples, by Levinson's recursion downwards."""
+    """Returns the best linear predictors of the orders 0, 1, ... and their errors, by the reversed Levinson recursion."""
     orders, variance = [], innovation_sd**2
     for _ in range(len(coefficients)):
         reflection = coefficients[-1]
         if not abs(reflection) < 1:
             raise InputError(
-                f"Expected coefficients of a stationary autoregression. Received: a reflection of {reflection:.4g}, not within 1."
+                "Expected coefficients of a stationary autoregression. "
+                f"Received: a reflection coefficient of {reflection:.4g}, whose magnitude is not below 1."
             )
         coefficients = (coefficients[:-1] + reflection * coefficients[-2::-1]) / (1 - reflection**2)
         variance /= 1 - reflection**2
@@ -124,17 +126,17 @@ def _lower_orders(coefficients: np.ndarray, innovation_sd: float) -> list[tuple[
 
 
 class BlockBootstrap:
-    """Blocks of the real noise itself, drawn at random and put end to end: a ceiling that nothing has learnt.
+    """Block bootstrap (Künsch 1989): randomly drawn blocks of the real noise, concatenated; a non-parametric upper baseline.
 
-    Within a block all is real; across a seam nothing is. The seams fall anywhere in a window, so that no sample is
-    special (Künsch 1989).
+    The noise is real within a block, and independent across the boundary of two blocks. The boundaries have random
+    positions in a window, so that all samples have the same distribution.
 
     Args:
         windows: Noise windows of shape `(windows, samples)`.
-        block: Samples of a block.
+        block: Number of samples in a block.
 
     Raises:
-        InputError: If a block does not fit into a window.
+        InputError: If a block is longer than a window.
     """
 
     def __init__(self, windows: np.ndarray, block: int = 50):
@@ -144,15 +146,15 @@ class BlockBootstrap:
 
     @classmethod
     def fit(cls, windows: np.ndarray, block: int = 50) -> "BlockBootstrap":
-        """Keeps noise windows of shape `(windows, samples)` to cut blocks of `block` samples from."""
+        """Stores noise windows of shape `(windows, samples)`, from which blocks of `block` samples are drawn."""
         return cls(windows, block)
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws noise, float32 of shape `(num_windows, samples)`; the same seed draws the same."""
+        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise."""
         return self._draw((num_windows, self.windows.shape[1]), seed)
 
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples,)`; it has a seam after each block."""
+        """Draws one series of any length, float32 of shape `(num_samples,)`. Consecutive blocks are independent."""
         return self._draw((1, num_samples), seed)[0]
 
     def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
@@ -160,6 +162,6 @@ class BlockBootstrap:
         chain = (num_rows, -(-samples // self.block) + 1)
         sources = rng.integers(0, len(self.windows), chain)
         begins = rng.integers(0, self.windows.shape[1] - self.block + 1, chain)
-        places = np.arange(samples) + rng.integers(0, self.block, (num_rows, 1))  # where in its chain of blocks a window begins
+        places = np.arange(samples) + rng.integers(0, self.block, (num_rows, 1))  # a window starts at a random position of its first block
         rows, blocks = np.arange(num_rows)[:, None], places // self.block
         return self.windows[sources[rows, blocks], begins[rows, blocks] + places % self.block]

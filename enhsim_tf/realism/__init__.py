@@ -1,4 +1,4 @@
-"""Measures of how close generated data are to real data, each with the value that real data reach against real data.
+"""Measures of how realistic generated noise and telemetry are, each with its real-vs-real baseline (evaluates sections 2.2 and 2.3).
 
-This package knows windows, and nothing of where they come from.
+This package works on arrays of windows. It does not depend on how they were obtained.
 """

@@ -1,32 +1,37 @@
-"""Measures of how close generated telemetry is to real: pure functions of arrays of shape `(windows, samples)`.
+"""Measures of the difference between generated and real windows, as pure functions (evaluates sections 2.2 and 2.3 of the paper).
 
-Those that compare spectra or correlations take what `window_spectra` and `lagged_products` make of each window, so that a
-floor over many re-splits of the same windows transforms each window once. `realism` holds each against its floor.
+Windows have the shape `(windows, samples)`. Measures that compare spectra or correlations take the results of `window_spectra`
+or `lagged_products`, so that each window is transformed only once when the same windows are resampled many times.
+`real_floor` compares each measure with its real-vs-real baseline.
 """
 
 import functools
 
 import numpy as np
 
-_TINY = 1e-30  # keeps the logarithm of what stands still finite
+_TINY = 1e-30  # keeps logarithms and quotients of constant windows finite
 
 
 def nrmse(estimate: np.ndarray, truth: np.ndarray) -> float:
-    """Root-mean-square error in units of the standard deviation of the truth; 1 is what predicting the mean reaches."""
+    """Normalised root-mean-square error (NRMSE): the error divided by the standard deviation of the truth.
+
+    An estimate that equals the mean of the truth everywhere has an NRMSE of 1.
+    """
     error = np.asarray(estimate, np.float64) - truth
     return float(np.sqrt(np.mean(error**2)) / np.std(truth, dtype=np.float64))
 
 
 def roughness(windows: np.ndarray) -> float:
-    """Standard deviation of the first differences, in the telemetry's unit: how restless a signal is."""
+    """Standard deviation of the first differences, in the unit of the telemetry."""
     return float(np.std(np.diff(np.asarray(windows, np.float64), axis=-1)))
 
 
 def effective_rank(windows: np.ndarray) -> float:
-    """How many dimensions the windows fill: the exponential of the entropy of their covariance's eigenvalue shares.
+    """Effective rank of the windows: the exponential of the entropy of their normalised covariance eigenvalues.
 
-    From 1 (all on one line) to the number of samples (round in every direction). Roy and Vetterli 2007. It grows with
-    the number of windows, so compare equal numbers.
+    The effective rank (Roy and Vetterli 2007) is a measure of the number of dimensions that the windows occupy. It is 1 if
+    all windows lie on a line, and equals the number of samples if the covariance is a multiple of the identity. Its estimate
+    increases with the number of windows, so compare only sets of equal size.
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, axis=0, dtype=np.float64)
     energy = np.linalg.svd(centred, compute_uv=False) ** 2
@@ -36,9 +41,10 @@ def effective_rank(windows: np.ndarray) -> float:
 
 
 def lagged_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
-    """Mean product of each window's values with those 0 to `max_lag` samples later, about the mean of all windows.
+    """Autocovariance of each window at lags 0 to `max_lag`, about the mean of all windows.
 
-    Averaged over windows they are the autocovariance; shape `(windows, max_lag + 1)`.
+    Returns:
+        float64 array of shape `(windows, max_lag + 1)`. Its mean over the windows is the pooled autocovariance.
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
     samples = centred.shape[1]
@@ -47,7 +53,7 @@ def lagged_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
 
 
 def lagged_square_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
-    """`lagged_products` of the squares of the values about their mean: how scale follows scale (volatility clustering)."""
+    """`lagged_products` of the squared deviations from the mean, which show volatility clustering."""
     return lagged_products((np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2, max_lag)
 
 
@@ -58,13 +64,13 @@ def autocorrelation(windows: np.ndarray, max_lag: int) -> np.ndarray:
 
 
 def autocorrelation_distance(generated_products: np.ndarray, real_products: np.ndarray) -> float:
-    """Largest difference of the autocorrelations that two sets of `lagged_products` make up."""
+    """Largest absolute difference of two autocorrelations, which are computed from two sets of `lagged_products`."""
     generated, real = (np.mean(products, axis=0) for products in (generated_products, real_products))
     return float(np.max(np.abs(generated / (generated[0] + _TINY) - real / (real[0] + _TINY))))
 
 
 def scale_difference(generated: np.ndarray, real: np.ndarray) -> float:
-    """Absolute logarithm of the ratio of standard deviations: 0 for equal scale, 0.1 for ten per cent."""
+    """Absolute logarithm of the ratio of the standard deviations: 0 for equal scales, about 0.1 for a difference of 10 %."""
     return float(abs(np.log(np.std(generated, dtype=np.float64) / np.std(real, dtype=np.float64))))
 
 
@@ -74,20 +80,23 @@ def log_scales(windows: np.ndarray) -> np.ndarray:
 
 
 def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) -> float:
-    """First Wasserstein distance of two sets of `log_scales`: how wrongly the scale varies from window to window."""
+    """First Wasserstein distance between two sets of `log_scales`, which compares how the scale varies between windows."""
     from scipy.stats import wasserstein_distance
 
     return float(wasserstein_distance(generated_scales, real_scales))
 
 
 def marginal_distance(generated: np.ndarray, real: np.ndarray) -> float:
-    """First Wasserstein distance of the values, from 2,000 of their quantiles, in units of the real standard deviation."""
+    """First Wasserstein distance of the marginal distributions, in units of the real standard deviation.
+
+    The distance is computed from 2,000 quantiles of the values.
+    """
     difference = _quantiles(generated) - _quantiles(real)
     return float(np.mean(np.abs(difference)) / np.std(real, dtype=np.float64))
 
 
 def _quantiles(values: np.ndarray, number: int = 2000) -> np.ndarray:
-    """`np.quantile` in the middles of equal shares, several times as fast: one sort for all."""
+    """Same as `np.quantile` at the midpoints of `number` equal intervals, but several times faster, because it sorts only once."""
     ordered = np.sort(values, axis=None)
     place = (np.arange(number) + 0.5) / number * (ordered.size - 1)
     below = place.astype(int)
@@ -95,24 +104,24 @@ def _quantiles(values: np.ndarray, number: int = 2000) -> np.ndarray:
 
 
 def excess_kurtosis(windows: np.ndarray) -> float:
-    """Fourth moment of the values in units of the squared variance, less the 3 of a Gaussian."""
+    """Excess kurtosis of the values: the standardised fourth moment minus 3, which is 0 for a Gaussian distribution."""
     centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
     squares = centred**2
     return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY) - 3)
 
 
 def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
-    """Excess kurtosis of the generated values less that of the real ones: above 0, their tails are too heavy."""
+    """Excess kurtosis of the generated values minus that of the real values. A positive difference means too heavy tails."""
     return excess_kurtosis(generated) - excess_kurtosis(real)
 
 
 def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
-    """Quantile 0.999 of the generated absolute values, in units of that of the real ones."""
+    """Ratio of the 0.999 quantiles of the absolute values, generated to real. A ratio above 1 means too heavy tails."""
     return float(np.quantile(np.abs(generated), 0.999) / (np.quantile(np.abs(real), 0.999) + _TINY))
 
 
 def power_spectrum(windows: np.ndarray) -> np.ndarray:
-    """Mean periodogram (Hann taper) without its zero frequency, shape `(samples // 2,)`, in value^2 a bin."""
+    """Mean periodogram with a Hann taper, without the zero frequency, shape `(samples // 2,)`, in squared units for each bin."""
     samples = windows.shape[1]
     taper = np.hanning(samples + 2)[1:-1]
     transformed = np.fft.rfft(np.asarray(windows, np.float64) * taper, axis=1)
@@ -120,15 +129,16 @@ def power_spectrum(windows: np.ndarray) -> np.ndarray:
 
 
 def window_spectra(windows: np.ndarray, time_half_bandwidth: float = 4, num_tapers: int = 7) -> np.ndarray:
-    """Multitaper power spectrum of each window (Thomson 1982), without zero and Nyquist frequency.
+    """Multitaper power spectrum of each window (Thomson 1982), without the zero frequency and the Nyquist frequency.
 
     Args:
         windows: Windows of shape `(windows, samples)`.
-        time_half_bandwidth: Samples of a window times half the bandwidth of a bin, in cycles a sample.
-        num_tapers: Number of Slepian tapers, whose squared transforms are averaged.
+        time_half_bandwidth: Time half-bandwidth product: the number of samples times half the bandwidth in cycles per sample.
+        num_tapers: Number of Slepian tapers, over which the spectra are averaged.
 
     Returns:
-        float64 array of shape `(windows, (samples - 1) // 2)`, in value^2 a bin: white noise has its variance everywhere.
+        float64 array of shape `(windows, (samples - 1) // 2)`, in squared units for each bin. The expected spectrum of white
+        noise equals its variance in every bin.
     """
     values = np.asarray(windows, np.float64)
     samples, power = values.shape[1], 0.0
@@ -145,15 +155,16 @@ def _slepian_tapers(samples: int, time_half_bandwidth: float, num_tapers: int) -
 
 
 def geodesic_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
-    """Standard deviation over the bins of the log ratio of the median `window_spectra`: their shape, blind to scale.
+    """Geodesic distance of two power spectra (Georgiou 2007), which compares their shapes independently of scale.
 
-    The geodesic distance of power spectra (Georgiou 2007), as Wunderlich and Sklar (2023) judge generated noise by.
+    It is the standard deviation, over the bins, of the log ratio of the median `window_spectra`. Wunderlich and Sklar (2023)
+    evaluate generated noise with this distance.
     """
     return float(np.std(_log_ratio(generated_spectra, real_spectra)))
 
 
 def log_spectral_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
-    """Root mean square over the bins of the log ratio of the median `window_spectra`: their shape and scale."""
+    """Root mean square, over the bins, of the log ratio of the median `window_spectra`, which compares shape and scale."""
     return float(np.sqrt(np.mean(_log_ratio(generated_spectra, real_spectra) ** 2)))
 
 

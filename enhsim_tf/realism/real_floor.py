@@ -1,7 +1,9 @@
-"""Is generated noise realistic? Every measure of `fidelity` and `two_sample`, each beside its real-against-real floor.
+"""Real-vs-real baselines ("floors") of all realism measures, to which generated noise is compared (evaluates section 2.3 of the paper).
 
-A value means nothing alone: two finite samples of one process differ too, and by how much depends on the process. So real
-windows are split in two, by blocks in time, again and again, and each split is measured as if one half were generated.
+The value of a measure cannot be interpreted alone, because two finite samples of the same process differ too, by an amount
+that depends on the process. The floor of a measure is the distribution of its values for real windows compared with other
+real windows. To estimate it, real windows are repeatedly split at random into two halves, by blocks in time, and one half is
+treated as if it were generated.
 """
 
 import functools
@@ -20,17 +22,17 @@ Comparison = Callable[[np.ndarray, np.ndarray], float]
 
 @dataclass(frozen=True)
 class Measure:
-    """One measure: a comparison of what is described of each generated and each real window.
+    """A realism measure, which computes a description of each window and compares generated with real descriptions.
 
     Args:
-        section: Which aspect it belongs to, A1 (spectrum) to A7, or `rank`.
-        name: Its name.
-        describe: From windows of shape `(windows, samples)` to as many rows.
-        compare: From generated and real rows to the value.
-        perfect: The value of perfect noise; larger and smaller ones are both worse.
-        is_ratio: Whether the departure from perfect is that of the logarithm.
-        max_resplits: Re-splits that its floor is worth at most: the dear ones take fewer.
-        p_value: Permutation p-value, from the same rows.
+        section: Aspect that the measure belongs to: A1 (spectrum) to A7, or `rank`.
+        name: Name of the measure.
+        describe: Function from windows of shape `(windows, samples)` to their descriptions, one row for each window.
+        compare: Function from generated and real descriptions to the value of the measure.
+        perfect: Value for perfect noise. Larger and smaller values are both worse.
+        is_ratio: Whether the departure from the perfect value is computed on the logarithms.
+        max_resplits: Maximum number of resamples for the real-vs-real baseline; fewer for expensive measures.
+        p_value: Function from the same descriptions to a permutation p-value, or None.
     """
 
     section: str
@@ -43,7 +45,7 @@ class Measure:
     p_value: Comparison | None = None
 
     def departure(self, value: float) -> float:
-        """How far a value is from perfect, 0 or more."""
+        """Returns the distance of a value from the perfect value, which is at least 0."""
         return float(abs(np.log(max(value, 1e-12) / self.perfect)) if self.is_ratio else abs(value - self.perfect))
 
 
@@ -100,19 +102,19 @@ MEASURES = (
 
 @dataclass(frozen=True)
 class Row:
-    """One measure of generated windows beside its floor; departures are distances from the perfect value.
+    """Result of one measure for generated windows, with its real-vs-real baseline.
 
     Args:
-        section: Which aspect the measure belongs to.
-        measure: Its name.
-        value: Generated against real.
-        departure: How far the value is from perfect.
-        floor_mean: Mean departure of real against real.
-        floor_95: 95th percentile of the departures of real against real.
-        ratio: Departure in units of `floor_mean`; about 1 for perfect noise.
-        is_within: Whether the departure is at most `floor_95`.
-        num_resplits: Re-splits behind the floor.
-        p_value: Permutation p-value of the two-sample tests, NaN elsewhere.
+        section: Aspect that the measure belongs to.
+        measure: Name of the measure.
+        value: Value of the measure for generated windows compared with real windows.
+        departure: Distance of the value from the perfect value.
+        floor_mean: Mean departure for real windows compared with real windows.
+        floor_95: 95th percentile of the same departures.
+        ratio: `departure` divided by `floor_mean`, which is about 1 for perfect noise.
+        is_within: Whether `departure` is at most `floor_95`.
+        num_resplits: Number of resamples from which the baseline was estimated.
+        p_value: Permutation p-value for the two-sample tests, and NaN for all other measures.
     """
 
     section: str
@@ -129,31 +131,32 @@ class Row:
 
 @dataclass(frozen=True)
 class RealismReport:
-    """All rows, and the windows a side that they were measured on.
+    """Results of all measures for one set of generated windows.
 
     Args:
-        rows: One `Row` a measure.
-        num_windows: Windows on each side.
+        rows: One `Row` for each measure.
+        num_windows: Number of generated windows, and of real windows, that were compared.
     """
 
     rows: tuple[Row, ...]
     num_windows: int
 
     def __getitem__(self, measure: str) -> Row:
-        """The row of a measure, by its name."""
+        """Returns the row of a measure by the name of the measure."""
         return next(row for row in self.rows if row.measure == measure)
 
     @property
     def worst(self) -> Row:
-        """The row furthest outside its floor, by `ratio`."""
+        """The row with the largest `ratio`."""
         return max(self.rows, key=lambda row: row.ratio)
 
     @property
     def verdict(self) -> str:
-        """`indistinguishable at n` only if every measure is within its floor's 95th percentile, else by which it is not.
+        """A sentence that says whether all measures lie within the 95th percentile of their baselines, and if not, which do not.
 
-        Strict: perfect noise is above each floor's percentile in five to fifteen of a hundred cases (a third part of the
-        real noise is not in the two that were re-split), so above one of fifteen more often than not. `worst` says by how much.
+        The criterion is strict. Perfect noise exceeds the percentile of an individual measure in 5 % to 15 % of all cases; it
+        is more than 5 % because the tested noise is not part of the noise that was resampled. With fifteen measures, even
+        perfect noise therefore usually exceeds at least one of them. Use `worst` to see by how much.
         """
         outside = [row.measure for row in self.rows if not row.is_within]
         return f"{'distinguishable' if outside else 'indistinguishable'} at n = {self.num_windows:,}" + (
@@ -162,18 +165,18 @@ class RealismReport:
 
 
 class RealFloor:
-    """Real windows, measured against themselves: what every generated set of this noise is judged against.
+    """Real-vs-real baselines of all measures for one kind of noise, to which generated windows are compared.
 
     Args:
-        real: Real windows of shape `(windows, samples)`, in the order of time, none overlapping another.
-        later_real: As many other real windows, from later.
-        num_resplits: Re-splits of both; a measure takes its `max_resplits` at most.
-        block: Consecutive windows that stay together.
-        seed: Draws the re-splits.
-        measures: Which measures.
+        real: Real windows of shape `(windows, samples)`, in the order of time and without overlaps.
+        later_real: The same number of other real windows, from a later time.
+        num_resplits: Number of resamples. Each measure uses at most its `max_resplits`.
+        block: Number of consecutive windows that stay together when the windows are split.
+        seed: Seed for the resampling.
+        measures: The measures.
 
     Raises:
-        InputError: If there are fewer than 20 windows a side, or values that are not finite.
+        InputError: If there are fewer than 20 windows on either side, or if a value is not finite.
     """
 
     def __init__(
@@ -195,17 +198,21 @@ class RealFloor:
         for measure in self.measures:
             pooled, compare = np.concatenate(describe(measure.describe)), measure.compare
             chosen = splits[: measure.max_resplits]
-            with threadpool_limits(1):  # threads that wait for each other on a busy machine take ten times as long
+            with threadpool_limits(1):  # on a busy machine, several threads that wait for each other are ten times slower
                 self.values[measure.name] = np.array([compare(pooled[first], pooled[second]) for first, second in chosen])
 
     def evaluate(self, generated: np.ndarray) -> RealismReport:
-        """Measures generated windows against the real ones.
+        """Compares generated windows with the real windows.
 
         Args:
-            generated: At least as many windows as the real ones, of the same length and in the same unit; the first count.
+            generated: At least as many windows as there are real windows, of the same length and in the same unit. Additional
+                windows are ignored.
+
+        Returns:
+            The results of all measures.
 
         Raises:
-            InputError: If they are fewer, of another length, or not finite.
+            InputError: If there are too few windows, if they have another length, or if a value is not finite.
         """
         generated = self._checked(generated, "generated")
         describe = functools.cache(lambda function: function(generated))
@@ -223,7 +230,7 @@ class RealFloor:
         return RealismReport(tuple(rows), self.num_windows)
 
     def _checked(self, windows: np.ndarray, kind: str) -> np.ndarray:
-        """The first `num_windows` windows in units of the real standard deviation, about the real mean."""
+        """Checks windows and returns the first `num_windows` of them, standardised by the mean and deviation of the real windows."""
         if np.ndim(windows) != 2 or len(windows) < max(20, self.num_windows) or np.shape(windows)[1] != self.samples:
             least = f"at least {max(20, self.num_windows)} {kind} windows of {self.samples} samples"
             raise InputError(f"Expected {least}. Received: shape {np.shape(windows)}.")
@@ -232,7 +239,7 @@ class RealFloor:
         return ((np.asarray(windows[: self.num_windows], np.float64) - self._offset) / self._unit).astype(np.float32)
 
     def _resplits(self, num_resplits: int, block: int, rng: np.random.Generator):
-        """Pairs of index sets: blocks in time fall to either half by chance, and each half keeps the order of time."""
+        """Yields pairs of index arrays. Blocks in time are assigned to the halves at random; each half keeps the order of time."""
         blocks = np.array_split(np.arange(2 * self.num_windows), max(2, 2 * self.num_windows // block))
         for _ in range(num_resplits):
             order = np.concatenate([blocks[chosen] for chosen in rng.permutation(len(blocks))])
@@ -240,13 +247,16 @@ class RealFloor:
 
 
 def evaluate(generated: np.ndarray, real: np.ndarray, later_real: np.ndarray, num_resplits: int = 200, seed: int = 0) -> RealismReport:
-    """Measures one set of generated windows against a `RealFloor` made for it; keep the floor to judge several.
+    """Compares one set of generated windows with real windows. To compare several sets, create a `RealFloor` once.
 
     Args:
         generated: Generated windows of shape `(windows, samples)`.
-        real: Real windows, in the order of time.
-        later_real: As many other real windows, from later.
-        num_resplits: Re-splits of the real windows at most.
-        seed: Draws the re-splits.
+        real: Real windows of the same shape, in the order of time.
+        later_real: The same number of other real windows, from a later time.
+        num_resplits: Maximum number of resamples of the real windows.
+        seed: Seed for the resampling.
+
+    Returns:
+        The results of all measures.
     """
     return RealFloor(real, later_real, num_resplits, seed=seed).evaluate(generated)

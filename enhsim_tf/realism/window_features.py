@@ -1,16 +1,23 @@
-"""Features of a window, for two-sample tests and for detectors."""
+"""Summary features of windows, for two-sample tests and for anomaly detectors (evaluates sections 2.2 and 2.3 of the paper)."""
 
 import numpy as np
 
 
 def window_features(windows: np.ndarray) -> np.ndarray:
-    """Fourteen features of each window, float64 of shape `(windows, 14)`.
+    """Computes fourteen features of each window.
 
-    Mean, log sd, excess kurtosis, largest value, log sd of first differences, lag-1 correlation, and the log power in
-    eight bands that double in width.
+    The features are the mean, the logarithm of the standard deviation, the excess kurtosis, the maximum, the logarithm of the
+    standard deviation of the first differences, the autocorrelation at lag 1, and the logarithm of the power in eight
+    frequency bands that double in width.
+
+    Args:
+        windows: Windows of shape `(windows, samples)`.
+
+    Returns:
+        float64 array of shape `(windows, 14)`.
     """
     values = np.asarray(windows, np.float64)
-    tiny = 1e-12  # keeps the logarithm of a window that stands still finite
+    tiny = 1e-12  # keeps logarithms and quotients of constant windows finite
     mean = values.mean(axis=1)
     centred = values - mean[:, None]
     variance = np.mean(centred**2, axis=1) + tiny

@@ -119,7 +119,7 @@ def test_many_windows_are_scored_in_parts_and_remembered_up_to_a_number(fitted, 
     monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._CHUNK", 7)
     np.testing.assert_allclose(fitted.score(windows), whole)
     assert fitted.score(windows[:0]).shape == (0,)
-    monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._MOST_REMEMBERED", 100)
+    monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._MAX_KEPT", 100)
     thinned = OutOfRange().fit(training).score(windows)  # of what is remembered, the nearest can only be further
     assert np.all(thinned >= whole - 1e-9) and np.mean(thinned) < 1.1 * np.mean(whole)
 

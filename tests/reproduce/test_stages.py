@@ -299,7 +299,9 @@ def test_imports_of_reads_every_form():
     source = "import os\nfrom enhsim_tf.noise.surrogates import a, b\nfrom enhsim_tf import signals, files as f\n"
     source += "from enhsim_tf.reproduce.paper.data import c\nfrom enhsim_tf.reproduce import report\n"
     source += "def g():\n    from enhsim_tf.enhancer.network import d\n    import numpy\n"
-    source += "LAZY = {'limit check': 'enhsim_tf.detection.detectors:LimitCheck'}\nOTHER = 'enhsim_tf.detection.metrics', 'other.detectors:A'\n"
+    source += (
+        "LAZY = {'limit check': 'enhsim_tf.detection.detectors:LimitCheck'}\nOTHER = 'enhsim_tf.detection.metrics', 'other.detectors:A'\n"
+    )
     assert sorted(imports_of(source)) == [
         "detection.detectors",
         "enhancer.network",
