@@ -133,7 +133,8 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers:
     if labels.shape != scores.shape or labels.ndim != 1 or not labels.any() or np.isnan(scores).any() or max_buffer < 0:
         raise InputError(
             "Expected labels and scores of one shape (samples,), an anomalous sample, no nan and a buffer of 0 or more. "
-            f"Received: shapes {labels.shape} and {scores.shape}, {labels.sum()} anomalous, {np.isnan(scores).sum()} nan, max_buffer={max_buffer}."
+            f"Received: shapes {labels.shape} and {scores.shape}, {labels.sum()} anomalous, {np.isnan(scores).sum()} nan, "
+            f"max_buffer={max_buffer}."
         )
     order = np.argsort(-scores, kind="stable")
     last = np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)  # the last of each group of equal scores, where a threshold may lie

@@ -1,4 +1,4 @@
-"""The table of designs that were tried: one row a training, none made twice, on development seeds alone."""
+"""The table of compared designs: one row for each training, no row computed twice, and development seeds only."""
 
 import csv
 

@@ -1,4 +1,4 @@
-"""The page on sizing says what was measured; the projection is a multiplication that is done again by hand."""
+"""The page on sizing agrees with the measurements, and the projection agrees with a calculation by hand."""
 
 import json
 from pathlib import Path

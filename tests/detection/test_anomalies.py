@@ -1,4 +1,4 @@
-"""Injected anomalies against arrays worked out by hand, and the pairing that the experiment rests on."""
+"""Injected anomalies compared with arrays computed by hand, and equal positions for all kinds and severities."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ RAMP = np.arange(10, dtype=np.float32)
 
 
 def injected(window, kind, severity, duration, seed=0, noise_sd=0.5):
-    """One window with an anomaly, and where that begins."""
+    """Injects an anomaly into one window, and returns the window and the anomalous positions."""
     values, mask = inject(np.asarray(window)[None], kind, severity, duration, noise_sd, np.random.default_rng(seed))
     assert values.dtype == np.float32 and mask.dtype == bool and values.shape == mask.shape == (1, len(window))
     return values[0], np.flatnonzero(mask[0])
@@ -164,7 +164,7 @@ def test_what_is_refused(refused):
     for severity in (-1, np.nan, np.inf):
         with refused(f"severity={severity}"):
             inject(waves(), "ramp", severity, 25, 0.1, rng)
-    with refused("num_ranges=4", "100 samples", "110 samples or more"):
+    with refused("num_ranges=4", "100 samples", "at least 110 samples"):
         inject_into_trace(np.zeros(100), "ramp", 1, 20, 0.1, num_ranges=4, gap=6, rng=rng)
     with refused("num_ranges=0"):
         inject_into_trace(np.zeros(100), "ramp", 1, 20, 0.1, num_ranges=0, gap=6, rng=rng)

@@ -1,4 +1,4 @@
-"""Each detector finds planted anomalies, beside the degenerate scores that find none."""
+"""Each detector finds injected anomalies, and degenerate scores find none."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ DETECTORS = {
     "moving deviation": lambda seed=0: MovingDeviation(width=20),
 }
 SEEDED = ("isolation forest", "dense autoencoder", "convolutional autoencoder")
-MUST_SEE = {  # what each was made for; a window that stands still is no news to a network that knows only short stretches
+MUST_SEE = {  # anomalies that each detector should find; a constant window is not anomalous for a network with a short receptive field
     "limit check": ["spike", "noisy", "shifted"],
     "PCA residual": ["stuck", "noisy", "spike"],
     "nearest neighbours": ["stuck", "noisy", "shifted"],
@@ -82,7 +82,7 @@ ANOMALIES = {
 
 @pytest.fixture(scope="module", params=DETECTORS)
 def fitted(request):
-    """The name of a detector, and one that learnt 400 nominal windows."""
+    """The name of a detector, and the detector fitted to 400 nominal windows."""
     return request.param, DETECTORS[request.param]().fit(waves(400, 0))
 
 
@@ -156,7 +156,7 @@ def test_controls_by_hand():
     assert MovingDeviation().score(random) == pytest.approx(stretches.std(axis=2).max(axis=1))
 
 
-def test_random_score_owns_its_draws():
+def test_random_scores_depend_on_the_seed_only():
     detector, again = RandomScore(3), RandomScore(3)
     first, second = detector.fit(waves(5, 0)).score(waves(200, 0)), detector.score(waves(200, 0))
     assert (first == again.score(waves(200, 1))).all() and (first != second).all()

@@ -1,4 +1,4 @@
-"""The experiment's room: what is counted, on what, and that arms meet the same real side."""
+"""The evaluation of arms: the counted quantities, and the same real telemetry for all arms."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ WINDOW = 300
 
 
 class Largest:
-    """Scores a window by its largest value: every rate can be worked by hand."""
+    """Scores a window by its maximum, so that all rates can be computed by hand."""
 
     def fit(self, windows):
         return self

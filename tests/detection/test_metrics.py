@@ -1,4 +1,4 @@
-"""Thresholds, rates and areas against small cases by hand, closed forms and a second implementation of the volume."""
+"""Thresholds, rates and areas, compared with small cases by hand, closed forms and a direct implementation of VUS-PR."""
 
 import math
 

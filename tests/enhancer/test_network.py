@@ -1,4 +1,4 @@
-"""Network one: the paper's shape, known maps learnt to known errors, every draw owned."""
+"""The enhancing network: the paper's architecture, learning of known maps to known errors, and reproducible random numbers."""
 
 import keras
 import numpy as np
@@ -84,7 +84,7 @@ def test_known_linear_map_is_learnt_to_a_known_error():
     history = fit_windows(model, source, target, 15, 50, seed=0, validation=(held_out, noisy), verbose=0)
     enhanced = enhance(model, held_out)
     error = np.mean((enhanced - noisy) ** 2)
-    assert untrained > np.var(clean) > 5 * noise_sd**2  # there is something to learn
+    assert untrained > np.var(clean) > 5 * noise_sd**2  # the untrained error is far above the noise
     assert error == pytest.approx(np.mean((noisy - clean) ** 2), rel=0.1)
     assert np.mean((enhanced - clean) ** 2) < 0.1 * noise_sd**2  # the noise is averaged away, not learnt
     assert history["val_loss"].shape == history["loss"].shape == (15,)
@@ -126,7 +126,7 @@ def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
     assert len({tuple(order) for order in orders}) == 3 and list(range(12)) not in orders.tolist()
 
 
-def test_every_draw_is_owned():
+def test_all_random_numbers_depend_on_the_seeds_only():
     def run(global_seed, weights_seed, order_seed):
         keras.utils.set_random_seed(global_seed)  # must not matter
         model = small(weights_seed)

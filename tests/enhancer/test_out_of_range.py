@@ -1,4 +1,4 @@
-"""The out-of-range score on points worked by hand, and on degraded modes whose true error is known."""
+"""The out-of-range score for points computed by hand, and for degraded modes with known errors."""
 
 import functools
 
@@ -120,7 +120,7 @@ def test_many_windows_are_scored_in_parts_and_remembered_up_to_a_number(fitted, 
     np.testing.assert_allclose(fitted.score(windows), whole)
     assert fitted.score(windows[:0]).shape == (0,)
     monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._MAX_KEPT", 100)
-    thinned = OutOfRange().fit(training).score(windows)  # of what is remembered, the nearest can only be further
+    thinned = OutOfRange().fit(training).score(windows)  # with fewer stored windows, the nearest can only be further away
     assert np.all(thinned >= whole - 1e-9) and np.mean(thinned) < 1.1 * np.mean(whole)
 
 

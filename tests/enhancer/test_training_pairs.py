@@ -1,4 +1,4 @@
-"""Pairs of windows: places are counted over the parts of a series, and a simulator that is set to a window says how."""
+"""Training pairs: indices of window starts over the parts of a series, and simulators that are fitted to each window."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def part(begin, stop, interval_s=1.0):
 PARTS = [part(0, 10), part(20, 23), part(30, 35), part(50, 54)]  # windows of 4 begin at 0..6, nowhere, 30..31, 50
 
 
-def test_places_are_counted_over_the_parts():
+def test_window_starts_are_counted_over_all_parts():
     assert num_window_starts(PARTS, 4) == 7 + 0 + 2 + 1
     windows, time_s = cut_windows_from_parts(PARTS, np.arange(10), 4)
     begins = [0, 1, 2, 3, 4, 5, 6, 30, 31, 50]
@@ -40,7 +40,7 @@ def test_places_are_counted_over_the_parts():
     assert windows.dtype == np.float32
 
 
-def test_places_may_come_in_any_order_and_twice():
+def test_window_starts_may_be_unsorted_and_repeated():
     windows, time_s = cut_windows_from_parts(PARTS, np.array([9, 0, 7, 9]), 4)
     np.testing.assert_array_equal(windows[:, 0], [50, 0, 30, 50])
     np.testing.assert_array_equal(time_s, [50, 0, 30, 50])
@@ -52,12 +52,12 @@ def test_times_are_in_seconds_on_the_clock_of_the_series():
 
 
 @pytest.mark.parametrize("places", [[-1], [10], [0, 99]])
-def test_places_where_no_whole_window_begins_are_refused(refused, places):
+def test_window_starts_out_of_range_are_refused(refused, places):
     with refused("before 10"):
         cut_windows_from_parts(PARTS, np.array(places), 4)
 
 
-def test_no_place_in_parts_shorter_than_a_window(refused):
+def test_parts_shorter_than_a_window_have_no_window_starts(refused):
     assert (
         num_window_starts(PARTS, 11) == 0
         and evenly_spaced_starts(PARTS, 11, 5).size == 0
@@ -69,7 +69,7 @@ def test_no_place_in_parts_shorter_than_a_window(refused):
         random_window_starts([], 11, 5, np.random.default_rng(0))
 
 
-def test_random_places_are_everywhere_alike():
+def test_random_window_starts_are_uniform():
     places = random_window_starts(PARTS, 4, 20_000, np.random.default_rng(3))
     counts = np.bincount(places, minlength=10)
     assert len(counts) == 10 and np.abs(counts - 2_000).max() < 5 * np.sqrt(20_000 * 0.1 * 0.9)
@@ -77,7 +77,7 @@ def test_random_places_are_everywhere_alike():
 
 
 @pytest.mark.parametrize("number", [1, 2, 4, 9, 10, 50])
-def test_even_places_are_spread_in_the_order_of_time_and_none_twice(number):
+def test_evenly_spaced_starts_are_sorted_and_distinct(number):
     places = evenly_spaced_starts(PARTS, 4, number)
     assert len(places) == min(number, 10) and (np.diff(places) > 0).all() and places[0] == 0
     assert number == 1 or places[-1] == 9
@@ -145,7 +145,7 @@ def test_shift_and_gain_are_those_of_least_squares():
         np.testing.assert_allclose([shift, gain], expected, rtol=1e-5)
 
 
-def test_windows_that_do_not_follow_the_simulator_are_left_out():
+def test_flat_windows_are_dropped():
     moving, still = COARSE(np.arange(300.0)), np.zeros(300)
     series = Telemetry(np.concatenate([moving, still, 0.5 * MIN_GAIN * moving, moving]).astype(np.float32))
     pairs = cut_pairs([series], COARSE, np.array([0, 300, 600, 900]), 300, follow=True)

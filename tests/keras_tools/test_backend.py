@@ -1,4 +1,4 @@
-"""How TensorFlow starts: the settings, the user's own ones, and what is written to the terminal meanwhile."""
+"""The start of TensorFlow: default settings, settings of the user, and the output on the terminal."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ STATE = "from tensorflow.python.util import _pywrap_util_port as port\nprint(por
 
 
 def run(code, **environment):
-    """Runs code in a process of its own whose environment holds none of the settings but those that are given."""
+    """Runs code in a separate process, whose environment contains only the given settings."""
     ours = ("TF_", "ONEDNN_", "DNNL_", "KERAS_", "MALLOC_", "GLIBC_TUNABLES")
     clean = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
     return subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=clean | environment, capture_output=True, text=True)
@@ -55,7 +55,7 @@ def test_another_backend_of_keras_is_refused_in_one_line():
 
 
 def test_keras_that_was_imported_with_another_backend_is_refused(tmp_path):
-    """Its other backends need packages that are not here, so a stand-in for Keras says that it has one."""
+    """Other backends need packages that are not installed, so a stub of Keras reports another backend."""
     (tmp_path / "keras.py").write_text("class backend:\n    def backend():\n        return 'torch'\n")
     code = "import keras\nfrom enhsim_tf.common.errors import InputError\ntry:\n    import enhsim_tf.keras_tools.backend\nexcept InputError as error:\n    print(error)"
     ended = run(code, PYTHONPATH=str(tmp_path))

@@ -19,13 +19,13 @@ def windows(number=80):
 
 @pytest.fixture(params=[1, 7, 13])
 def rows_in_a_block(request, monkeypatch):
-    """Blocks of so many rows of the widest kernel; 40 rows are no multiple of any."""
+    """Number of rows in a block of the widest kernel, none of which divides its 40 rows."""
     monkeypatch.setattr(blockwise_training, "BLOCK_BYTES", 4 * UNITS * request.param)
     return request.param
 
 
 def trained_plainly(network, epochs, batch_size, seed, rate, loss="mean_squared_error"):
-    """What Keras makes of the same windows in the same order."""
+    """Trains with Keras on the same windows in the same order."""
     source, target = windows()
     network.compile(keras.optimizers.Adam(rate), loss=loss)
     rng = np.random.default_rng(seed)

@@ -29,7 +29,7 @@ def by_keras(rows, kernel, bias, stride):
     return rows, kernel, bias, lambda: maximum(convolution(rows[:, :, None]))
 
 
-def by_us(rows, kernel, bias, stride):
+def by_fast_path(rows, kernel, bias, stride):
     rows, kernel, bias = tf.constant(rows), tf.constant(kernel), tf.constant(bias)
     return rows, kernel, bias, lambda: convolution_maximum(rows, kernel, bias, stride)
 
@@ -47,7 +47,7 @@ def compare(rows, kernel, bias, stride, seed=0, atol=2e-5):
     rows, kernel, bias = (np.asarray(array, np.float32) for array in (rows, kernel, bias))
     upstream = np.random.default_rng(seed).integers(-4, 5, (len(rows), len(bias))).astype(np.float32)
     expected = values_and_gradients(by_keras(rows, kernel, bias, stride), upstream)
-    computed = values_and_gradients(by_us(rows, kernel, bias, stride), upstream)
+    computed = values_and_gradients(by_fast_path(rows, kernel, bias, stride), upstream)
     for name, mine, theirs in zip(("outputs", "to rows", "to kernel", "to bias"), computed, expected, strict=True):
         mine = mine.reshape(theirs.shape)
         np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=atol, err_msg=name)
@@ -57,9 +57,9 @@ def compare(rows, kernel, bias, stride, seed=0, atol=2e-5):
 def test_by_hand():
     # frames [1 2], [0 3], [-1 -9] times the kernel [1 1]: 3, 3, -10, so two winners share the gradient
     rows, kernel, bias = np.array([[1, 2, 0, 3, -1, -9]]), np.array([[1], [1]]), np.array([0.5])
-    *_, compute = by_us(*(np.asarray(array, np.float32) for array in (rows, kernel, bias)), 2)
+    *_, compute = by_fast_path(*(np.asarray(array, np.float32) for array in (rows, kernel, bias)), 2)
     assert compute().numpy().tolist() == [[3.5]]
-    made = by_us(*(np.asarray(array, np.float32) for array in (rows, kernel, bias)), 2)
+    made = by_fast_path(*(np.asarray(array, np.float32) for array in (rows, kernel, bias)), 2)
     _, to_rows, to_kernel, to_bias = values_and_gradients(made, np.float32([[2]]))
     assert to_rows.tolist() == [[1, 1, 1, 1, 0, 0]]
     assert to_kernel.tolist() == [[1 * 1 + 1 * 0], [1 * 2 + 1 * 3]] and to_bias.tolist() == [2]
@@ -114,6 +114,6 @@ def test_the_same_within_a_traced_function():
         return outputs, tf.gradients(outputs, [rows, kernel, bias])
 
     outputs, gradients = traced(rows, kernel, bias)
-    expected = values_and_gradients(by_us(rows, kernel, bias, 4), np.ones((3, 4), np.float32))
+    expected = values_and_gradients(by_fast_path(rows, kernel, bias, 4), np.ones((3, 4), np.float32))
     for mine, theirs in zip((outputs, *gradients), expected, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-5, atol=1e-6)

@@ -1,4 +1,4 @@
-"""What is equal to the bit and what to rounding: the same command here twice, and on what computes as another processor does."""
+"""Reproducibility: bitwise on the same machine, and up to rounding with the instructions of another processor."""
 
 import os
 import platform
@@ -36,7 +36,7 @@ def model(tmp_path_factory):
 
 
 def generated(model, out, **environment):
-    """A small data set, made by the command in a process of its own: its bytes and its table."""
+    """Generates a small data set with the command in a separate process, and returns its bytes and its table."""
     command = [sys.executable, "-m", "enhsim_tf", "generate", model, "--windows", "120", "--scenario", "dropout:0.7", "--workers", "1"]
     subprocess.run([*command, "--seed", "4", "--out", out], cwd=ROOT, env=os.environ | environment, check=True, capture_output=True)
     (shard,) = out.glob("shard-*.parquet")

@@ -1,4 +1,4 @@
-"""The second pair of networks: shapes, what the judge can see, what the generator can fill, saving, and learning."""
+"""The convolutional GAN: shapes, the discriminator's statistics, the rank of the generated windows, saving and training."""
 
 import keras
 import numpy as np
@@ -34,7 +34,7 @@ def test_same_seed_same_noise(gan):
         np.testing.assert_array_equal(np.asarray(mine), np.asarray(theirs))
 
 
-def test_every_sample_has_a_draw_of_its_own(gan):
+def test_every_sample_has_its_own_random_input(gan):
     # 600 windows from a 16-element latent vector fill at most 16 dimensions before a non-linearity; these fill most of 120
     windows = gan.generate(600, seed=3)
     assert fidelity.effective_rank(windows) > 60
@@ -64,12 +64,12 @@ def test_networks_load_in_safe_mode(gan, tmp_path):
 
 
 def seen(discriminator):
-    """What the discriminator concatenates before it judges."""
+    """Features that the discriminator concatenates before its Dense layers."""
     return keras.Model(discriminator.input, discriminator.get_layer("seen").output)
 
 
 def statistics(rows):
-    """The first statistics, by NumPy."""
+    """The first statistics, computed with NumPy."""
     scale = np.sqrt(np.mean(rows**2, axis=1, keepdims=True))
     unit = rows / scale
     columns = [
@@ -89,7 +89,7 @@ def statistics(rows):
     return np.stack(columns, axis=1)
 
 
-def test_the_judge_sees_the_statistics_as_far_as_real_windows_vary_in_them():
+def test_the_discriminator_standardises_statistics_by_their_variation_over_real_windows():
     rng = np.random.default_rng(1)
     real, rows = rng.normal(0.2, 0.7, (200, 400)), rng.normal(0.25, 0.8, (5, 400))
     found = np.asarray(seen(build_statistics_discriminator(real, filters=8))(rows[:, :, None].astype(np.float32)))
@@ -128,7 +128,7 @@ def test_learns_the_scale_and_the_correlation_of_coloured_noise():
     assert fidelity.effective_rank(after) > 0.6 * fidelity.effective_rank(real[:300])
 
 
-def test_the_average_takes_the_place_of_the_last_weights():
+def test_the_weight_average_replaces_the_last_weights():
     noise = np.random.default_rng(0).normal(size=(40, 60)).astype(np.float32)
 
     def trained(averaging):

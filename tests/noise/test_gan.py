@@ -1,4 +1,4 @@
-"""Network two: who moves in which step, what is recorded, and that every draw is owned."""
+"""The GAN: which weights change in which step, the recorded history, and reproducible random numbers."""
 
 import inspect
 
@@ -23,7 +23,7 @@ def small(cls=NoiseGAN, seed=0, width=20, stride=4, dropout=0.0, **arguments):
 
 
 def fit(gan, num_iterations=6, windows=NOISE, compiled=False, **arguments):
-    """Trains for a few steps; to compile them takes longer than to take them."""
+    """Trains for a few steps, by default without compilation, which would take longer than the steps."""
     if not compiled:
         gan._step = gan.train_step
     return gan.fit(windows, num_iterations, **{"record_every": 3, "verbose": False, **arguments})
@@ -90,11 +90,11 @@ def test_default_networks_and_counts_are_the_paper_s():
     assert gan.generate(2, seed=0).shape == (2, 500)
 
 
-# who moves
+# which weights change
 
 
 class DiscriminatorStandsStill(NoiseGAN):
-    """Leaves the generator's part of the step alone."""
+    """Runs only the generator's part of the step."""
 
     def _update_discriminator(self, rows, tags):
         pass
@@ -156,7 +156,7 @@ def test_generator_step_makes_generated_rows_judged_real():
 
 @pytest.mark.filterwarnings("default::UserWarning")
 def test_the_trap_of_compiling_freezing_and_stacking():
-    """What the author's loop, right under Keras 2, does under Keras 3: the discriminator never learns."""
+    """The author's training loop is correct in Keras 2, but in Keras 3 the discriminator never learns."""
     generator, discriminator = build_generator(WINDOW, LATENT, 8), build_discriminator(WINDOW, 12, narrow_units=5)
     discriminator.compile("adam", "binary_crossentropy")
     discriminator.trainable = False  # meant for the stack alone
@@ -176,7 +176,7 @@ def test_the_trap_of_compiling_freezing_and_stacking():
 
 
 class Recording(NoiseGAN):
-    """Keeps what the discriminator is taught instead of teaching it."""
+    """Stores the training data of the discriminator instead of training it."""
 
     def _update_discriminator(self, rows, tags):
         self.taught = [*getattr(self, "taught", []), (np.asarray(rows)[:, :, 0], np.asarray(tags).ravel())]
@@ -254,7 +254,7 @@ def test_training_sees_a_discriminator_of_another_make(convolution):
 
 
 class PlainPath(NoiseGAN):
-    """Judges by the Keras layers alone."""
+    """Uses only the Keras layers of the discriminator."""
 
     def _discriminate(self, rows):
         return self.discriminator(rows, training=True)
@@ -285,7 +285,7 @@ def test_fast_path_and_plain_path_give_equal_training_curves(monkeypatch):
 
 
 def judging(probability_of_positive, probability_of_negative):
-    """A discriminator that knows two answers: one for rows whose first sample is positive, one for the others."""
+    """A discriminator with two outputs: one for rows whose first sample is positive, the other for all other rows."""
     low, high = (np.log(p / (1 - p)) for p in (probability_of_negative, probability_of_positive))
     model = keras.Sequential(
         [
@@ -302,7 +302,7 @@ def judging(probability_of_positive, probability_of_negative):
 
 
 def generating(value):
-    """A generator that answers one value."""
+    """A generator with a constant output."""
     generator = build_generator(WINDOW, LATENT, 8)
     generator.layers[2].set_weights([np.zeros((8, WINDOW)), np.full(WINDOW, np.arctanh(value))])
     return generator
@@ -364,11 +364,11 @@ def test_recording_more_often_does_not_change_what_is_trained():
     assert not any(moved(weights_of(often.combined), seldom.combined))
 
 
-# owned draws, variants, output
+# reproducible random numbers, variants, output
 
 
 @pytest.mark.parametrize(("dropout", "compiled"), [(0.0, False), (0.3, True)])
-def test_every_draw_is_owned(dropout, compiled):
+def test_all_random_numbers_depend_on_the_seed_only(dropout, compiled):
     def run(global_seed, seed):
         keras.utils.set_random_seed(global_seed)  # must not matter
         gan = small(seed=seed, dropout=dropout)

@@ -1,4 +1,4 @@
-"""Latent draws: the same distribution in a training step and in generating, and series without seams."""
+"""Latent inputs: the same distribution in training and in generation, and series without seams."""
 
 import keras
 import numpy as np
@@ -74,7 +74,7 @@ def test_rows_do_not_depend_on_how_many_are_drawn():
 
 
 @pytest.mark.parametrize("stretch", [40, 41, 99, 250])
-def test_stretches_join_as_one_piece(stretch, monkeypatch):
+def test_chunks_join_without_seams(stretch, monkeypatch):
     generator = convolution()
     latent = Latent(generator, 40, slow_samples=SLOW)
     whole = np.asarray(generator(next(latent.series_chunks(250, np.random.default_rng(2)))))[0, :, 0]

@@ -1,4 +1,4 @@
-"""What a moving average leaves, against its closed forms."""
+"""Noise extraction and the classical noise models, compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, G
 
 
 def gain(width, frequency):
-    """Of a centred moving average, for a sine of `frequency` cycles a sample."""
+    """Gain of a centred moving average for a sine of `frequency` cycles per sample."""
     return np.sin(np.pi * width * frequency) / (width * np.sin(np.pi * frequency))
 
 
@@ -73,7 +73,7 @@ def test_gaussian_noise_recovers_the_standard_deviation():
     assert np.mean(noise[:, 1:] * noise[:, :-1]) / 0.09 == pytest.approx(0, abs=5 / np.sqrt(noise.size))
 
 
-def test_gaussian_noise_owns_its_draws():
+def test_gaussian_noise_depends_on_the_seed_only():
     noise = GaussianNoise(0.1, 40)
     np.random.seed(0)  # noqa: NPY002 - the global state must not matter
     first = noise.generate(3, seed=5)
@@ -91,7 +91,7 @@ def autocorrelation_of_second_order(first, second, max_lag):
 
 
 def second_order(first, second, number, samples, seed):
-    """Windows of an AR(2) with innovations of sd 1, sample by sample, after 500 that are thrown away."""
+    """Windows of an AR(2) process with innovations of standard deviation 1, after a burn-in of 500 samples."""
     draws = np.random.default_rng(seed).standard_normal((number, samples + 500))
     values = np.zeros_like(draws)
     for t in range(2, samples + 500):
@@ -192,7 +192,7 @@ def test_blocks_that_are_refused(refused, block):
 
 
 @pytest.mark.parametrize("fit", [GaussianNoise.fit, GaussianAutoregression.fit, BlockBootstrap.fit])
-def test_surrogates_own_their_draws(fit):
+def test_surrogates_depend_on_the_seed_only(fit):
     surrogate = fit(np.random.default_rng(0).normal(0, 1, (40, 60)))
     first = surrogate.generate(3, seed=5)
     assert (first == surrogate.generate(3, seed=5)).all() and (first != surrogate.generate(3, seed=6)).any()

@@ -1,4 +1,4 @@
-"""Each measure against a closed form or windows worked by hand."""
+"""Each measure compared with a closed form, or with values computed by hand."""
 
 import numpy as np
 import pytest

@@ -215,12 +215,12 @@ def test_the_unit_and_the_offset_do_not_matter():
         assert again_row.num_resplits == 3
 
 
-def test_dear_measures_say_that_they_took_fewer_resplits(judged):
+def test_expensive_measures_report_fewer_resplits(judged):
     found = {row.measure: row.num_resplits for row in judged["real"].rows}
     assert found["geodesic distance"] == 100 and found["classifier AUC, boosted trees"] == 20
 
 
-def test_judging_in_one_call_is_the_same():
+def test_evaluation_in_one_call_is_the_same():
     real, again, generated = (process(seed, 25, 60) for seed in (1, 2, 3))
     assert repr(evaluate(generated, real, again, 3, seed=5)) == repr(RealFloor(real, again, 3, seed=5).evaluate(generated))
 
@@ -230,7 +230,7 @@ def test_a_floor_can_be_kept_for_other_processes():
     assert repr(pickle.loads(pickle.dumps(floor)).evaluate(generated)) == repr(floor.evaluate(generated))
 
 
-def test_windows_that_cannot_be_judged_are_refused(refused):
+def test_windows_that_cannot_be_compared_are_refused(refused):
     real, again = process(1, 30, 60), process(2, 30, 60)
     floor = RealFloor(real, again, 2, measures=MEASURES[:1])
     with refused("at least 20 real windows"):

@@ -1,4 +1,4 @@
-"""Tests that tell two samples apart, against definitions written out and samples that are the same."""
+"""Two-sample tests, compared with direct implementations of their definitions, and applied to samples of one distribution."""
 
 import numpy as np
 import pytest
