@@ -15,7 +15,10 @@ RESULTS = ("results.json", "results_avx2.json")
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """Parses the options of the command."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside comparisons and the machine's limits.")
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description="Speed of enhsim_tf, compared with other implementations and with the limits of the machine.",
+    )
     parser.add_argument("--quick", action="store_true", help="tiny networks, few repetitions: shows that everything runs, measures nothing")
     parser.add_argument("--only", choices=ROWS, action="append", help="measure these rows alone; others stay as they are in the file")
     parser.add_argument(

@@ -1,9 +1,10 @@
 """Speed of large data sets: `python -m benchmarks.fleet MODEL_DIR`.
 
-Windows a second of `local` with one and two workers and of `ray` with two, each as a whole (processes starting included)
-and from the first shard on; bytes a window in the files; the memory of the driver and of its largest worker; where a
-worker's time goes; and how many shards a second a driver could hand out. The rows differ in nothing but who works: their
-checksums are compared. `benchmarks.sizing` draws and projects from the file this writes.
+The benchmark measures the engine `local` with one and two workers, and the engine `ray` with two workers. For each, it reports
+the number of windows in a second, both for the whole run (including the start of processes) and after the first shards, the
+size of the files, and the memory of the driver and of the largest worker. It also reports how a worker's time is distributed,
+and how many shards a driver could distribute in a second. All rows generate the same data set, which is verified by checksums.
+`benchmarks.sizing` draws the results and projects them to clusters.
 """
 
 import argparse

@@ -252,11 +252,11 @@ def bar_of_reproduction(about: dict) -> float:
 
 
 def reproduction(rows: list[dict], bar: float = 0.33) -> Iterator[dict]:
-    """The training of one full reproduction, put together from the steps measured above: a whole textbook run takes too long.
+    """Estimates the training time of a full reproduction from the measured steps, because a full textbook run takes too long.
 
     Args:
-        rows: The rows measured.
-        bar: What the ratio has to stay below (`bar_of_reproduction`).
+        rows: The measured rows.
+        bar: Target for the ratio, see `bar_of_reproduction`.
     """
     found = {(row["work"], row.get("comparison")): row for row in rows}
     enhancing, judging = found.get(("enhancer step", "plain fit"), {}), found.get(("GAN iteration", "textbook loop"), {})

@@ -1,6 +1,6 @@
 """Estimates the cluster size for a data set from the results of `benchmarks.fleet`: `python -m benchmarks.sizing`.
 
-It fills the tables of docs/sizing.md and draws `figures/fleet_sizing`; nothing is measured here.
+The command fills the tables of docs/sizing.md and draws `figures/fleet_sizing`. It does not measure anything.
 """
 
 import argparse
@@ -35,16 +35,16 @@ def medians(found: dict) -> dict[str, dict[str, float]]:
 def projected(found: dict, cores: int, num_windows: int = WINDOWS) -> dict[str, float]:
     """Projects the cost of a data set to a number of cores like the measured ones, with one worker on each core.
 
-    A core gives what one of two workers gave side by side, once running. Nothing else is thought to slow it down; what
-    would have to keep up is said beside it.
+    The projection assumes that each core reaches the rate of one of two concurrent workers after start-up, and that nothing else
+    limits the rate. The result includes the rates that storage and the driver would have to sustain.
 
     Args:
-        found: What `benchmarks.fleet` wrote.
-        cores: Number of them.
-        num_windows: Size of the data set.
+        found: Results of `benchmarks.fleet`.
+        cores: Number of cores.
+        num_windows: Number of windows in the data set.
 
     Returns:
-        Hours, core-hours, terabytes, and per second: windows, megabytes to be written and shards to be recorded.
+        Hours, core-hours, terabytes, and, for each second, the windows, the megabytes to write and the shards to record.
     """
     two = medians(found)[TWO]
     rate = two["windows_a_second_once_running"] / 2 * cores

@@ -221,11 +221,11 @@ def align_to_enhanced(pairs: Pairs, coarse: np.ndarray, enhanced: np.ndarray) ->
     return Pairs(coarse[best], pairs.target, *_least_squares(enhanced[best], pairs.target), pairs.time_s)
 
 
-def ridge(learnt: Pairs, pairs: Pairs) -> np.ndarray:
+def ridge(training: Pairs, pairs: Pairs) -> np.ndarray:
     """Predicts telemetry windows by ridge regression on coarse windows, the linear baseline for the enhancer.
 
     Args:
-        learnt: Training pairs. Flat windows are dropped, see `Pairs.drop_flat`.
+        training: Training pairs. Flat windows are dropped, see `Pairs.drop_flat`.
         pairs: Pairs whose telemetry is predicted, from their coarse windows, shifts and gains.
 
     Returns:
@@ -233,8 +233,8 @@ def ridge(learnt: Pairs, pairs: Pairs) -> np.ndarray:
     """
     from sklearn.linear_model import Ridge
 
-    learnt = learnt.drop_flat()
-    predicted = Ridge().fit(learnt.coarse, learnt.target_in_unit).predict(pairs.coarse)
+    training = training.drop_flat()
+    predicted = Ridge().fit(training.coarse, training.target_in_unit).predict(pairs.coarse)
     return apply_shift_and_gain(predicted, pairs.shift, pairs.gain)
 
 

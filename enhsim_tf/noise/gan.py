@@ -114,8 +114,8 @@ class NoiseGAN:
 
     def _update_generator(self) -> None:
         with tf.GradientTape() as tape:
-            judged = self._discriminate(self.generator(self._draw_latent(self.seeds), training=True))
-            loss = self.loss(self._tags(REAL), judged)
+            predicted = self._discriminate(self.generator(self._draw_latent(self.seeds), training=True))
+            loss = self.loss(self._tags(REAL), predicted)
         weights = self.generator.trainable_variables
         self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
 
@@ -127,10 +127,10 @@ class NoiseGAN:
         (first, *between), rest = self.discriminator.layers[: number - 1], self.discriminator.layers[number:]
         kernel, bias = (tf.convert_to_tensor(weight) for weight in (first.kernel, first.bias))
         dropped = {"rate": between[0].rate, "seed": between[0].seed_generator.next()} if between and between[0].rate else {}
-        judged = convolution_maximum(tf.squeeze(rows, 2), tf.squeeze(kernel, 1), bias, first.strides[0], **dropped)
+        predicted = convolution_maximum(tf.squeeze(rows, 2), tf.squeeze(kernel, 1), bias, first.strides[0], **dropped)
         for layer in rest:
-            judged = layer(judged, training=True) if isinstance(layer, keras.layers.Dropout) else layer(judged)
-        return judged
+            predicted = layer(predicted, training=True) if isinstance(layer, keras.layers.Dropout) else layer(predicted)
+        return predicted
 
     def _draw_rows(self, noise: tf.Tensor, seeds: keras.random.SeedGenerator) -> tf.Tensor:
         return tf.gather(noise, keras.random.randint((self.batch_size,), 0, noise.shape[0], seed=seeds))
@@ -189,9 +189,9 @@ class NoiseGAN:
         generated = self.generator(self._draw_latent(self.record_seeds), training=False)
         record = {}
         for kind, rows, tag in (("real", real, REAL), ("generated", generated, GENERATED)):
-            judged = self.discriminator(rows, training=False)
-            record[f"accuracy_{kind}"] = float(np.mean((np.asarray(judged) > 0.5) == (tag == REAL)))
-            record[f"loss_{kind}"] = float(self.loss(self._tags(tag), judged))
+            predicted = self.discriminator(rows, training=False)
+            record[f"accuracy_{kind}"] = float(np.mean((np.asarray(predicted) > 0.5) == (tag == REAL)))
+            record[f"loss_{kind}"] = float(self.loss(self._tags(tag), predicted))
         return record
 
     def generate(self, num_windows: int, seed: int | np.random.Generator, batch_size: int = 1_024) -> np.ndarray:

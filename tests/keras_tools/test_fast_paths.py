@@ -7,7 +7,7 @@ import pytest
 import tensorflow as tf
 
 from enhsim_tf.enhancer.network import enhance
-from enhsim_tf.keras_tools import convolution_maximum as room
+from enhsim_tf.keras_tools import convolution_maximum as fast_path
 from enhsim_tf.keras_tools.convolution_maximum import convolution_maximum, num_layers_computed
 from enhsim_tf.keras_tools.fused_adam import fused_adam
 from enhsim_tf.keras_tools.training import fit_windows
@@ -76,7 +76,7 @@ def test_gradients_with_dropped_products(rate):
     given, seed = arrays(23), tf.constant([3, 4])
     seeds = tf.unstack(tf.random.split(seed, 3))
     shapes = [tf.TensorShape((number, 11, FILTERS)) for number in (10, 10, 3)]
-    kept = tf.concat([room._kept(shape, rate, each) for shape, each in zip(shapes, seeds, strict=True)], axis=0)
+    kept = tf.concat([fast_path._kept(shape, rate, each) for shape, each in zip(shapes, seeds, strict=True)], axis=0)
     if rate == 0.95:
         assert not kept.numpy().any(axis=1).all()
     compare(
@@ -88,12 +88,12 @@ def test_gradients_with_dropped_products(rate):
 
 
 def test_dropped_products_are_drawn_independently_at_the_rate():
-    kept = room._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 2])).numpy()
+    kept = fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 2])).numpy()
     error = np.sqrt(0.3 * 0.7 / len(kept))
     assert abs(kept.mean() - 0.7) < 5 * error
     for lag in (1, 2, 8):  # neighbours come out of one word
         assert abs(np.mean(kept[lag:] & kept[:-lag]) - 0.49) < 5 * np.sqrt(0.49 * 0.51 / len(kept)) * 2
-    assert not np.array_equal(kept, room._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 3])).numpy())
+    assert not np.array_equal(kept, fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 3])).numpy())
 
 
 def test_mean_under_dropout_is_that_of_the_keras_layers():

@@ -225,7 +225,7 @@ def test_training_drops_in_both_places_and_judging_in_none():
     gan, rows = small(dropout=0.3), rows_of(NOISE)
     convolution, _, _, narrow, _, last = gan.discriminator.layers
     narrow.set_weights([np.ones((12, 5)), np.zeros(5)])
-    assert np.ptp(gan._discriminate(tf.repeat(rows[:1], 64, axis=0))) > 0  # equal rows, judged differently
+    assert np.ptp(gan._discriminate(tf.repeat(rows[:1], 64, axis=0))) > 0  # equal rows with different outputs
     convolution.set_weights([np.zeros((20, 1, 12)), np.ones(12)])  # every product is 1: its maximum survives what is dropped
     last.set_weights([np.arange(5.0)[:, None] / 100, np.zeros(1)])
     judged = np.ravel(gan._discriminate(rows))

@@ -4,7 +4,7 @@ import keras
 import numpy as np
 import pytest
 
-from enhsim_tf.noise import latent as room
+from enhsim_tf.noise import latent as latent_module
 from enhsim_tf.noise.latent import Latent, standard_normal
 
 SLOW = (30.0, 200.0)
@@ -78,7 +78,7 @@ def test_chunks_join_without_seams(stretch, monkeypatch):
     generator = convolution()
     latent = Latent(generator, 40, slow_samples=SLOW)
     whole = np.asarray(generator(next(latent.series_chunks(250, np.random.default_rng(2)))))[0, :, 0]
-    monkeypatch.setattr(room, "_CHUNK_SAMPLES", stretch)
+    monkeypatch.setattr(latent_module, "_CHUNK_SAMPLES", stretch)
     parts = [np.asarray(generator(each))[0, :, 0] for each in latent.series_chunks(250, np.random.default_rng(2))]
     assert [len(part) for part in parts[:-1]] == [stretch] * (len(parts) - 1)
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-5)

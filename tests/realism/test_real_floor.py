@@ -30,7 +30,7 @@ def floor():
 
 
 @pytest.fixture(scope="module")
-def judged(floor):
+def reports(floor):
     """The rows of each control, made from windows that the floor has not seen."""
     real = process(3)
     return {"real": floor.evaluate(real)} | {
@@ -65,8 +65,8 @@ BLIND = {
 
 
 @pytest.mark.parametrize("control", SEEN_BY)
-def test_a_control_is_seen_by_those_that_can(judged, control):
-    rows = [row for row in judged[control].rows if row.measure in SEEN_BY[control]]
+def test_a_control_is_seen_by_those_that_can(reports, control):
+    rows = [row for row in reports[control].rows if row.measure in SEEN_BY[control]]
     assert {row.measure for row in rows} == SEEN_BY[control]
     assert {row.measure: row.ratio for row in rows if row.is_within or row.ratio < 2} == {}
     for row in rows:
@@ -75,36 +75,36 @@ def test_a_control_is_seen_by_those_that_can(judged, control):
 
 
 @pytest.mark.parametrize("control", BLIND)
-def test_a_control_is_not_seen_by_those_that_cannot(judged, control):
-    ratios = {measure: judged[control][measure].ratio for measure in BLIND[control]}
+def test_a_control_is_not_seen_by_those_that_cannot(reports, control):
+    ratios = {measure: reports[control][measure].ratio for measure in BLIND[control]}
     assert {measure: ratio for measure, ratio in ratios.items() if ratio > 2} == {}
 
 
-def test_controls_have_the_values_that_theory_or_the_published_practice_gives(judged):
+def test_controls_have_the_values_that_theory_or_the_published_practice_gives(reports):
     frequency = np.arange(1, 250) / 500
     of_the_filter = np.std(np.log(np.abs(1 - 0.7 * np.exp(-2j * np.pi * frequency)) ** 2))
-    assert judged["Gaussian of the same scale"]["geodesic distance"].value == pytest.approx(of_the_filter, rel=0.05)
-    assert judged["Gaussian of the same scale"]["autocorrelation distance"].value == pytest.approx(0.7, abs=0.03)
+    assert reports["Gaussian of the same scale"]["geodesic distance"].value == pytest.approx(of_the_filter, rel=0.05)
+    assert reports["Gaussian of the same scale"]["autocorrelation distance"].value == pytest.approx(0.7, abs=0.03)
     for measure in ("scale difference", "log scale distance"):
-        assert judged["real, 1.5 times as loud"][measure].value == pytest.approx(np.log(1.5), abs=0.06)
-    assert judged["real, 1.5 times as loud"]["tail ratio"].value == pytest.approx(1.5, rel=0.1)
-    assert judged["twenty windows memorised"]["density"].value == pytest.approx(1, abs=0.15)  # density alone looks fine
-    assert judged["twenty windows memorised"]["coverage"].value < 0.5
-    assert judged["twenty windows memorised"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 20
-    assert judged["sixteen linear dimensions"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 16.5
+        assert reports["real, 1.5 times as loud"][measure].value == pytest.approx(np.log(1.5), abs=0.06)
+    assert reports["real, 1.5 times as loud"]["tail ratio"].value == pytest.approx(1.5, rel=0.1)
+    assert reports["twenty windows memorised"]["density"].value == pytest.approx(1, abs=0.15)  # density alone looks fine
+    assert reports["twenty windows memorised"]["coverage"].value < 0.5
+    assert reports["twenty windows memorised"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 20
+    assert reports["sixteen linear dimensions"]["effective rank ratio"].value * fidelity.effective_rank(process(1)) < 16.5
 
 
-def test_verdicts(judged):
+def test_verdicts(reports):
     for control in SEEN_BY:
-        assert judged[control].verdict.startswith("distinguishable at n = 200 by ")
-        assert all(row.measure in judged[control].verdict for row in judged[control].rows if not row.is_within)
-        assert judged[control].worst.ratio == max(row.ratio for row in judged[control].rows) > 10
-    passed = dataclasses.replace(judged["real"], rows=tuple(row for row in judged["real"].rows if row.is_within))
+        assert reports[control].verdict.startswith("distinguishable at n = 200 by ")
+        assert all(row.measure in reports[control].verdict for row in reports[control].rows if not row.is_within)
+        assert reports[control].worst.ratio == max(row.ratio for row in reports[control].rows) > 10
+    passed = dataclasses.replace(reports["real"], rows=tuple(row for row in reports["real"].rows if row.is_within))
     assert passed.verdict == "indistinguishable at n = 200"
 
 
-def test_real_noise_is_within_its_floor(judged):
-    rows = judged["real"].rows
+def test_real_noise_is_within_its_floor(reports):
+    rows = reports["real"].rows
     assert [row.measure for row in rows] == NAMES
     assert max(row.ratio for row in rows) < 3
     assert sum(row.is_within for row in rows) >= len(rows) - 2  # each is outside once in twenty times
@@ -215,8 +215,8 @@ def test_the_unit_and_the_offset_do_not_matter():
         assert again_row.num_resplits == 3
 
 
-def test_expensive_measures_report_fewer_resplits(judged):
-    found = {row.measure: row.num_resplits for row in judged["real"].rows}
+def test_expensive_measures_report_fewer_resplits(reports):
+    found = {row.measure: row.num_resplits for row in reports["real"].rows}
     assert found["geodesic distance"] == 100 and found["classifier AUC, boosted trees"] == 20
 
 
