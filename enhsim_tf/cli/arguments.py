@@ -18,15 +18,7 @@ python -m enhsim_tf fit --help shows the options of fit; generate, verify and sc
 paper is a separate command: python -m enhsim_tf.reproduce.
 """
 SOURCE = "a .csv, .parquet or .npy file, the folder of a store, folder#channel, or influxdb://bucket/measurement/field?tag=value"
-DETECTORS = (
-    "limit-check",
-    "pca-residual",
-    "nearest-neighbours",
-    "isolation-forest",
-    "one-class-svm",
-    "dense-autoencoder",
-    "convolutional-autoencoder",
-)
+DETECTORS = tuple(map(option_name, registry.DETECTORS))
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 
 

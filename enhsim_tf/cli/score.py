@@ -14,7 +14,7 @@ def run_score(options: argparse.Namespace) -> int:
     Args:
         options: Parsed options of `score`.
     """
-    from enhsim_tf.detection import detectors
+    from enhsim_tf.detection.registry import DETECTORS, option_name
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
 
     detector = {option_name(name): name for name in DETECTORS}[options.detector]

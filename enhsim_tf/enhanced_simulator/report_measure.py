@@ -43,7 +43,7 @@ def report_on(
         The report.
     """
     window = simulator.window
-    places = even_places(held_out, window, _NUM_COMPARED)
+    places = evenly_spaced_starts(held_out, window, _NUM_COMPARED)
     pairs = cut_pairs(held_out, simulator.coarse, places, window, follow=True)  # aligned without the enhancer
     enhanced = simulator.follow(simulator.pairs(held_out, places))
     typical = _typical(enhanced, pairs.target)

@@ -15,7 +15,7 @@ from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network as enhancer_network
-from enhsim_tf.enhancer.training_pairs import Pairs, at_level, cut_pairs, random_places, set_by_shape
+from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs, random_window_starts
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.gan import NoiseGAN, num_overlapping
 from enhsim_tf.telemetry.parquet_store import write_windows
@@ -167,7 +167,7 @@ class EnhancedSimulator:
         """
         parts = check_parts(telemetry)
         check_counts(num_windows=(num_windows, 0))
-        pairs = self.pairs(parts, random_places(parts, self.window, num_windows, rng))
+        pairs = self.pairs(parts, random_window_starts(parts, self.window, num_windows, rng))
         return pairs.target - self.follow(pairs)
 
     def pairs(self, telemetry: Telemetry | Sequence[Telemetry], places: np.ndarray) -> Pairs:

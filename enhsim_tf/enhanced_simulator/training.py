@@ -16,9 +16,16 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhancer import network as enhancer_network
-from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, cut_parts, even_places, random_places, split_off
+from enhsim_tf.enhancer.training_pairs import (
+    Pairs,
+    cut_pairs,
+    cut_windows_from_parts,
+    evenly_spaced_starts,
+    random_window_starts,
+    split_end,
+)
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import EpochsDone, fit_windows
+from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
@@ -115,17 +122,19 @@ def train(
     by_enhancer = settings.extraction == "enhancer"
     averaged = [] if by_enhancer else _subtract_moving_average(parts, settings)  # before training, so that a wrong width fails early
     simulator = _build(create, parts, coarse, settings)
-    learnt, rest = split_off(parts, settings.held_out if by_enhancer else 0.0)
+    learnt, rest = split_end(parts, settings.held_out if by_enhancer else 0.0)
     _train_enhancer(simulator, learnt, settings, verbose, progress)
     if settings.follow:
-        seen = simulator.pairs(parts, even_places(parts, settings.window, _NUM_LEVELS)).clear()
+        seen = simulator.pairs(parts, evenly_spaced_starts(parts, settings.window, _NUM_LEVELS)).drop_flat()
         simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
     simulator.trained = _training_record(parts[0].name, len(values), settings)
     rng = np.random.default_rng([settings.seed, 1])
     if by_enhancer:
         noise_windows = simulator.residual_windows(rest, settings.num_windows, rng)
     else:
-        noise_windows, _ = cut_parts(averaged, random_places(averaged, settings.window, settings.num_windows, rng), settings.window)
+        noise_windows, _ = cut_windows_from_parts(
+            averaged, random_window_starts(averaged, settings.window, settings.num_windows, rng), settings.window
+        )
     simulator.noise = _train_noise(noise_windows, settings, verbose, progress)
     return simulator
 
@@ -145,7 +154,7 @@ def _train_enhancer(
     simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: TrainingSettings, verbose: int | str, progress: Progress
 ) -> None:
     """Trains the enhancer in one round, or with `follow` in several rounds with the windows aligned again in between."""
-    places = random_places(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
+    places = random_window_starts(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
     pairs = cut_pairs(parts, simulator.coarse, places, settings.window, settings.follow)
     show_bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
     rounds = min(_ROUNDS, settings.epochs) if settings.follow else 1
@@ -153,8 +162,8 @@ def _train_enhancer(
     report_epoch = progress.loop("enhancer, epoch", settings.epochs)
     for number, (begin, end) in enumerate(itertools.pairwise(ends)):
         pairs = simulator.align_to_enhanced(pairs) if number else pairs
-        pairs = pairs.clear() if settings.follow else pairs
-        callbacks = [EpochsDone(report_epoch.within(begin))]
+        pairs = pairs.drop_flat() if settings.follow else pairs
+        callbacks = [EpochProgress(report_epoch.within(begin))]
         _train_round(simulator, pairs, end - begin, settings.seed + number, settings.decay, callbacks, show_bars)
 
 

@@ -136,7 +136,7 @@ class OutOfRange:
             InputError: If the file was not written by `save`.
         """
         try:
-            kept = load_npz(path, _MOST_BYTES)
+            kept = load_npz(path, _MAX_FILE_BYTES)
             loaded = cls(float(kept["explained"]), float(kept["weight"]))
             for name in _FITTED:
                 setattr(loaded, f"_{name}", kept[name])

@@ -68,8 +68,8 @@ def test_the_error_agrees_with_an_independent_computation(fitted):
         times = held_out.offset_s + 10.0 * (begin + np.arange(64))
         coarse = np.stack([simulator.coarse(times + shift) for shift in np.linspace(-200, 200, 401)])
         design = [np.linalg.lstsq(np.stack([np.ones(64), each], 1), window, rcond=None)[0] for each in coarse]
-        at_level = np.stack([shift + gain * each for (shift, gain), each in zip(design, coarse, strict=True)])
-        moved.append(at_level[np.argmin(((at_level - window) ** 2).sum(axis=1))])
+        apply_shift_and_gain = np.stack([shift + gain * each for (shift, gain), each in zip(design, coarse, strict=True)])
+        moved.append(apply_shift_and_gain[np.argmin(((apply_shift_and_gain - window) ** 2).sum(axis=1))])
     errors = np.sqrt(np.mean((np.array(moved) - target) ** 2, axis=1)) / target.std(axis=1)
     assert report.nrmse["coarse"] == pytest.approx(np.median(errors), rel=0.02)
 
