@@ -48,7 +48,7 @@ def run_score(options: argparse.Namespace) -> int:
         scored = len(frame) - left
         tell(
             f"{printable(channel)}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector}, "
-            f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal ones"
+            f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal samples"
             + (f"; {counted(left, 'sample')} not scored, in parts shorter than a window" if left else "")
             + f"; in {paths[channel]}"
         )

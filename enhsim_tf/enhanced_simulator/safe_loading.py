@@ -85,21 +85,21 @@ def _description_of(archive: zipfile.ZipFile, size: int) -> dict[str, Any]:
     if any(member.compress_type != zipfile.ZIP_STORED or member.file_size != member.compress_size for member in members):
         raise ValueError("a compressed archive, which Keras does not write")
     if sum(member.file_size for member in members) > size:
-        raise ValueError("an archive whose files share their bytes")
+        raise ValueError("an archive with overlapping files")
     description = json.loads(archive.read("config.json"))
     description.pop("compile_config", None)  # settings of the training, which are not loaded
     num_layers = 0
     for part in _parts_of(description):
         module, kind = part.get("module"), part["class_name"]
         if not isinstance(kind, str) or kind not in _KINDS.get(module if isinstance(module, str) else None, ()):
-            raise ValueError(f"a part of the kind {str(module)[:40]}.{str(kind)[:40]}, of which no network of ours is made")
+            raise ValueError(f"an object of type {str(module)[:40]}.{str(kind)[:40]}, which this package does not use")
         if part.get("registered_name") not in (None, kind):
-            raise ValueError(f"a part registered as {str(part['registered_name'])[:40]!r}")
+            raise ValueError(f"an object registered as {str(part['registered_name'])[:40]!r}")
         if part.get("compile_config") is not None:
-            raise ValueError("a network inside another that is to be trained")
+            raise ValueError("a nested network with training settings")
         settings = part.get("config")
         if isinstance(settings, dict) and any(settings.get(name) is not None for name in _UNUSED):
-            raise ValueError(f"one of the settings {', '.join(_UNUSED)}")
+            raise ValueError(f"a layer with one of the settings {', '.join(_UNUSED)}")
         num_layers += module == "keras.layers" or str(module).startswith("keras.src.ops.")
     if num_layers > _MOST_LAYERS:
         raise ValueError(f"{num_layers:,} layers")
@@ -123,7 +123,7 @@ def _shape_of(part: dict[str, Any]) -> list[int]:
     """Returns the input shape of a layer without the batch axis."""
     shape = [size for size in part["build_config"]["input_shape"][1:] if size is not None]
     if not shape or any(type(size) is not int or size < 1 for size in shape):
-        raise ValueError("a layer that is built for no shape")
+        raise ValueError("a layer without a valid input shape")
     return shape
 
 
@@ -135,7 +135,7 @@ def _num_declared(part: dict[str, Any]) -> int:
     outputs = settings["units"] if part["class_name"] == "Dense" else settings["filters"]
     width = 1 if part["class_name"] == "Dense" else math.prod(settings["kernel_size"])
     if any(type(number) is not int or number < 1 for number in (outputs, width)) or settings.get("groups", 1) != 1:
-        raise ValueError("a layer of no size")
+        raise ValueError("a layer without a valid size")
     return inputs * width * outputs
 
 
@@ -150,7 +150,7 @@ def _num_weights(content: bytes) -> int:
         if isinstance(part, h5py.Dataset):
             num_bytes = math.prod(part.shape or (0,)) * part.dtype.itemsize
             if part.external or part.is_virtual or num_bytes > part.id.get_storage_size():
-                raise ValueError("weights that do not stand in the file in full")
+                raise ValueError("weights that are not stored in the file in full")
             num_values += num_bytes // 4
 
     with h5py.File(io.BytesIO(content), "r") as file:

@@ -73,7 +73,9 @@ def check_saved(folder: str | os.PathLike) -> None:
         )
     for name, expected in manifest["sha256"].items():
         if not (folder / name).is_file() or sha256(folder / name) != expected:
-            raise InputError(f"Expected {name} as it was saved. Received: a missing or damaged file in {folder}. Save the simulator again.")
+            raise InputError(
+                f"Expected {name} to be unchanged since it was saved. Received: a missing or damaged file in {folder}. Save the simulator again."
+            )
 
 
 def _is_complete(checksums: Any) -> bool:
@@ -96,7 +98,7 @@ def _json_of(folder: Path, name: str) -> dict[str, Any]:
     try:
         content = read_json(folder / name, MOST_SETTINGS)
         if not isinstance(content, dict):
-            raise ValueError("no object")
+            raise ValueError("not a JSON object")
     except (OSError, ValueError) as error:
         raise InputError(
             f"Expected a folder written by EnhancedSimulator.save. Received: {folder} ({type(error).__name__} in {name})."
@@ -129,7 +131,7 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
             warnings.simplefilter("error", UserWarning)  # Keras only warns about layers without weights in the file
             networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
         if sha256(folder / MANIFEST) != as_checked:  # another process replaced the simulator, so the networks may be mixed
-            raise ValueError("it was replaced while it was read; try again")
+            raise ValueError("the simulator was replaced while it was read; try again")
         return make(networks, settings)
     except (*READ_ERRORS, UserWarning, tf.errors.OpError) as error:
         reason = (str(error).splitlines() or [""])[0]
