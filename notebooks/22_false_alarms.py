@@ -69,16 +69,16 @@ assert rate["clean"] > 0.9 and rate["real"] < 0.1
 #
 # One detector, one kind of noise and one seed prove little. `python -m enhsim_tf.reproduce --experiment robustness` trains every
 # detector on every arm, in four environments, everything anew with each seed. It takes hours; its tables are kept with the project.
-# An arm is what a detector learns from; *enhanced* is the paper's pipeline. *Ours* is a second one, the default of
-# `EnhancedSimulator.fit`: its enhancer takes the waveform off instead of a moving average, and a convolutional generator learns what
-# is left.
+# An arm is what a detector is trained on. Arms that begin with *enhanced* use the paper's pipeline. Arms that begin with *residual* use the
+# default pipeline of `EnhancedSimulator.fit`: it extracts the noise as the residual of the enhancer, instead of subtracting a moving
+# average, and a convolutional GAN learns that noise.
 
 # %%
 from enhsim_tf.reproduce.robustness.replicate import ARMS
 
 found, tables = open_findings()
 for arm, about in ARMS.items():
-    print(f"{arm:22} {about}")
+    print(f"{arm:28} {about}")
 for name in ("alarms", "recall", "realism"):
     print(f"{name:8} {len(tables[name]):7,} rows: {', '.join(tables[name].columns)}")
 
@@ -86,24 +86,28 @@ for name in ("alarms", "recall", "realism"):
 show_finding(found, "false_alarms")
 
 # %% [markdown]
-# *What to see:* orange is the paper's pipeline, blue the second one. The orange dots with the GAN's noise lie far right of the line: its
-# detectors alarm on real, healthy telemetry, some on all of it. So does the bootstrap of *real* extracted noise when the noise is
-# coloured: there the moving average has taken the slow part of it away. Of the blue ones those with the generated noise (*ours + GAN*) lie
-# near the real-trained detectors in all four environments, the bootstrap nearly so; Gaussian noise and the autoregression do only
-# where the noise is of their kind. Without noise, blue is as far off as orange.
+# *What to see:* orange is the paper's pipeline, blue is the residual pipeline. The orange dots with the noise of the paper's GAN lie far to
+# the right of the line: those detectors alarm on real, healthy telemetry, some of them on all of it. So do detectors trained with a
+# bootstrap of the noise that the moving average extracts, when the noise is coloured: the moving average has removed its slow part. The
+# blue dots with generated noise (*residual + convolutional GAN*) lie near the detectors trained on real telemetry in all four
+# environments, and the bootstrap nearly so. Gaussian noise and the autoregression do so only where the noise is of their kind. Without
+# noise, blue is as far off as orange.
 
 # %%
 mean = {arm: about["false_alarms"]["mean"] for arm, about in found["arms"].items()}
-for arm in ("enhanced", "enhanced + GAN", "ours + GAN", "real"):
-    print(f"{arm:16} {mean[arm]:6.1%}")
+for arm in ("enhanced", "enhanced + GAN", "residual + convolutional GAN", "real"):
+    print(f"{arm:28} {mean[arm]:6.1%}")
 assert mean["enhanced"] > 0.5 and mean["enhanced + GAN"] > 5 * mean["real"]
-assert mean["ours + GAN"] < mean["enhanced + GAN"] / 5 and mean["ours + GAN"] < mean["real"] + 0.02
+assert (
+    mean["residual + convolutional GAN"] < mean["enhanced + GAN"] / 5
+    and mean["residual + convolutional GAN"] < mean["real"] + 0.02
+)
 at = {
-    name: found["arms"]["ours + AR"]["by_environment"][name]["false_alarms"]["mean"]
+    name: found["arms"]["residual + AR"]["by_environment"][name]["false_alarms"]["mean"]
     for name in found["environments"]
 }
 assert max(at["white"], at["autoregressive"]) < 0.05 < 0.2 < min(at["heteroscedastic"], at["shot"])
-assert mean["ours"] > 0.8
+assert mean["residual, no noise"] > 0.8
 
 # %% [markdown]
 # ## Quiet is not the same as good
@@ -121,21 +125,32 @@ show_finding(found, "recall")
 
 # %%
 at_real_rate = {arm: about["recall_at_real_rate"] for arm, about in found["arms"].items()}
-print({arm: f"{at_real_rate[arm]:.1%}" for arm in ("coarse", "enhanced + GAN", "ours + GAN", "real")})
-assert abs(at_real_rate["ours + GAN"] - at_real_rate["real"]) < 0.05
+print(
+    {
+        arm: f"{at_real_rate[arm]:.1%}"
+        for arm in ("coarse", "enhanced + GAN", "residual + convolutional GAN", "real")
+    }
+)
+assert abs(at_real_rate["residual + convolutional GAN"] - at_real_rate["real"]) < 0.05
 
 # %%
 show_finding(found, "scale_and_share")
 
 # %% [markdown]
-# *What to see:* on the left, means over environments. Where all windows are equally loud (white and coloured noise) the scale has to be
-# right: noise that is too quiet leaves every real window loud; noise that is too loud leaves it *too quiet*, which to detectors that look
-# at features is as strange, while the others find less. Where loudness differs it matters less. On the right, real windows are
-# mixed in. The solid curves fall along the dotted line, which is arithmetic: where one in twenty of the windows that set a threshold is
-# real, at most a fifth of the real ones can lie above it. What those windows teach the detector itself is the dashed curve.
+# *What to see:* the left column shows means over environments. Where all windows are equally loud (white and coloured noise), the scale has
+# to be right. Detectors trained with noise that is too quiet alarm on most real windows. Detectors trained with noise that is too loud
+# find fewer anomalies if they use the samples themselves; the isolation forest and the one-class SVM, which use features such as the
+# standard deviation, alarm on real windows because these are then too quiet. Where loudness differs between windows, the scale matters
+# less. The right column shows what real windows in the training set change. The solid curves fall along the dotted line, which is
+# arithmetic: where one in twenty of the windows that set a threshold is real, at most a fifth of the real windows can lie above it. The
+# dashed curve shows what those windows teach the detector itself.
 
 # %%
-rows = [row for row in found["variations"] if row["arm"] == "ours + GAN" and row["real_share"] == 0]
+rows = [
+    row
+    for row in found["variations"]
+    if row["arm"] == "residual + convolutional GAN" and row["real_share"] == 0
+]
 at_scale = {row["scale"]: row["false_alarms"] for row in rows}
 assert at_scale[1.0] < min(at_scale[0.75], at_scale[1.5])
 quiet = next(row for row in rows if row["scale"] == 0.75)["by_environment"]

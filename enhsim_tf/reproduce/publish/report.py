@@ -80,7 +80,7 @@ def render(
         settings=settings,
         words=words(found, settings),
         c8=share_c8(found),
-        c8_ours=share_c8(found, "ours + GAN"),
+        c8_residual=share_c8(found, "residual + convolutional GAN"),
     )
 
 

@@ -108,8 +108,15 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     return {
         "arms": replicates.ARMS,
         "methods": degraded_modes.METHODS,
-        "noises": ["real", *(noise for pipeline in ("ours", "enhanced") for noise in _noises(pipeline, replicates.ARMS))],
-        "estimated": ("real", "ours: extracted", "ours + GAN", "ours + AR", "enhanced: extracted", "enhanced + GAN"),
+        "noises": ["real", *(noise for pipeline in ("residual", "enhanced") for noise in _noises(pipeline, replicates.ARMS))],
+        "estimated": (
+            "real",
+            "residual: extracted",
+            "residual + convolutional GAN",
+            "residual + AR",
+            "enhanced: extracted",
+            "enhanced + GAN",
+        ),
         "verdict_c8": verdict_c8(found),
         "kept_c8": kept_c8(found),
         "first_trial": first_trial(found),
@@ -140,7 +147,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
 
 def by_scale(found: Findings) -> dict[float, Findings]:
     """What the second generator's noise does at each scale, without any real window."""
-    return {row["scale"]: row for row in found["variations"] if row["arm"] == "ours + GAN" and row["real_share"] == 0}
+    return {row["scale"]: row for row in found["variations"] if row["arm"] == "residual + convolutional GAN" and row["real_share"] == 0}
 
 
 def opposite_signs(found: Findings, least: float = 0.1) -> str:

@@ -23,13 +23,14 @@ _NAMES = {
     "heteroscedastic": "heteroscedastic noise",
     "shot": "shot noise",
 }
-_LEAST = 2e-4  # a rate of zero is drawn here
+_LEAST = 2e-4  # rates below this are drawn here, because the axis is logarithmic
+_SHORT = {"residual + convolutional GAN": "residual + conv. GAN"}  # for labels beside a curve
 
 
 def _colour(arm: str) -> str:
     if arm in ("real", "truth"):
         return REAL
-    return COARSE if arm == "coarse" else ENHANCED if arm.startswith("ours") else GENERATED
+    return COARSE if arm == "coarse" else ENHANCED if arm.startswith("residual") else GENERATED
 
 
 def _per_cent(axes: Axes, ticks: Sequence[float]) -> None:
@@ -43,22 +44,24 @@ def _scope(found: Findings) -> str:
 
 def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     """False alarms by arm and detector, an environment a panel."""
-    arms, paper, ours, real = (
+    arms, paper, residual, real = (
         [found["arms"][name] for name in ARMS],
-        *(found["arms"][n] for n in ("enhanced + GAN", "ours + GAN", "real")),
+        *(found["arms"][n] for n in ("enhanced + GAN", "residual + convolutional GAN", "real")),
     )
     environments = found["environments"]
     figure, down = new_sheet(
         DOUBLE,
         6.4,
-        f"Detectors trained with the paper's generated noise alarm on {100 * paper['false_alarms']['mean']:.0f} % of nominal telemetry on average, "
-        f"with the second generator's on {100 * ours['false_alarms']['mean']:.1f} %; trained on real telemetry, on {100 * real['false_alarms']['mean']:.1f} %",
-        f"Set for 1 % (line). Dot and bar: mean over {len(real['by_environment'][environments[0]]['detectors'])} detectors with its 95 % interval over "
-        f"seeds; small marks: each detector, {100 * _LEAST:g} % or less at {100 * _LEAST:g} %. Real: example telemetry that plays its part; {_scope(found)}.",
+        f"Detectors trained with noise of the paper's GAN raise false alarms on {100 * paper['false_alarms']['mean']:.0f} % of nominal windows on average, "
+        f"those trained with noise of the convolutional GAN on {100 * residual['false_alarms']['mean']:.1f} %, "
+        f"and those trained on real telemetry on {100 * real['false_alarms']['mean']:.1f} %",
+        f"Vertical line: the rate that thresholds are set for, 1 %. Dot and bar: mean over {len(real['by_environment'][environments[0]]['detectors'])} "
+        f"detectors with its 95 % interval over seeds; small marks: single detectors; rates below {100 * _LEAST:g} % are drawn at {100 * _LEAST:g} %. "
+        f"Example telemetry stands in for real telemetry; {_scope(found)}.",
     )
     rows = -(-len(environments) // 2)
     grid = panels(figure, down + 0.22, rows, min(2, len(environments)), gap=(0.42, 0.16), sharey=True, sharex=True)
-    left = 1.5 / DOUBLE
+    left = 1.95 / DOUBLE
     for number, (axes, name) in enumerate(zip(grid.ravel(), environments, strict=False)):
         place = axes.get_position()
         width = (1 - left - 0.04) / grid.shape[1]
@@ -81,11 +84,11 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     return figure
 
 
-# colours that a grey printer makes alike differ in their dashes or marks
+# line styles and markers differ, so that the curves can be told apart in greyscale
 _SHOWN = {
     "real": {"color": REAL, "linestyle": "-", "linewidth": 1.8},
-    "ours + GAN": {"color": ENHANCED, "linestyle": "-", "marker": "o", "markersize": 2.5},
-    "ours + AR": {"color": ENHANCED, "linestyle": ":"},
+    "residual + convolutional GAN": {"color": ENHANCED, "linestyle": "-", "marker": "o", "markersize": 2.5},
+    "residual + AR": {"color": ENHANCED, "linestyle": ":"},
     "enhanced + GAN": {"color": GENERATED, "linestyle": "--", "marker": "s", "markersize": 2.5},
     "enhanced + AR": {"color": GENERATED, "linestyle": ":"},
     "coarse": {"color": COARSE, "linestyle": "-."},
@@ -99,12 +102,12 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.4,
-        f"With the threshold set on real telemetry, detectors trained on the second generator's noise find {100 * at['ours + GAN']:.0f} % "
-        f"of anomalies, on real telemetry {100 * at['real']:.0f} %, on the paper's generated noise {100 * at['enhanced + GAN']:.0f} %",
-        "Recall at 1 % false alarms on real windows, whatever the arm's own threshold; means over detectors, environments and "
+        f"With the threshold set on real telemetry, detectors trained with noise of the convolutional GAN find {100 * at['residual + convolutional GAN']:.0f} % "
+        f"of anomalies, those trained on real telemetry {100 * at['real']:.0f} %, and those with noise of the paper's GAN {100 * at['enhanced + GAN']:.0f} %",
+        "Recall at the real rate: the threshold is set for 1 % false alarms on real windows. Means over detectors, environments and "
         f"{in_seeds(found['seeds'])}.",
     )
-    grid = panels(figure, down + 0.22, 2, 4, right=1.1, gap=(0.42, 0.16), sharex=True, sharey=True)
+    grid = panels(figure, down + 0.22, 2, 4, right=1.45, gap=(0.42, 0.16), sharex=True, sharey=True)
     for axes, (kind, arms) in zip(grid.ravel(), curves.items(), strict=True):
         for arm, style in _SHOWN.items():
             axes.plot(arms[arm]["severity"], arms[arm]["recall_at_real_rate"], **style, clip_on=False)
@@ -113,27 +116,31 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
         axes.set_xticks([0.5, 1, 2, 4, 8], ["0.5", "1", "2", "4", "8"])
         axes.minorticks_off()
         axes.set_ylim(0, 1.02)
-    label_ends(grid[0, -1], {arm: (curves[list(curves)[3]][arm]["recall_at_real_rate"], style["color"]) for arm, style in _SHOWN.items()})
+    label_ends(
+        grid[0, -1],
+        {_SHORT.get(arm, arm): (curves[list(curves)[3]][arm]["recall_at_real_rate"], style["color"]) for arm, style in _SHOWN.items()},
+    )
     for axes in grid[-1]:
-        axes.set_xlabel("severity (sd of the noise)")
+        axes.set_xlabel("severity (noise sd)")
     for axes in grid[:, 0]:
         axes.set_ylabel("recall")
     return figure
 
 
 def realism_value(found: Findings) -> matplotlib.figure.Figure:
-    """Which measure of realism predicts what noise is worth to a detector."""
+    """Rank correlation of each measure of realism with the share of the false-alarm gap that a noise closes."""
     measures = sorted(found["measures"]["predicts"].items(), key=lambda each: each[1]["rho"])
     (best, strongest), (within, inside) = measures[0], min(measures, key=lambda each: each[1]["within"])
     there = f"{inside['within']:.2f}"
     is_tie = f"{measures[0][1]['within']:.2f}" == there
-    inside_too = "inside them too" if within == best else f"inside them, {'it and ' if is_tie else ''}{within} ({there})"
+    names = f"{best} and {within} do" if is_tie else f"{within} does"
+    inside_too = "on average within an environment, " + ("it does too" if within == best else f"{names} ({there})")
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        f"Over all environments, {best} follows a noise's value to detectors best (rank correlation {strongest['rho']:.2f}); {inside_too}",
-        f"Dot and bar: Spearman's rho between the departure from real noise and the share of the false-alarm gap closed, over {found['measures']['num_rows']} "
-        "noises of all environments and seeds, with its 95 % interval; cross: mean of the correlations inside each environment. −1 would be perfect.",
+        f"Over all environments, {best} best predicts how much a noise reduces false alarms (rank correlation {strongest['rho']:.2f}); {inside_too}",
+        f"Dot and bar: Spearman's rank correlation between the departure from real noise and the share of the false-alarm gap closed, over {found['measures']['num_rows']} "
+        "noises of all environments and seeds, with its 95 % interval; cross: mean of the correlations within each environment. A perfect predictor has −1.",
     )
     axes = panels(figure, down + 0.12, 1, 1)[0, 0]
     place = axes.get_position()
@@ -150,7 +157,7 @@ def realism_value(found: Findings) -> matplotlib.figure.Figure:
     return figure
 
 
-_FEATURES = ("isolation forest", "one-class SVM")  # detectors that look at features of a window
+_FEATURES = ("isolation forest", "one-class SVM")  # detectors that use features of a window instead of its samples
 
 
 def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
@@ -166,20 +173,20 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.8,
-        f"At {quiet['scale']:g} of its scale, the second generator's noise leaves false alarms of {in_environments}; at {loud['scale']:g} of it, detectors "
-        f"that look at values find {found_by_values(loud):.0f} % of anomalies instead of {found_by_values(own):.0f} %",
-        f"Means over {len(loud['by_detector'])} detectors (no networks), environments and {in_seeds(found['seeds'])}. Right, solid: real windows in training and where the "
-        "threshold is set; dashed: in training alone; dotted: the most that arithmetic allows, 1 % over the share of real windows.",
+        f"With noise of the convolutional GAN scaled by {quiet['scale']:g}, the false-alarm rate is {in_environments}; scaled by {loud['scale']:g}, detectors "
+        f"that use samples instead of features find {found_by_values(loud):.0f} % of anomalies instead of {found_by_values(own):.0f} %",
+        f"Means over {len(loud['by_detector'])} detectors (no neural networks), environments and {in_seeds(found['seeds'])}. Right: real windows replace some "
+        "of the windows for training and threshold (solid) or for training only (dashed). Dotted: upper bound for the solid curves, 1 % divided by the share of real windows.",
     )
-    grid = panels(figure, down + 0.2, 2, 2, right=1.15, gap=(0.2, 1.5), sharex="col")
-    shares = [arm for arm in MIXED if arm != "ours"]
+    grid = panels(figure, down + 0.2, 2, 2, right=1.45, gap=(0.2, 1.8), sharex="col")
+    shares = [arm for arm in MIXED if arm != "residual, no noise"]
     for row, (value, label) in enumerate((("false_alarms", "false alarms (%)"), ("recall", "recall (%)"))):
         left, right = grid[row]
         ends: dict[str, Any] = {}
         for arm in SCALED:
             points = sorted((each["scale"], 100 * each[value]) for each in rows if each["arm"] == arm and each["real_share"] == 0)
             left.plot(*np.transpose(points), **_SHOWN[arm], clip_on=False)
-            ends[arm] = ([points[-1][1]], _SHOWN[arm]["color"])
+            ends[_SHORT.get(arm, arm)] = ([points[-1][1]], _SHOWN[arm]["color"])
         right_ends: dict[str, Any] = {}
         for arm in shares:
             colour = COARSE if arm == "enhanced" else _SHOWN[arm]["color"]
@@ -191,7 +198,7 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
                 )
                 right.plot(*np.transpose(points), style, color=colour, marker="o", markersize=2.5, clip_on=False)
                 if not both:
-                    right_ends[arm] = ([points[-1][1]], colour)
+                    right_ends[_SHORT.get(arm, arm)] = ([points[-1][1]], colour)
         if not row:
             share = np.geomspace(1, 100, 50)
             right.plot(share, 100 / share, ":", color=QUIET)
@@ -224,11 +231,11 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.2,
-        f"Beyond severity {found['modes']['largest_trained']} the paper's enhancer errs by {errors['paper']['outside']:.2f}, the untouched coarse signal by "
-        f"{errors['identity']['outside']:.2f}; trained over randomised configurations up to there, a network errs by {errors['randomised']['outside']:.2f}, "
-        f"linear regression by {errors['ridge, randomised']['outside']:.2f}",
-        f"Root mean square error of the enhanced signal against the true degraded one, in units of the nominal signal's standard deviation; grey: severities "
-        f"that the randomised enhancer was trained on; {in_seeds(found['modes']['seeds'])}.",
+        f"Above severity {found['modes']['largest_trained']}, the error of the paper's enhancer is {errors['paper']['outside']:.2f} and that of the coarse signal "
+        f"{errors['identity']['outside']:.2f}; trained on randomised configurations up to that severity, a network has {errors['randomised']['outside']:.2f} "
+        f"and ridge regression {errors['ridge, randomised']['outside']:.2f}",
+        f"Root mean square error of the enhanced signal with respect to the true degraded signal, in standard deviations of the nominal signal. Grey: "
+        f"severities that the randomised methods were trained on. {in_seeds(found['modes']['seeds'])}.",
     )
     grid = panels(figure, down + 0.22, 2, 3, right=1.15, gap=(0.42, 0.36), sharex=True)
     for axes, mode in zip(grid.ravel(), modes, strict=True):
@@ -260,7 +267,7 @@ def out_of_range(found: Findings) -> matplotlib.figure.Figure:
         2.7,
         f"The out-of-range score rises with the error: rank correlation {trust['paper']['rank_correlation']:.2f} for the paper's enhancer, "
         f"{trust['randomised']['rank_correlation']:.2f} for the randomised one",
-        "Tenths of all windows, nominal and degraded, by their score: median error and the range of the middle 80 %.",
+        "All windows, nominal and degraded, in ten groups of increasing score: median error, and the range from the 10th to the 90th percentile.",
     )
     grid = panels(figure, down + 0.22, 1, len(curves), gap=(0.2, 0.3), sharey=True)[0]
     for axes, method in zip(grid, SCORED, strict=True):
@@ -291,7 +298,7 @@ FIGURES: dict[str, Figure] = {
     ),
     "realism_value": Figure(
         23,
-        "Which measure predicts detector value",
+        "Which measure of realism predicts false alarms",
         "Measures of realism from top to bottom, sorted by their rank correlation with the share of the false-alarm gap closed, with intervals.",
         realism_value,
     ),

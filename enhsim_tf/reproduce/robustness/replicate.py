@@ -31,7 +31,14 @@ TABLES = {  # by stage
     "variations": ("variations",),
     "realism": ("realism", "parameters"),
 }
-PAPER, OURS = "paper", "ours"  # the two pipelines: moving average and the paper's GAN; residual and the convolutional one
+PAPER, RESIDUAL = "paper", "residual"
+"""The two pipelines: the paper's, which extracts noise with a moving average and learns it with the paper's GAN; and the one that
+extracts noise as the residual of the enhancer and learns it with the convolutional GAN."""
+PREFIXES = {PAPER: "enhanced", RESIDUAL: "residual"}
+"""What the names of a pipeline's arms begin with."""
+CLEAN = {"enhanced": "enhanced", "residual": "residual, no noise"}
+"""The arm without noise of each prefix."""
+GANS = {PAPER: "GAN", RESIDUAL: "convolutional GAN"}
 ARMS = {
     "coarse": "the coarse simulator",
     "truth": "the noiseless signal: a perfect simulator without environment",
@@ -40,16 +47,16 @@ ARMS = {
     "enhanced + Gaussian": "plus Gaussian noise of the same standard deviation",
     "enhanced + AR": "plus a fitted autoregression",
     "enhanced + bootstrap": "plus blocks of the extracted noise itself",
-    "ours": "the second pipeline's enhanced signal, clean",
-    "ours + GAN": "plus noise of the convolutional GAN",
-    "ours + Gaussian": "plus Gaussian noise of the same standard deviation",
-    "ours + AR": "plus an autoregression fitted to the same noise",
-    "ours + bootstrap": "plus blocks of the same noise",
+    "residual, no noise": "the enhanced signal of the residual pipeline, without noise",
+    "residual + convolutional GAN": "plus noise of the convolutional GAN",
+    "residual + Gaussian": "plus Gaussian noise of the same standard deviation",
+    "residual + AR": "plus an autoregression fitted to the same noise",
+    "residual + bootstrap": "plus blocks of the same noise",
     "real": "real nominal telemetry",
 }
 """What detectors are trained on, in the order of the figures."""
-SCALES, SCALED = (0.5, 0.75, 1.0, 1.5, 2.0), ("enhanced + GAN", "enhanced + AR", "ours + GAN", "ours + AR")
-SHARES, MIXED = (0.0, 0.01, 0.05, 0.25), ("enhanced", "enhanced + GAN", "ours", "ours + GAN")
+SCALES, SCALED = (0.5, 0.75, 1.0, 1.5, 2.0), ("enhanced + GAN", "enhanced + AR", "residual + convolutional GAN", "residual + AR")
+SHARES, MIXED = (0.0, 0.01, 0.05, 0.25), ("enhanced", "enhanced + GAN", "residual, no noise", "residual + convolutional GAN")
 VARIATIONS = tuple(
     dict.fromkeys(
         [
@@ -62,6 +69,8 @@ VARIATIONS = tuple(
 )
 """Arm, scale of its noise, share of its training windows that real ones replace (which are the same for all arms), and
 whether they replace as many of the windows that set the threshold."""
+# The seed of a random draw depends on its name. The published results were drawn under these names, so that a new run repeats them.
+_DRAW_NAMES = {"residual, no noise": "ours", "residual + convolutional GAN": "ours + GAN", "residual + AR": "ours + AR"}
 NUM_BLOCKS = 10  # of windows, in each of which the parameters of a noise are estimated
 QUICK_DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest", "one-class SVM")
 
@@ -152,7 +161,7 @@ class Replicate:
         learnt, limiting = self.arms("arms, training"), self.arms("arms, threshold")
         rows, told = [], self.stages.progress.loop("variation", len(VARIATIONS))
         for number, (arm, scale, share, both) in enumerate(VARIATIONS):
-            draws = self.experiment.data.draw(f"mixed windows, {arm}, {scale}, {share}")
+            draws = self.experiment.data.draw(f"mixed windows, {_DRAW_NAMES.get(arm, arm)}, {scale}, {share}")
             training, held_out = (
                 robustness.mix_real_and_simulated(_scaled(arms, arm, scale), arms["real"], part, draws)
                 for arms, part in ((learnt, share), (limiting, share if both else 0.0))
@@ -174,7 +183,7 @@ class Replicate:
         floor, held_out = self.floor()
         number, seed = len(held_out), int(self.experiment.data.draw("realism").integers(2**31))
         judged = {"real": held_out}
-        for pipeline, name in ((PAPER, "enhanced"), (OURS, "ours")):
+        for pipeline, name in PREFIXES.items():
             extracted = self.disjoint_extracted[pipeline]
             judged[f"{name}: extracted"] = extracted[np.arange(number) % len(extracted)]
             judged |= {f"{name} + {noise}": model.generate(number, seed) for noise, model in self.surrogates[pipeline].items()}
@@ -243,23 +252,24 @@ class Replicate:
         draws = np.random.default_rng([self.settings.seed, 1])
         return {
             PAPER: data.noise_windows("train", number, "noise windows"),
-            OURS: self.second_simulator.residual_windows(data.channels[0].train, self.settings.second.num_windows, draws),
+            RESIDUAL: self.second_simulator.residual_windows(data.channels[0].train, self.settings.second.num_windows, draws),
         }
 
     @property
     def disjoint_extracted(self) -> dict[str, np.ndarray]:
         """The same noise in windows that share no sample, as the measures of realism want them."""
         data, windows = self.experiment.data, self.experiment.data.windows("train", None)
-        return {PAPER: data.noise_windows("train", None), OURS: windows["target"] - self.second_simulator.enhance(windows["coarse"])}
+        return {PAPER: data.noise_windows("train", None), RESIDUAL: windows["target"] - self.second_simulator.enhance(windows["coarse"])}
 
     @functools.cached_property
     def surrogates(self) -> Mapping[str, Mapping[str, object]]:
         """The noises of both pipelines by name."""
         chosen, noise = self.settings.robustness, self.extracted
         return {
-            PAPER: {"GAN": self.experiment.simulator.noise, "Gaussian": GaussianNoise.fit(noise[PAPER])}
+            PAPER: {GANS[PAPER]: self.experiment.simulator.noise, "Gaussian": GaussianNoise.fit(noise[PAPER])}
             | self._fitted(noise[PAPER], chosen),
-            OURS: {"GAN": self.second_simulator.noise, "Gaussian": GaussianNoise.fit(noise[OURS])} | self._fitted(noise[OURS], chosen),
+            RESIDUAL: {GANS[RESIDUAL]: self.second_simulator.noise, "Gaussian": GaussianNoise.fit(noise[RESIDUAL])}
+            | self._fitted(noise[RESIDUAL], chosen),
         }
 
     @staticmethod
@@ -271,11 +281,14 @@ class Replicate:
         """Windows of every arm; one purpose draws what detectors learn from, another what sets their thresholds."""
         data, number = self.experiment.data, self.settings.robustness.num_windows
         simulated = data.windows("train", number, purpose)
-        clean = {PAPER: self.experiment.simulator.enhance(simulated["coarse"]), OURS: self.second_simulator.enhance(simulated["coarse"])}
+        clean = {
+            PAPER: self.experiment.simulator.enhance(simulated["coarse"]),
+            RESIDUAL: self.second_simulator.enhance(simulated["coarse"]),
+        }
         seed = int(data.draw(purpose).integers(2**31))
         arms = {"coarse": simulated["coarse"], "truth": simulated["truth"]}
-        for pipeline, name in ((PAPER, "enhanced"), (OURS, "ours")):
-            arms[name] = clean[pipeline]
+        for pipeline, name in PREFIXES.items():
+            arms[CLEAN[name]] = clean[pipeline]
             for noise, model in self.surrogates[pipeline].items():
                 arms[f"{name} + {noise}"] = clean[pipeline] + model.generate(number, seed)
         part = "train" if purpose == "arms, training" else "calibration"
@@ -285,7 +298,8 @@ class Replicate:
 
 def _scaled(arms: Mapping[str, np.ndarray], arm: str, scale: float) -> np.ndarray:
     """Windows of an arm with its noise at another scale; an arm without noise stays as it is."""
-    clean = arms[arm.split(" + ")[0]]
+    prefix, plus, _ = arm.partition(" + ")
+    clean = arms[CLEAN[prefix] if plus else arm]
     return clean + np.float32(scale) * (arms[arm] - clean)
 
 

@@ -26,13 +26,13 @@ def bars(alarms: "pd.DataFrame", recall: "pd.DataFrame", ratios: "pd.DataFrame",
         environments: Which.
     """
     rate, found = by_block(alarms), by_replicate(recall, "recall")
-    excess, over = rate["ours + GAN"] - rate["real"], rate["ours + GAN"] - rate["ours + AR"]
-    difference = found["ours + GAN"] - found["real"]
+    excess, over = rate["residual + convolutional GAN"] - rate["real"], rate["residual + convolutional GAN"] - rate["residual + AR"]
+    difference = found["residual + convolutional GAN"] - found["real"]
     reports = {}
     for name in environments:
         largest, bound = BARS[name]
         about, recalled, against = interval(excess, name), interval(difference, name), interval(over, name)
-        is_gaussian, ratio = name in KINDS_OF_NOISE["Gaussian"], ratios.loc["ours + GAN", name]
+        is_gaussian, ratio = name in KINDS_OF_NOISE["Gaussian"], ratios.loc["residual + convolutional GAN", name]
         reports[name] = {
             "excess": about,
             "largest_excess": largest,
@@ -53,7 +53,7 @@ def bars(alarms: "pd.DataFrame", recall: "pd.DataFrame", ratios: "pd.DataFrame",
 def not_inferior(alarms: "pd.DataFrame") -> dict[str, Any]:
     """False alarms with each pipeline's GAN against those with blocks of the noise that it learnt from, within the margin."""
     rate, found = by_block(alarms), {}
-    for pipeline in ("enhanced", "ours"):
-        about = interval(rate[f"{pipeline} + GAN"] - rate[f"{pipeline} + bootstrap"])
+    for pipeline, gan in (("enhanced", "enhanced + GAN"), ("residual", "residual + convolutional GAN")):
+        about = interval(rate[gan] - rate[f"{pipeline} + bootstrap"])
         found[pipeline] = {"difference": about, "margin": MARGIN, "reached": bool(about["high"] <= MARGIN)}
     return found

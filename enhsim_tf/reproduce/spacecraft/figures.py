@@ -29,10 +29,10 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         SINGLE,
         2.3 + 0.2 * len(channels),
-        f"The enhancer is nearest to real telemetry on {nearest.count('enhanced')} of {len(nearest)} channels; ridge regression, given its clock, "
+        f"The enhanced signal has the smallest error on {nearest.count('enhanced')} of {len(nearest)} channels; ridge regression with the enhancer's clock "
         f"on {nearest.count('ridge, same clock')}",
-        "Median error over nominal test windows, in standard deviations of each window, once clock, level and amplitude are set to that window. "
-        "Hollow: ridge regression with the clock that the enhanced shape finds.",
+        "Median error over nominal test windows, in standard deviations of each window, after phase, offset and gain are aligned to that window. "
+        "Hollow: ridge regression aligned with the phase that the enhanced signal finds.",
     )
     axes = panels(figure, down + 0.4, 1, 1)[0, 0]
     place = axes.get_position()
@@ -40,7 +40,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
     marks = (
         ("coarse", "s", COARSE, COARSE, 0.0),
         ("enhanced", "o", ENHANCED, ENHANCED, 0.0),
-        ("ridge", "^", AVERAGE, AVERAGE, 0.3),  # beside the row, where no other mark covers it
+        ("ridge", "^", AVERAGE, AVERAGE, 0.3),  # offset from the row, so that no other mark covers it
         ("ridge, same clock", "^", AVERAGE, "none", -0.3),
     )
     for method, marker, colour, inside, beside in marks:
@@ -56,13 +56,13 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
 def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
     """False alarms on nominal test windows, and labelled sequences found, by what detectors were trained on."""
     arms = found["arms"]
-    ours, real = arms[GENERATED_ARM], arms["real"]
+    generated, real = arms[GENERATED_ARM], arms["real"]
     number = len(found["channels"])
     figure, down = new_sheet(
         DOUBLE,
         3.6,
-        f"On a real spacecraft, detectors trained on generated telemetry alarm on {100 * ours['false_alarms']['mean']:.0f} % of nominal windows "
-        f"and find {100 * ours['found']['mean']:.0f} % of the labelled anomalies; trained on its own past, on {100 * real['false_alarms']['mean']:.0f} % "
+        f"On a real spacecraft, detectors trained on generated telemetry raise false alarms on {100 * generated['false_alarms']['mean']:.0f} % of nominal windows "
+        f"and find {100 * generated['found']['mean']:.0f} % of the labelled anomalies; trained on the channel's own past, on {100 * real['false_alarms']['mean']:.0f} % "
         f"and {100 * real['found']['mean']:.0f} %",
         f"Set for 1 % (line). Dot and bar: mean over {in_words(len(DETECTORS))} detectors and {number} channels, with its 95 % interval over channels; small marks: "
         f"each detector. {found['num_sequences']} labelled sequences.",
@@ -91,14 +91,14 @@ FIGURES = {
     "errors": Figure(
         15,
         "Enhancement of real telemetry",
-        "A row for each channel with four marks: the median error of the coarse signal, of ridge regression with two clocks and of the enhanced signal on "
-        "nominal test windows. The title counts the channels on which the enhanced signal is nearest.",
+        "A row for each channel with four marks: the median error of the coarse signal, of ridge regression aligned in two ways and of the enhanced signal on "
+        "nominal test windows. The title counts the channels on which the enhanced signal has the smallest error.",
         errors,
     ),
     "alarms_and_finds": Figure(
         16,
         "Detectors on real telemetry",
-        "Two panels with a row for each thing that detectors were trained on: left the false alarms on nominal test windows, right the share of "
+        "Two panels with a row for each training arm. Left: the false alarms on nominal test windows. Right: the share of "
         "labelled anomalies found; means with intervals over channels, and a mark for each detector. The title gives the two means for "
         "generated and for real training.",
         alarms_and_finds,

@@ -38,7 +38,7 @@ PARAMETERS = {
     "shot": ("rate", "amplitude", "background_sd"),
 }
 # false alarms of 100 windows in each of two blocks, by arm: what every number below is worked out from
-ALARMS = dict.fromkeys(ARMS, 50) | {"enhanced": 90, "enhanced + GAN": 60, "ours + GAN": 3, "ours + AR": 10, "real": 2}
+ALARMS = dict.fromkeys(ARMS, 50) | {"enhanced": 90, "enhanced + GAN": 60, "residual + convolutional GAN": 3, "residual + AR": 10, "real": 2}
 
 
 def tables():
@@ -70,7 +70,7 @@ def tables():
                     rows["variations"].append({**where, **about, "alarms": alarms, "windows": 200, "recall": 0.1})
             for parameter in PARAMETERS[environment]:
                 true = getattr(NOISES[environment], parameter)
-                for noise in ("real", *(f"{name}: extracted" for name in ("enhanced", "ours")), *(arm for arm in ARMS if " + " in arm)):
+                for noise in ("real", *(f"{name}: extracted" for name in ("enhanced", "residual")), *(arm for arm in ARMS if " + " in arm)):
                     for block, factor in enumerate((0.9, 1.1)):
                         value = factor * true * (1.5 if noise == "enhanced + GAN" else 1.0)
                         rows["parameters"].append({**where, "noise": noise, "block": block, "parameter": parameter, "value": value})
@@ -125,7 +125,7 @@ def test_rates_gaps_and_recall(found):
     arms = found["arms"]
     assert list(arms) == list(ARMS) and found["num_replicates"] == 12 and found["num_windows"] == 200
     assert arms["enhanced + GAN"]["false_alarms"] == pytest.approx({"mean": 0.6, "low": 0.6, "high": 0.6})
-    assert arms["ours + GAN"]["gap_closed"] == pytest.approx((0.50 - 0.03) / (0.50 - 0.02))
+    assert arms["residual + convolutional GAN"]["gap_closed"] == pytest.approx((0.50 - 0.03) / (0.50 - 0.02))
     assert arms["coarse"]["gap_closed"] == 0 and arms["real"]["gap_closed"] == 1
     assert arms["enhanced"]["gap_closed"] == pytest.approx((0.50 - 0.90) / (0.50 - 0.02))  # worse than the coarse signal
     assert arms["real"]["recall"] == pytest.approx(0.4) and arms["real"]["recall_at_real_rate"] == pytest.approx(0.2)
@@ -139,7 +139,7 @@ def test_rates_gaps_and_recall(found):
 def test_contrasts_are_differences_of_log_odds(found):
     contrast = found["contrasts"]["second"][0]
     odds = np.log(6.5 / 194.5) - np.log(20.5 / 180.5)  # 6 and 20 alarms of 200, half a count added to both sides
-    assert (contrast["first"], contrast["second"], contrast["num_replicates"]) == ("ours + GAN", "ours + AR", 12)
+    assert (contrast["first"], contrast["second"], contrast["num_replicates"]) == ("residual + convolutional GAN", "residual + AR", 12)
     assert contrast["mean"]["estimate"] == pytest.approx(odds)
     assert contrast["p_value"] == pytest.approx(2 / 2**3)  # all three seeds' signs agree
     assert contrast["pooled_p_value"] == pytest.approx(2 / 2**12)  # and all twelve replicates'
@@ -154,7 +154,7 @@ def test_bars_hold_the_excess_against_what_was_asked_for(found):
     assert bar["ratios"] == pytest.approx({"follows": 103 / 60, "does not": 97 / 60}) and bar["measures_within"] == 2
     assert found["bars"]["shot"]["largest_bound"] is None and found["bars"]["shot"]["excess_reached"]
     louder = tables()
-    arm, few = louder["alarms"]["arm"] == "ours + GAN", louder["alarms"]["seed"] == SEEDS[0]
+    arm, few = louder["alarms"]["arm"] == "residual + convolutional GAN", louder["alarms"]["seed"] == SEEDS[0]
     louder["alarms"].loc[arm & few, "alarms"] = 20  # one seed of three beyond the bound
     bar = findings.summarise(louder)["bars"]["white"]
     assert not bar["excess_reached"] and bar["excess"]["mean"] == pytest.approx((0.18 + 2 * 0.01) / 3)
@@ -166,21 +166,24 @@ def test_bars_on_recall_and_the_autoregression(found):
         assert (bar["autoregression_asked"], bar["autoregression_reached"]) == (asked, True)
         assert bar["over_autoregression"] == pytest.approx({"mean": -0.07, "low": -0.07, "high": -0.07})
     same = tables()
-    chosen = same["alarms"]["arm"] == "ours + AR"
-    same["alarms"].loc[chosen, "alarms"] = ALARMS["ours + GAN"]
+    chosen = same["alarms"]["arm"] == "residual + AR"
+    same["alarms"].loc[chosen, "alarms"] = ALARMS["residual + convolutional GAN"]
     bars = findings.summarise(same)["bars"]
     assert bars["white"]["autoregression_reached"] and not bars["shot"]["autoregression_reached"]  # equal is not better
-    same["alarms"].loc[chosen & (same["alarms"]["block"] == 0), "alarms"] = ALARMS["ours + GAN"] - 2  # a point on average
+    same["alarms"].loc[chosen & (same["alarms"]["block"] == 0), "alarms"] = ALARMS["residual + convolutional GAN"] - 2  # a point on average
     assert not findings.summarise(same)["bars"]["white"]["autoregression_reached"]
     for change, is_reached in ((-0.03, False), (0.03, False), (0.01, True)):  # within two points, on either side
         other = tables()
-        other["recall"].loc[other["recall"]["arm"] == "ours + GAN", "recall"] += change
+        other["recall"].loc[other["recall"]["arm"] == "residual + convolutional GAN", "recall"] += change
         bar = findings.summarise(other)["bars"]["white"]
         assert bar["recall_difference"]["mean"] == pytest.approx(change) and bar["recall_reached"] == is_reached
 
 
 def test_not_inferior_within_half_a_point(found):
-    assert found["not_inferior"]["ours"]["difference"]["mean"] == pytest.approx(0.03 - 0.50) and found["not_inferior"]["ours"]["reached"]
+    assert (
+        found["not_inferior"]["residual"]["difference"]["mean"] == pytest.approx(0.03 - 0.50)
+        and found["not_inferior"]["residual"]["reached"]
+    )
     assert (
         found["not_inferior"]["enhanced"]["difference"]["mean"] == pytest.approx(0.10) and not found["not_inferior"]["enhanced"]["reached"]
     )
@@ -198,7 +201,9 @@ def test_parameters_are_compared_with_those_of_real_noise(found):
     rows = {(row["environment"], row["parameter"]): row for row in found["parameters"]}
     assert set(rows) == {(name, parameter) for name, parameters in PARAMETERS.items() for parameter in parameters}
     rate = rows["shot", "rate"]
-    assert rate["true"] == 0.01 and rate["noises"]["ours + GAN"] == pytest.approx({"mean": 0.01, "distance": 0}, abs=1e-12)
+    assert rate["true"] == 0.01 and rate["noises"]["residual + convolutional GAN"] == pytest.approx(
+        {"mean": 0.01, "distance": 0}, abs=1e-12
+    )
     assert rate["noises"]["enhanced + GAN"] == pytest.approx({"mean": 0.015, "distance": 0.5})
 
 
@@ -275,11 +280,11 @@ def test_what_rounds_to_nought_has_no_sign(value, text):
 
 def test_variations_are_means_of_their_own_table(found):
     rows = {(row["arm"], row["scale"], row["real_share"], row["real_threshold"]): row for row in found["variations"]}
-    assert rows["ours + GAN", 2.0, 0.0, True]["false_alarms"] == pytest.approx(2 * 3 / 200)
+    assert rows["residual + convolutional GAN", 2.0, 0.0, True]["false_alarms"] == pytest.approx(2 * 3 / 200)
     assert rows["enhanced", 1.0, 0.25, True]["false_alarms"] == pytest.approx(0.75 * 90 / 200)
     assert rows["enhanced", 1.0, 0.25, False]["false_alarms"] == pytest.approx((0.75 * 90 + 1) / 200)
     assert {rows[arm, 1.0, 1.0, True]["false_alarms"] for arm in MIXED} == {0.0} and ("real", 1.0, 1.0, True) not in rows
-    assert rows["ours + AR", 1.0, 0.0, True]["by_detector"]["PCA residual"] == pytest.approx({"rate": 0.05, "recall": 0.1})
+    assert rows["residual + AR", 1.0, 0.0, True]["by_detector"]["PCA residual"] == pytest.approx({"rate": 0.05, "recall": 0.1})
 
 
 def test_errors_in_degraded_modes(found):
@@ -291,7 +296,7 @@ def test_c8_by_the_rule_of_the_ledger(found):
     quiet = tables()
     quiet["alarms"].loc[quiet["alarms"]["arm"] == "enhanced + GAN", "alarms"] = 4  # below twice two, plus one
     assert report_words.verdict_c8(findings.summarise(quiet)) == "holds"
-    assert report_words.share_c8(findings.summarise(quiet), "ours + GAN") == (28, 28)
+    assert report_words.share_c8(findings.summarise(quiet), "residual + convolutional GAN") == (28, 28)
     recall = quiet["recall"]
     blind = (recall["arm"] == "enhanced + GAN") & (recall["environment"] == "shot") & (recall["detector"] == next(iter(DETECTORS)))
     recall.loc[blind, "recall"] -= 0.06  # quiet, since it finds less: more than five points below the real-trained arm
@@ -304,13 +309,16 @@ def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
     alarms, first = loud["alarms"], next(iter(DETECTORS))
     kept = (alarms["arm"] == "enhanced + GAN") & (alarms["detector"] == first) & alarms["environment"].isin(["white", "shot"])
     alarms.loc[kept, "alarms"] = 4
-    once = (alarms["arm"] == "ours + GAN") & (alarms["detector"] == first) & (alarms["environment"] == "white")
+    once = (alarms["arm"] == "residual + convolutional GAN") & (alarms["detector"] == first) & (alarms["environment"] == "white")
     alarms.loc[once & (alarms["seed"] == SEEDS[0]), "alarms"] = 6  # 6 % in one seed, 4 % on average: at most 5 %
     some = findings.summarise(loud)
     assert report_words.kept_c8(some) == f"{first} on shot and white noise"
-    assert len(some["arms"]["ours + GAN"]["c8"]["kept"]) == 28
-    assert (some["arms"]["ours + GAN"]["c8"]["replicates"], some["arms"]["ours + GAN"]["c8"]["of_replicates"]) == (83, 84)
-    assert some["arms"]["ours + GAN"]["c8"]["missed"] == dict.fromkeys(ENVIRONMENTS, 0) | {"white": 1}
+    assert len(some["arms"]["residual + convolutional GAN"]["c8"]["kept"]) == 28
+    assert (
+        some["arms"]["residual + convolutional GAN"]["c8"]["replicates"],
+        some["arms"]["residual + convolutional GAN"]["c8"]["of_replicates"],
+    ) == (83, 84)
+    assert some["arms"]["residual + convolutional GAN"]["c8"]["missed"] == dict.fromkeys(ENVIRONMENTS, 0) | {"white": 1}
 
 
 def test_sentences_follow_from_their_comparison(found):

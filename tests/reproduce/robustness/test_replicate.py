@@ -5,11 +5,11 @@ import pytest
 
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.reproduce.robustness import replicate as replicates
-from enhsim_tf.reproduce.robustness.replicate import ARMS, MIXED, OURS, PAPER, SCALED, SCALES, SHARES, VARIATIONS, Replicate
+from enhsim_tf.reproduce.robustness.replicate import ARMS, MIXED, PAPER, PREFIXES, RESIDUAL, SCALED, SCALES, SHARES, VARIATIONS, Replicate
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
 
-NOISES = ("GAN", "Gaussian", "AR", "bootstrap")
+NOISES = {PAPER: ("GAN", "Gaussian", "AR", "bootstrap"), RESIDUAL: ("convolutional GAN", "Gaussian", "AR", "bootstrap")}
 
 
 class Constant:
@@ -54,8 +54,8 @@ def replicate(tmp_path):
     made.experiment = type("Experiment", (), {"data": Windows(), "simulator": Pipeline(1_000.0)})()
     made.__dict__["second_simulator"] = Pipeline(2_000.0)
     made.__dict__["surrogates"] = {
-        pipeline: {noise: Constant(first + number) for number, noise in enumerate(NOISES)}
-        for pipeline, first in ((PAPER, 10.0), (OURS, 20.0))
+        pipeline: {noise: Constant(first + number) for number, noise in enumerate(NOISES[pipeline])}
+        for pipeline, first in ((PAPER, 10.0), (RESIDUAL, 20.0))
     }
     return made
 
@@ -65,10 +65,10 @@ def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise(replicate):
     assert list(arms) == list(ARMS)
     coarse = arms["coarse"]
     assert (arms["truth"] - coarse == 0.25).all()
-    for name, value, first in (("enhanced", 1_000.0, 10.0), ("ours", 2_000.0, 20.0)):
-        assert (arms[name] - coarse == value).all()
-        for number, noise in enumerate(NOISES):
-            assert (arms[f"{name} + {noise}"] - arms[name] == first + number).all()
+    for pipeline, clean, value, first in ((PAPER, "enhanced", 1_000.0, 10.0), (RESIDUAL, "residual, no noise", 2_000.0, 20.0)):
+        assert (arms[clean] - coarse == value).all()
+        for number, noise in enumerate(NOISES[pipeline]):
+            assert (arms[f"{PREFIXES[pipeline]} + {noise}"] - arms[clean] == first + number).all()
     assert {len(windows) for windows in arms.values()} == {make_settings("smoke").robustness.num_windows}
 
 
@@ -82,16 +82,21 @@ def test_what_is_learnt_and_what_sets_the_threshold_are_drawn_apart(replicate):
 
 
 def test_only_the_noise_is_scaled():
-    arms = {"ours": np.array([1.0, 2.0]), "ours + GAN": np.array([1.5, 1.0]), "real": np.array([7.0, 8.0])}
-    assert replicates._scaled(arms, "ours + GAN", 2.0).tolist() == [2.0, 0.0]
-    for arm in ("ours", "real"):
+    arms = {"residual, no noise": np.array([1.0, 2.0]), "residual + convolutional GAN": np.array([1.5, 1.0]), "real": np.array([7.0, 8.0])}
+    assert replicates._scaled(arms, "residual + convolutional GAN", 2.0).tolist() == [2.0, 0.0]
+    for arm in ("residual, no noise", "real"):
         assert replicates._scaled(arms, arm, 2.0).tolist() == arms[arm].tolist()
+
+
+def test_random_draws_keep_the_names_of_the_published_run():
+    drawn = {replicates._DRAW_NAMES.get(arm, arm) for arm, _, share, _ in VARIATIONS if share}
+    assert drawn == {"enhanced", "enhanced + GAN", "ours", "ours + GAN", "real"}  # names that seeded the published draws
 
 
 def test_each_variation_is_made_once():
     assert len(set(VARIATIONS)) == len(VARIATIONS) == len(SCALED) * len(SCALES) + len(MIXED) * (2 * len(SHARES) - 1) - 2 + 1
     assert {scale for arm, scale, share, _ in VARIATIONS if arm in SCALED and not share} >= {0.5, 1.0, 2.0}
-    assert set(SCALED) & set(MIXED) == {"enhanced + GAN", "ours + GAN"}  # whose scale 1 and share 0 are one
+    assert set(SCALED) & set(MIXED) == {"enhanced + GAN", "residual + convolutional GAN"}  # whose scale 1 and share 0 are one
 
 
 @pytest.mark.usefixtures("narrow_enhancer")
@@ -105,8 +110,8 @@ def test_surrogates_are_fitted_to_the_very_windows_that_the_networks_learn(tmp_p
     monkeypatch.setattr(NoiseGAN, "fit", spied)
     real = Replicate(make_settings("smoke"), Stages(tmp_path))
     assert real.experiment.noise_folder.is_dir() and real.second_simulator.window == 500
-    paper, ours = learnt
-    assert np.array_equal(real.extracted[PAPER], paper) and np.array_equal(real.extracted[OURS], ours)
-    assert len(ours) == real.settings.second.num_windows
+    paper, residual = learnt
+    assert np.array_equal(real.extracted[PAPER], paper) and np.array_equal(real.extracted[RESIDUAL], residual)
+    assert len(residual) == real.settings.second.num_windows
     for pipeline, noise in real.disjoint_extracted.items():  # in other windows, the same noise
-        assert np.std(noise) == pytest.approx(np.std(learnt[(PAPER, OURS).index(pipeline)]), rel=0.1)
+        assert np.std(noise) == pytest.approx(np.std(learnt[(PAPER, RESIDUAL).index(pipeline)]), rel=0.1)
