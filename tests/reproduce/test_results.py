@@ -239,7 +239,7 @@ def test_deviations_table_has_a_row_a_setting():
     assert len(rows) == len(deviations()) > 40
     for row, about in zip(rows, deviations(), strict=True):
         cells = [cell.strip() for cell in row.strip("|").split("|")]
-        assert cells == [f"`{about['setting']}`", about["ours"], about["paper"], about["author"], about["source"]]
+        assert cells == [f"`{about['setting']}`", about["value"], about["paper"], about["author"], about["source"]]
     assert head.count("|") == rule.count("|") == 6
 
 

@@ -70,11 +70,11 @@ def _flat(settings):
 def test_each_setting_has_unit_and_source(name):
     about = FIELDS[name][1]
     assert about["unit"].strip()
-    assert about["source"].startswith(("paper", "author's code", "ours: "))
+    assert about["source"].startswith(("paper", "author's code", "our choice: "))
     if about["source"].startswith("author"):
         assert about["author"] != "-"
-    if about["source"].startswith("ours"):
-        assert len(about["source"]) > len("ours: ") + 10, "ours needs its reason"
+    if about["source"].startswith("our choice"):
+        assert len(about["source"]) > len("our choice: ") + 10, "a choice needs its reason"
 
 
 @pytest.mark.parametrize("name", PAPER)
@@ -213,16 +213,16 @@ def test_deviations_have_a_row_a_setting():
     by_name = {row["setting"]: row for row in rows}
     assert by_name["enhancer.hidden_units"] == {
         "setting": "enhancer.hidden_units",
-        "ours": "3,200 units",
+        "value": "3,200 units",
         "paper": "3,200",
         "author": "a parameter",
         "source": "paper, section 2.2",
     }
-    ours = {
-        name: by_name[name]["ours"]
+    values = {
+        name: by_name[name]["value"]
         for name in ("noise.latent_span", "telemetry.layout", "adversarial.mixed_batch", "telemetry.num_samples")
     }
-    assert list(ours.values()) == ["1", "sum", "no", "2,073,600 samples"], "a bare number has no unit to name, a choice neither"
+    assert list(values.values()) == ["1", "sum", "no", "2,073,600 samples"], "a bare number has no unit to name, a choice neither"
 
 
 # -- each open question, turned, on networks small enough for a test -------------------------------------------------------

@@ -1,8 +1,8 @@
-"""The claims ledger: what the paper says, how it is judged, and what came out.
+"""The claims of the paper, the statistic and tolerance of each, and their evaluation.
 
-Statistics and tolerances were fixed before the first full run, but for the second condition of C9, which came after a
-trial and changed no verdict. Claims C8 and C9 the paper never tests: their verdict says so, and the finding says what our
-measurement shows.
+All statistics and tolerances were fixed before the first full run, except the second condition of C9, which was added after
+a trial and changed no verdict. The paper does not test claims C8 and C9: their verdict says so, and the finding reports what
+this project measures.
 """
 
 import dataclasses
@@ -20,13 +20,13 @@ _HOLDS = {REPRODUCED: "holds here", PARTLY: "holds in part here", NOT_REPRODUCED
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """What was measured of a claim.
+    """The result of the evaluation of a claim.
 
     Args:
         value: The statistic.
-        verdict: How it compares with the tolerance.
+        verdict: The result of the comparison with the tolerance.
         finding: One sentence with the numbers behind the verdict.
-        details: Every number behind it, by name.
+        details: All numbers behind the verdict, by name.
     """
 
     value: float | None
@@ -37,19 +37,19 @@ class Outcome:
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
-    """A claim of the paper and how it is judged.
+    """A claim of the paper and its evaluation.
 
     Args:
         id: C1 to C9.
         sentence: What the paper says.
-        section: Where.
+        section: The section of the paper.
         figure: Name of the figure that shows it.
-        statistic: What is measured.
-        tolerance: What counts as reproduced.
-        judge: Measures it.
-        expected: The verdict of a full run; the command's exit code tells when it changed.
-        close_call: Another verdict that a full run may as well come to: the statistic lies so near its tolerance that
-            seeds, or the rounding of another processor, decide.
+        statistic: The quantity that is measured.
+        tolerance: The values that count as reproduced.
+        judge: Computes the statistic and compares it with the tolerance.
+        expected: The verdict of a full run. The command exits with code 1 if a verdict differs.
+        close_call: A second verdict that a full run may return, because the statistic is so close to its tolerance that
+            the seed or the rounding of another processor decides.
         tested_by_paper: Whether the paper itself tests it.
     """
 
@@ -76,14 +76,16 @@ def _numbers(arrays: Mapping[str, np.ndarray]) -> dict[str, float]:
 def _learns_mapping(experiment: Experiment) -> Outcome:
     found = _numbers(experiment.enhancement)
     error, coarse, ridge = found["nrmse"], found["identity_nrmse"], found["ridge_nrmse"]
-    limit = 0.15 if experiment.is_paper else np.inf  # a real channel's truth is its noisy telemetry: only the baselines count
+    limit = (
+        0.15 if experiment.is_paper else np.inf
+    )  # the target of a real channel is noisy, so only the comparison with the baselines applies
     finding = (
-        f"NRMSE {error:.3f} on held-out time ({found['train_nrmse']:.3f} in training); the coarse signal itself {coarse:.3f}, "
-        f"ridge regression {ridge:.3f}; {found['test_windows_seen']:.0%} of the held-out coarse windows also occur in training"
+        f"NRMSE {error:.3f} on held-out data ({found['train_nrmse']:.3f} on training data), against {coarse:.3f} for the coarse signal and "
+        f"{ridge:.3f} for ridge regression; {found['test_windows_seen']:.0%} of the held-out coarse windows also occur in training"
     )
     if not experiment.is_paper:
         in_step = [found[f"synchronised_{key}"] for key in ("nrmse", "identity_nrmse", "ridge_nrmse")]
-        finding += "; with the clock of the coarse simulator set to each window {:.3f}, {:.3f} and {:.3f}".format(*in_step)
+        finding += "; with the phase of the coarse simulator aligned to each window {:.3f}, {:.3f} and {:.3f}".format(*in_step)
     return Outcome(error, _verdict(error <= limit and error < min(coarse, ridge), error < coarse), finding, found)
 
 
@@ -99,7 +101,7 @@ def _is_too_clean(experiment: Experiment) -> Outcome:
     if found is None:
         return _no_false_alarms(experiment)
     rates = _arm(found, "enhanced", "false_alarm_rate")
-    finding = f"trained on the clean enhanced signal, detectors alarm on {_listed(found, rates)} of real nominal windows (set for 1 %)"
+    finding = f"trained on the clean enhanced signal, detectors raise false alarms on {_listed(found, rates)} of real nominal windows (target: 1 %)"
     return Outcome(float(rates.mean()), _verdict(rates.min() >= 0.1, rates.max() >= 0.1), finding, _by_detector(found, rates))
 
 
@@ -109,9 +111,7 @@ def _iterations_suffice(experiment: Experiment) -> Outcome:
     good = (scale <= 0.1) & (lag <= 0.05)
     since = history["iteration"][len(good) - np.argmin(good[::-1])] if good[-1] and not good.all() else None
     last = int(history["iteration"][-1])
-    finding = (
-        f"after {last:,} iterations the noise has {history['sd_ratio'][-1]:.2f} of the real sd and lag-1 correlation off by {lag[-1]:.3f}"
-    )
+    finding = f"after {last:,} iterations the standard deviation of the noise is {history['sd_ratio'][-1]:.2f} of the real one, and its lag-1 correlation differs by {lag[-1]:.3f}"
     finding += f"; within tolerance from iteration {since:,} on" if since is not None else ""
     details = {"sd_ratio": history["sd_ratio"][-1], "lag_one_difference": lag[-1], "iterations": last}
     verdict = _verdict(bool(good[-1]), bool(scale[-1] <= 0.1 or lag[-1] <= 0.05))
@@ -122,7 +122,7 @@ def _stays_balanced(experiment: Experiment) -> Outcome:
     history = experiment.noise_history
     accuracy = (history["accuracy_real"] + history["accuracy_generated"]) / 2
     late = accuracy[len(accuracy) // 2 :]
-    finding = f"the discriminator judges {late.mean():.0%} of rows rightly over the second half of training, from {late.min():.0%} to {late.max():.0%}"
+    finding = f"the discriminator classifies {late.mean():.0%} of rows correctly over the second half of training (range {late.min():.0%} to {late.max():.0%})"
     details = {"late_accuracy": float(late.mean()), "lowest": float(late.min()), "highest": float(late.max())}
     return Outcome(float(late.mean()), _verdict(0.5 <= late.mean() <= 0.8, 0.35 <= late.mean() <= 0.95), finding, details)
 
@@ -133,9 +133,9 @@ def _noise_is_similar(experiment: Experiment) -> Outcome:
     strict = found["rank_ratio"] >= 0.8 and found["classifier_auc"] <= 0.6
     contrast = "but it" if found["rank_ratio"] < 0.8 else "it"
     finding = (
-        f"sd off by {np.expm1(found['scale_difference']):.1%}, lag-1 correlation by {found['lag_one_difference']:.3f}; {contrast} fills {found['rank']:.0f} effective "
-        f"dimensions where real noise fills {found['real_rank']:.0f}, and a classifier tells them apart at AUC {found['classifier_auc']:.2f} "
-        f"(real from real: {found['floor_classifier_auc']:.2f})"
+        f"the standard deviation differs by {np.expm1(found['scale_difference']):.1%} and the lag-1 correlation by {found['lag_one_difference']:.3f}; {contrast} has an "
+        f"effective rank of {found['rank']:.0f} against {found['real_rank']:.0f} for real noise, and a classifier separates the two with an AUC of "
+        f"{found['classifier_auc']:.2f} (real from real: {found['floor_classifier_auc']:.2f})"
     )
     return Outcome(found["rank_ratio"], _verdict(plain and strict, plain), finding, found)
 
@@ -144,8 +144,9 @@ def _sum_resembles(experiment: Experiment) -> Outcome:
     found = {key.removeprefix("sum_"): value for key, value in _numbers(experiment.resemblance).items() if key.startswith("sum_")}
     plain = found["scale_difference"] <= 0.1 and found["marginal_distance"] <= 0.1 and 0.8 <= found["roughness_ratio"] <= 1.25
     finding = (
-        f"sd off by {np.expm1(found['scale_difference']):.1%}, values by {found['marginal_distance']:.3f} sd, roughness {found['roughness_ratio']:.2f} of the real; "
-        f"a classifier tells the sum from telemetry at AUC {found['classifier_auc']:.2f} (real from real: {found['floor_classifier_auc']:.2f})"
+        f"the standard deviation differs by {np.expm1(found['scale_difference']):.1%}, the distribution of values by {found['marginal_distance']:.3f} sd, and the "
+        f"roughness is {found['roughness_ratio']:.2f} of the real one; a classifier separates the sum from telemetry with an AUC of "
+        f"{found['classifier_auc']:.2f} (real from real: {found['floor_classifier_auc']:.2f})"
     )
     return Outcome(found["classifier_auc"], _verdict(plain and found["classifier_auc"] <= 0.6, plain), finding, found)
 
@@ -175,7 +176,7 @@ def _is_robust(experiment: Experiment) -> Outcome:
 def _degrades_rightly(experiment: Experiment) -> Outcome:
     found = experiment.degraded
     if found is None:
-        return Outcome(None, NOT_MEASURED, "nobody knows this channel's degraded truth")
+        return Outcome(None, NOT_MEASURED, "the true degraded signal of this channel is unknown")
     nominal, errors = found["nrmse"][0], found["nrmse"][1:]
     good = (errors <= 2 * nominal) & (errors < found["identity_nrmse"][1:])
     listed = ", ".join(f"{mode} {error:.2f}" for mode, error in zip(found["modes"][1:], errors, strict=True))
@@ -189,7 +190,9 @@ def _degrades_rightly(experiment: Experiment) -> Outcome:
 
 
 def _no_false_alarms(experiment: Experiment) -> Outcome:
-    return Outcome(None, NOT_MEASURED, f"{experiment.data.num_test_windows} disjoint test windows and no known degraded truth: too little")
+    return Outcome(
+        None, NOT_MEASURED, f"{experiment.data.num_test_windows} disjoint test windows and no known degraded signal: too few to measure"
+    )
 
 
 def _arm(found: Mapping[str, np.ndarray], arm: str, what: str) -> np.ndarray:
@@ -210,8 +213,8 @@ CLAIMS = (
         "A wide, shallow network learns to map the highly quantised simulation to the smooth waveform in 40 epochs.",
         "2.2",
         "fig04_enhanced_simulation",
-        "NRMSE of the enhanced signal on held-out time",
-        "at most 0.15, below the coarse signal and ridge regression (a real channel: below both)",
+        "NRMSE of the enhanced signal on held-out data",
+        "at most 0.15, and below the NRMSE of the coarse signal and of ridge regression; for a real channel only below these two",
         _learns_mapping,
         REPRODUCED,
     ),
@@ -220,7 +223,7 @@ CLAIMS = (
         "Inference is extremely fast: fidelity comes without substantial speed penalties.",
         "2.2",
         "fig04_enhanced_simulation",
-        "seconds of telemetry made in a second of work",
+        "seconds of telemetry generated per second of computation",
         "at least 10,000",
         _is_fast,
         REPRODUCED,
@@ -231,7 +234,7 @@ CLAIMS = (
         "2.2",
         "fig04_enhanced_simulation",
         "false-alarm rate on real nominal windows, mean over detectors",
-        "at least 10 % for every detector (set for 1 %)",
+        "at least 10 % for every detector, with thresholds set for 1 %",
         _is_too_clean,
         REPRODUCED,
     ),
@@ -240,8 +243,8 @@ CLAIMS = (
         "To match the qualities of the noise, the model needs around 1,000 iterations.",
         "2.3",
         "fig12_accuracy_loss",
-        "absolute log ratio of standard deviations after the last iteration",
-        "at most 0.1, and lag-1 correlation within 0.05",
+        "absolute log ratio of the standard deviations after the last iteration",
+        "at most 0.1, and a difference in lag-1 correlation of at most 0.05",
         _iterations_suffice,
         REPRODUCED,
         close_call=PARTLY,
@@ -251,7 +254,7 @@ CLAIMS = (
         "The discriminator improves slightly faster than the generator, and the two stay balanced.",
         "2.3",
         "fig12_accuracy_loss",
-        "share of rows judged rightly, mean over the second half of training",
+        "share of rows that the discriminator classifies correctly, mean over the second half of training",
         "from 0.5 to 0.8",
         _stays_balanced,
         PARTLY,
@@ -262,8 +265,10 @@ CLAIMS = (
         "After 1,000 iterations the generated noise is sufficiently similar to the actual noise.",
         "2.3",
         "fig06_real_or_generated_noise",
-        "effective rank of generated over real noise",
-        "scale, lag-1 and values within 0.1, 0.05, 0.1 (else not); rank at least 0.8 and classifier AUC at most 0.6 (else partly)",
+        "effective rank of generated noise divided by that of real noise",
+        "the log ratio of the standard deviations is at most 0.1, the difference in lag-1 correlation at most 0.05 and the distance between the "
+        "distributions of values at most 0.1 sd (otherwise not reproduced); the ratio of effective ranks is at least 0.8 and the classifier AUC at "
+        "most 0.6 (otherwise partly)",
         _noise_is_similar,
         PARTLY,
         close_call=NOT_REPRODUCED,
@@ -273,8 +278,9 @@ CLAIMS = (
         "The sum of both networks resembles the original telemetry.",
         "2.3",
         "fig13_combined",
-        "AUC of a classifier between the sum and telemetry",
-        "scale and values within 0.1, roughness within a quarter (else not); AUC at most 0.6 (else partly)",
+        "AUC of a classifier that separates the sum from telemetry",
+        "the log ratio of the standard deviations is at most 0.1, the distance between the distributions of values at most 0.1 sd and the roughness "
+        "ratio from 0.8 to 1.25 (otherwise not reproduced); the AUC is at most 0.6 (otherwise partly)",
         _sum_resembles,
         PARTLY,
     ),
@@ -284,7 +290,7 @@ CLAIMS = (
         "title, abstract",
         "fig13_combined",
         "false-alarm rate on real nominal windows, trained on enhanced + GAN noise, mean over detectors",
-        "for every detector at most twice the real-trained rate + 1 point, recall within 5 points",
+        "for every detector, a rate of at most twice that of the detector trained on real telemetry plus 1 percentage point, and a recall at most 5 points lower",
         _is_robust,
         NOT_TESTED,
         tested_by_paper=False,
@@ -295,7 +301,7 @@ CLAIMS = (
         "1, 3",
         "fig04_enhanced_simulation",
         "largest NRMSE over degraded modes, in units of the nominal NRMSE",
-        "at most 2 in every mode, and below the coarse signal's own error",
+        "at most 2 in every mode, and an error below that of the coarse signal",
         _degrades_rightly,
         NOT_TESTED,
         tested_by_paper=False,
@@ -304,7 +310,7 @@ CLAIMS = (
 
 
 def judge(claims: tuple[Claim, ...], experiment: Experiment) -> list[dict]:
-    """Judges the claims and returns one plain record each, as `results.json` holds them."""
+    """Evaluates the claims and returns one plain record for each, as stored in `results.json`."""
     records = []
     for claim in claims:
         outcome = claim.judge(experiment)

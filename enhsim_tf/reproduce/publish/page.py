@@ -33,7 +33,11 @@ PIPELINE = "fig01_pipeline"
 _KINDS = {REPRODUCED: "good", PARTLY: "half", NOT_REPRODUCED: "bad", NOT_TESTED: "open", NOT_MEASURED: "none"}
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")  # no such letter belongs on a page
 _TYPES = {"png": "image/png", "svg": "image/svg+xml"}
-_ORIGINS = {"paper": "from the paper’s text", "author": "from the author’s public code", "ours": "ours, each with its reason"}
+_ORIGINS = {
+    "paper": "from the paper’s text",
+    "author": "from the author’s public code",
+    "our": "choices of this project, each with its reason",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,7 +167,7 @@ def _tally(words: Sequence[str], order: Mapping[str, str]) -> dict[str, int]:
 
 
 def _origin(source: str) -> str:
-    """Where a setting comes from: `paper`, `author` or `ours`."""
+    """Where a setting comes from: `paper`, `author` or `our` (a choice of this project)."""
     return next(origin for origin in _ORIGINS if source.startswith(origin))
 
 

@@ -1,6 +1,6 @@
-"""What the experiment on robustness found, in words: the report in `docs/`, the README's table, the lines of the command.
+"""Writes the report on robustness in `docs/`, the table of the README and the last lines of the command.
 
-No number is written here: each comes from the findings, and a test renders the report again from the tables.
+All numbers come from the findings. A test renders the report again from the tables and compares.
 """
 
 import csv
@@ -27,7 +27,7 @@ from enhsim_tf.reproduce.publish.wording import (
 )
 
 PATH = Path("docs") / "REPORT.md"
-TABLES = (Path("docs") / "designs.csv", Path("docs") / "tries.csv")  # on the way to the second generator; where it misses a bar
+TABLES = (Path("docs") / "designs.csv", Path("docs") / "tries.csv")  # designs tried before and after the targets were tested
 
 
 def render(
@@ -42,11 +42,11 @@ def render(
 
     Args:
         found: The findings.
-        labelled: Those of the study of real telemetry, or None where there was none.
-        designs: Rows of what was tried on the way to the second generator, as `designs_of` reads them.
-        tries: Those of what was tried where it misses a bar.
-        timing: What the benchmark measured of its iteration, as `timing_of` reads it.
-        template: Its template, beside this module.
+        labelled: The findings of the study of real telemetry, or None if it was not run.
+        designs: Designs that were tried during the development of the convolutional GAN, as `designs_of` reads them.
+        tries: Designs that were tried where the convolutional GAN misses a target.
+        timing: The benchmark of its training iteration, as `timing_of` reads it.
+        template: Name of the template in the folder of this module.
     """
     import jinja2
 
@@ -85,7 +85,7 @@ def render(
 
 
 def findings_of(root: Path, name: str) -> Findings | None:
-    """The findings that a project keeps of an experiment, or None.
+    """The findings of an experiment that are stored in the project, or None.
 
     Args:
         root: Folder of the project.
@@ -96,7 +96,7 @@ def findings_of(root: Path, name: str) -> Findings | None:
 
 
 def designs_of(path: Path) -> list[dict[str, str]]:
-    """The rows of a table of designs that were tried, a row a training; none where there is no such file."""
+    """The rows of a table of designs that were tried, one row per training; empty if there is no such file."""
     if not path.is_file():
         return []
     with open(path, newline="", encoding="utf-8") as file:
@@ -104,14 +104,14 @@ def designs_of(path: Path) -> list[dict[str, str]]:
 
 
 def timing_of(root: Path) -> Findings | None:
-    """What the project's benchmark measured of the second generator's iteration: `ratio`, `bar` and `reached`; or None."""
+    """The benchmark of a training iteration of the convolutional GAN: `ratio`, `bar` and `reached`; or None."""
     path = root / "benchmarks" / "results.json"
     rows = json.loads(path.read_text(encoding="utf-8"))["rows"] if path.is_file() else []
     return next((row for row in rows if row["of"] == "second"), None)
 
 
 def _tried(row: Mapping[str, str]) -> dict[str, Any]:
-    """A row of the tries as the report shows it: how many measures are within twice their floor, and which is furthest."""
+    """A row of the tries as the report shows it, with the number of measures within twice their baseline and the largest ratio."""
     from enhsim_tf.realism.real_floor import MEASURES
     from enhsim_tf.reproduce.robustness.targets import LARGEST_RATIO
 
@@ -122,7 +122,7 @@ def _tried(row: Mapping[str, str]) -> dict[str, Any]:
 
 
 def report(found: Findings, root: Path) -> None:
-    """Writes the report and the README's part on the experiment; each only where it exists or may be made.
+    """Writes the report, and the generated parts of the README if it exists.
 
     Args:
         found: The findings of a full run.
@@ -161,24 +161,25 @@ def table(found: Findings) -> str:
         lines.append(f"| {arm} | {' | '.join(cells)} | {per_cent(about['recall'])} | {per_cent(about['gap_closed'], 0)} |")
     seeds, rate = found["seeds"], make_settings(found["budget"]).robustness.false_alarm_rate
     return "\n".join(lines) + (
-        f"\n\nFalse alarms on {found['num_windows']:,} nominal windows of the example telemetry that plays the part of the real, mean over {len(DETECTORS)} detectors "
-        f"set for {per_cent(rate, 0)}, with its 95 % interval over {in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}) and blocks of time; recall at the arm's own threshold, mean "
-        f"over {len(INJECTIONS)} kinds of anomaly and {len(SEVERITIES)} severities; gap closed: share of the way from *coarse* to *real*, mean over replicates. "
+        f"\n\nFalse alarms on {found['num_windows']:,} nominal windows of the example telemetry that stands in for real telemetry: mean over {len(DETECTORS)} detectors "
+        f"whose thresholds are set for {per_cent(rate, 0)}, with its 95 % interval over {in_seeds(seeds)} ({seeds[0]} to {seeds[-1]}) and blocks of time. *Recall* is "
+        f"measured at the arm's own threshold, as the mean over {len(INJECTIONS)} kinds of anomaly and {len(SEVERITIES)} severities. *Gap closed* is the share of the "
+        "difference in false-alarm rate between *coarse* and *real* that the arm removes, as the mean over replicates. "
         "From `figures/robustness/findings.json`."
     )
 
 
 def verdict_lines(found: Findings) -> list[str]:
-    """What the command says at its end."""
+    """The last lines that the command prints."""
     kept, total = share_c8(found)
     lines = [
-        f"C8  {verdict_c8(found)}: with the paper's generated noise, false alarms and recall are near the real-trained ones "
+        f"C8  {verdict_c8(found)}: with noise of the paper's GAN, false alarms and recall are near those of training on real telemetry "
         f"in {kept} of {total} pairs of environment and detector"
     ]
     for name, bar in found["bars"].items():
         words = {True: "reached", False: "not reached"}[bar["excess_reached"] and bar["recall_reached"] and bar["autoregression_reached"]]
         lines.append(
-            f"    {name:15} second generator: excess of false alarms {points(bar['excess'])} points, recall {points(bar['recall_difference'])} points "
-            f"from the real-trained: {words}"
+            f"    {name:15} convolutional GAN: against training on real telemetry, false alarms {points(bar['excess'])} points, "
+            f"recall {points(bar['recall_difference'])} points: {words}"
         )
     return lines

@@ -94,14 +94,14 @@ def collect(
         turns.end(stages)
         from enhsim_tf.keras_tools.backend import keras
 
-        keras.backend.clear_session()  # dozens of networks would fill the memory
+        keras.backend.clear_session()  # frees the memory of the channel's networks
     if not parts:
         raise InputError(f"Expected a channel that can be used. Received: none of {len(chosen)} in {data}. The first: {skipped[chosen[0]]}")
     return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}, skipped
 
 
 def table(found: dict[str, Any]) -> str:
-    """The README's table, a channel a row."""
+    """The table of the README, one row per channel."""
     from enhsim_tf.reproduce.spacecraft.study import GENERATED_ARM
 
     rows = [
@@ -128,7 +128,7 @@ def table(found: dict[str, Any]) -> str:
 
 
 def lines(found: dict[str, Any]) -> list[str]:
-    """What the command says at its end."""
+    """The last lines that the command prints."""
     from enhsim_tf.reproduce.spacecraft.study import GENERATED_ARM
 
     said = []
