@@ -225,7 +225,7 @@ def test_a_smoke_run_says_so_and_judges_nothing(folder, tree):
 
 def test_a_channel_is_named_and_expects_nothing(folder):
     text = read(folder, found_of(source="T-1.npy")).text
-    assert "Judged on T-1.npy" in text and "changed; expected" not in text
+    assert "Evaluated on T-1.npy" in text and "changed; expected" not in text
 
 
 # -- how it is built -------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The words of the report on robustness: how numbers are written, and the sentences that follow from a comparison of them."""
+"""Text of the report on robustness: the format of numbers, and sentences that depend on comparisons of numbers."""
 
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,28 +8,28 @@ if TYPE_CHECKING:
     from enhsim_tf.reproduce.settings import Settings
 
 Findings = Mapping[str, Any]
-DEVELOPMENT_SEEDS = range(100, 200)  # designs are chosen on these, and nothing is reported of them
-REAL_NOISE, AS_IT_IS = "real noise", "as it is"  # of the tries: what no generator made, and the design that nothing was changed in
+DEVELOPMENT_SEEDS = range(100, 200)  # designs are chosen on these seeds, and no results on them are reported
+REAL_NOISE, AS_IT_IS = "real noise", "as it is"  # rows of the tries: held-out real noise, and the unchanged design
 
 
 def number(value: float, digits: int = 1) -> str:
-    """A number with so many decimals; what rounds to nought has no sign."""
+    """A number with a fixed number of decimals; a number that rounds to zero has no sign."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def per_cent(value: float, digits: int = 1) -> str:
-    """A share as per cent."""
+    """A share in per cent."""
     return f"{number(100 * value, digits)} %"
 
 
 def interval(about: Mapping[str, float], digits: int = 1) -> str:
-    """A mean of shares with its interval, in per cent."""
+    """The mean of a share with its interval, in per cent."""
     mean, low, high = (number(100 * about[name], digits) for name in ("mean", "low", "high"))
     return f"{mean} % ({low} to {high})"
 
 
 def points(about: Mapping[str, float] | float, digits: int = 1) -> str:
-    """A difference of shares in points of per cent, with its interval where it has one."""
+    """A difference of shares in percentage points, with its interval if it has one."""
     if not isinstance(about, Mapping):
         return number(100 * about, digits)
     mean, low, high = (number(100 * about[name], digits) for name in ("mean", "low", "high"))
@@ -42,34 +42,34 @@ def p_value(value: float) -> str:
 
 
 def in_list(names: Sequence[str]) -> str:
-    """Names one after the other, the last behind an "and"."""
+    """Joins names with commas, and the last one with "and"."""
     return " and ".join(", ".join(names).rsplit(", ", 1))
 
 
 def reached(is_reached: bool) -> str:
-    """Whether a bar was reached."""
+    """Says whether a target is reached."""
     return "reached" if is_reached else "**not reached**"
 
 
 def share(text: str) -> str:
-    """A share of the table of designs in per cent; nothing where it was not measured."""
+    """A share from the table of designs in per cent; empty if it was not measured."""
     return per_cent(float(text)) if text else ""
 
 
 def share_c8(found: Findings, arm: str = "enhanced + GAN") -> tuple[int, int]:
-    """In how many pairs of environment and detector an arm keeps the ledger's rule of claim C8, and of how many."""
+    """The number of pairs of environment and detector in which an arm meets the criterion of claim C8, and the number of all pairs."""
     about = found["arms"][arm]["c8"]
     return len(about["kept"]), about["of"]
 
 
 def verdict_c8(found: Findings) -> str:
-    """Verdict on claim C8, that detectors trained on the paper's output are robust: the rule asks it of every detector."""
+    """Verdict on claim C8, that detectors trained on the paper's output are robust: every pair has to meet the criterion."""
     kept, total = share_c8(found)
     return "holds" if kept == total else "does not hold"
 
 
 def kept_c8(found: Findings, most: int = 6) -> str:
-    """The pairs of environment and detector that keep the rule, in words; none where there are many."""
+    """The pairs of environment and detector that meet the criterion, as text; empty if there are many."""
     kept = found["arms"]["enhanced + GAN"]["c8"]["kept"]
     detectors: dict[str, list[str]] = {}
     for environment, detector in kept if len(kept) <= most else ():
@@ -78,20 +78,20 @@ def kept_c8(found: Findings, most: int = 6) -> str:
 
 
 def first_trial(found: Findings) -> str:
-    """Whether the finding of the first trial is confirmed, environment by environment."""
+    """Says for each environment whether the finding of the first trial is confirmed."""
     from enhsim_tf.reproduce.robustness.findings import EVERYTHING
 
     groups: dict[str, list[str]] = {"Confirmed": [], "In part": [], "Refuted": []}
     for name, about in found["alarms_on_everything"].items():
         word = "Confirmed" if about["replicates"] == about["of"] else "In part" if about["replicates"] else "Refuted"
-        ends = dict.fromkeys(per_cent(about[end]) for end in ("low", "high"))  # one where they are the same
+        ends = dict.fromkeys(per_cent(about[end]) for end in ("low", "high"))  # a single number if both are equal
         groups[word].append(f"{name} ({about['replicates']} of {about['of']} replicates; {' to '.join(ends)})")
     said = [f"**{word}** on {', '.join(names)}" for word, names in groups.items() if names]
     return f"{'; '.join(said)}. Everything: at least {per_cent(EVERYTHING, 0)} of the windows."
 
 
 def words(found: Findings, settings: "Settings") -> dict[str, Any]:
-    """What the template says that is no number of the findings: names, what was fixed before, and what follows from a comparison."""
+    """Values for the template that are not in the findings: names, settings, and sentences that depend on comparisons."""
     from enhsim_tf.detection import anomalies as injections
     from enhsim_tf.detection import evaluation as robustness
     from enhsim_tf.detection.registry import DETECTORS
@@ -140,28 +140,31 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         "largest_ratio": number(bars.LARGEST_RATIO, 0),
         "best_control": max(about["recall_at_real_rate"] for about in controls if "recall_at_real_rate" in about),
         "modes_found": modes_found(found),
-        "least_p": inference.wilcoxon_signed_rank([1.0] * len(found["seeds"])),  # where all signs are the same
+        "least_p": inference.wilcoxon_signed_rank([1.0] * len(found["seeds"])),  # the p-value if all signs agree
         "quieter": scaled[max(scale for scale in scaled if scale < 1)],
+        "louder": scaled[min(scale for scale in scaled if scale > 1)],
     }
 
 
 def by_scale(found: Findings) -> dict[float, Findings]:
-    """What the second generator's noise does at each scale, without any real window."""
+    """The variations with noise of the convolutional GAN at each scale, without real windows."""
     return {row["scale"]: row for row in found["variations"] if row["arm"] == "residual + convolutional GAN" and row["real_share"] == 0}
 
 
 def opposite_signs(found: Findings, least: float = 0.1) -> str:
-    """The contrasts whose sign is not the same in all environments; log-odds nearer to nought than the least have none."""
+    """The contrasts with different signs in different environments; log-odds closer to zero than `least` have no sign."""
     said = []
     for contrast in (each for name in ("paper", "second") for each in found["contrasts"][name]):
         more, less = ([name for name in found["environments"] if sign * contrast["parts"][name] > least] for sign in (1, -1))
         if more and less:
-            said.append(f"*{contrast['first']}* alarms more than *{contrast['second']}* on {in_list(more)} noise, less on {in_list(less)}")
+            said.append(
+                f"*{contrast['first']}* has more false alarms than *{contrast['second']}* on {in_list(more)} noise, and fewer on {in_list(less)} noise"
+            )
     return "; ".join(said)
 
 
 def modes_found(found: Findings) -> str:
-    """What the degraded modes show against the baselines that cost nothing."""
+    """Compares the enhancers with simple baselines in the degraded modes."""
     errors = found["modes"]["nrmse"]
     at = {name: {where: f"{errors[name][where]:.2f}" for where in ("inside", "outside")} for name in errors}
     cells = {(row["method"], row["mode"], row["severity"]): row["nrmse"] for row in found["modes"]["by_mode"] if row["mode"] != "nominal"}
@@ -170,20 +173,20 @@ def modes_found(found: Findings) -> str:
     coarse = sum(cells["identity", *key] < error for key, error in network.items())
     worse = "above" if errors["paper"]["outside"] > errors["identity"]["outside"] else "below"
     return (
-        f"Outside, the paper's enhancer errs by {at['paper']['outside']}, {worse} the coarse signal left as it is ({at['identity']['outside']}) "
-        f"and against {at['moving average']['outside']} of the smoothed one. Training over random configurations is what helps, where the true response to them is known "
-        "as it is here (their targets are the true degraded signal with noise): linear regression over them "
-        f"errs by {at['ridge, randomised']['inside']} inside and {at['ridge, randomised']['outside']} outside, the network that learnt from the same by "
-        f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {len(network)} pairs of mode and severity the regression is nearer than that "
-        f"network, in {coarse} the untouched coarse signal."
+        f"For severities outside the training range, the error of the paper's enhancer is {at['paper']['outside']}, {worse} that of the coarse signal "
+        f"({at['identity']['outside']}); that of the smoothed coarse signal is {at['moving average']['outside']}. Training on random configurations reduces the error. It needs "
+        "the true response to them, which is known here: the targets are the true degraded signals with noise. Ridge regression trained in this way "
+        f"has an error of {at['ridge, randomised']['inside']} inside and {at['ridge, randomised']['outside']} outside, and a network trained on the same windows has "
+        f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {len(network)} pairs of mode and severity the regression has a smaller error than that "
+        f"network, and in {coarse} the coarse signal has."
     )
 
 
 def tries_found(tries: Sequence[Mapping[str, Any]]) -> str:
-    """How many measures the tries keep within twice their floor: the design as it is and the best other, environment by environment.
+    """The number of measures within twice their baseline, for the unchanged design and the best change in each environment.
 
     Args:
-        tries: Rows of the tries with how many measures are `within`, of which `number`.
+        tries: Rows of the tries, with the number of measures (`number`) and how many of them are `within`.
     """
     trainings = [row for row in tries if row["noise"] != REAL_NOISE]
     if not trainings:
@@ -195,13 +198,14 @@ def tries_found(tries: Sequence[Mapping[str, Any]]) -> str:
     for environment, counts in kept.items():
         mean = {noise: sum(each) / len(each) for noise, each in counts.items()}
         other = max(mean.keys() - {AS_IT_IS}, key=lambda noise: (mean[noise], noise), default=None)
-        before = f"{mean[AS_IT_IS]:.3g} as it is" if AS_IT_IS in mean else ""
-        after = f"{mean[other]:.3g} at best otherwise ({other})" if other else ""
+        before = f"{mean[AS_IT_IS]:.3g} for the unchanged design" if AS_IT_IS in mean else ""
+        after = f"{mean[other]:.3g} for the best change ({other})" if other else ""
         said.append(f"on {environment} noise {', '.join(filter(None, (before, after)))}")
     full = sum(row["within"] == row["number"] for row in trainings)
-    return f"Measures kept, of {trainings[0]['number']}: {'; '.join(said)}. {full or 'None'} of the {len(trainings)} trainings keeps all."
+    kept_all = f"{full or 'None'} of the {len(trainings)} trainings has all measures within."
+    return f"Number of measures, of {trainings[0]['number']}, within twice their baseline: {'; '.join(said)}. {kept_all}"
 
 
 def _noises(pipeline: str, arms: Iterable[str]) -> list[str]:
-    """What the measures of realism judge of a pipeline: what its generators learn from, and what they make of it."""
+    """The noises of a pipeline that are compared with real noise: the extracted noise, and that of each noise model."""
     return [f"{pipeline}: extracted", *(arm for arm in arms if arm.startswith(f"{pipeline} + "))]

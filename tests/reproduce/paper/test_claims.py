@@ -175,7 +175,7 @@ def test_c6(values, verdict):
 
 def test_c6_says_but_only_where_the_noise_fills_less():
     less, more = (_outcome("C6", _with("resemblance", noise_rank_ratio=ratio)).finding for ratio in (0.8 - TINY, 1.28))
-    assert "; but it fills 360 effective" in less and "; it fills 360 effective" in more
+    assert "; but it has an effective rank of 360" in less and "; it has an effective rank of 360" in more
 
 
 C7 = [({"sum_scale_difference": 0.1}, YES), ({"sum_scale_difference": 0.1 + TINY}, NO), ({"sum_marginal_distance": 0.1}, YES)]

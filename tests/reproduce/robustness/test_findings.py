@@ -249,7 +249,7 @@ def test_tries_are_counted_and_the_furthest_measure_is_named(found):
     }
     text = robustness_report.render({**found, "budget": "full"}, tries=[row])
     assert "| white | 110 | as it is | 1000 | 13 of 15 | tail ratio | 7.0 | 1.2 % |  |" in text
-    assert "Tries where" not in robustness_report.render({**found, "budget": "full"})
+    assert "Changes that were tried where" not in robustness_report.render({**found, "budget": "full"})
 
 
 def test_what_the_tries_show_is_counted():
@@ -264,10 +264,11 @@ def test_what_the_tries_show_is_counted():
         {"environment": where, "noise": noise, "within": within, "number": 15}
         for where, noise, within in (*counts, ("shot", "as it is", 5))
     ]
-    said = "Measures kept, of 15: on white noise 6.5 as it is, 9 at best otherwise (longer); on shot noise 5 as it is. "
-    assert report_words.tries_found(rows) == said + "None of the 5 trainings keeps all."
+    head = "Number of measures, of 15, within twice their baseline: on white noise 6.5 for the unchanged design, "
+    said = head + "9 for the best change (longer); on shot noise 5 for the unchanged design. "
+    assert report_words.tries_found(rows) == said + "None of the 5 trainings has all measures within."
     assert report_words.tries_found([*rows, {**rows[3], "within": 15}]).endswith(
-        "11.5 at best otherwise (louder); on shot noise 5 as it is. 1 of the 6 trainings keeps all."
+        "11.5 for the best change (louder); on shot noise 5 for the unchanged design. 1 of the 6 trainings has all measures within."
     )
     assert report_words.tries_found([]) == report_words.tries_found(rows[:1]) == ""
 
@@ -328,19 +329,23 @@ def test_sentences_follow_from_their_comparison(found):
     alarms.loc[(alarms["arm"] == "enhanced + GAN") & (alarms["environment"] == "shot"), "alarms"] = 40
     said = report_words.opposite_signs(findings.summarise(mixed))
     assert said == "; ".join(
-        f"*enhanced + GAN* alarms more than *{arm}* on white, autoregressive and heteroscedastic noise, less on shot"
+        f"*enhanced + GAN* has more false alarms than *{arm}* on white, autoregressive and heteroscedastic noise, and fewer on shot noise"
         for arm in ("enhanced + AR", "enhanced + bootstrap")
     )
     nearly = tables()
     alarms = nearly["alarms"]
     alarms.loc[(alarms["arm"] == "enhanced + GAN") & (alarms["environment"] == "shot"), "alarms"] = 49  # of 50: no sign
     assert report_words.opposite_signs(findings.summarise(nearly)) == ""
-    assert "in 0 the untouched coarse signal" in report_words.modes_found(found)
+    assert "in 0 the coarse signal has" in report_words.modes_found(found)
     near = tables()
     degraded = near["degraded"]
     degraded.loc[(degraded["method"] == "identity") & (degraded["severity"] == 1.0), "nrmse"] = 0.7
     words = report_words.modes_found(findings.summarise(near))
-    assert f"In 0 of {2 * len(MODES)} pairs" in words and f"in {len(MODES)} the untouched" in words and "0.80, above the coarse" in words
+    assert (
+        f"In 0 of {2 * len(MODES)} pairs" in words
+        and f"in {len(MODES)} the coarse signal has" in words
+        and "0.80, above that of the coarse" in words
+    )
 
 
 def test_the_first_trial_is_judged_environment_by_environment(found):
