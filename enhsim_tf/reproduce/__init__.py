@@ -1,1 +1,1 @@
-"""The paper: every number, figure and claim of Feldman 2020. Nothing below imports this wing."""
+"""Reproduction of Feldman 2020: every number, figure and claim of the paper. No other package imports this one."""

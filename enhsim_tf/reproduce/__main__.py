@@ -1,4 +1,4 @@
-"""`python -m enhsim_tf.reproduce`: runs the paper, draws its figures and says claim by claim what holds."""
+"""`python -m enhsim_tf.reproduce`: runs the pipeline of the paper, draws its figures and prints a verdict for each claim."""
 
 import argparse
 import sys
@@ -28,7 +28,7 @@ NOISES = ("white", "autoregressive", "heteroscedastic", "shot")
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """Reads the command line; imports nothing that is slow.
+    """Reads the command line without slow imports.
 
     Raises:
         InputError: If an option is unknown or its value is not of its kind.
@@ -76,7 +76,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Runs what the options ask for and returns the exit code."""
+    """Runs what the options ask for, and returns the exit code."""
     check(options)
     folder = make_folders(options)
     if options.experiment:
@@ -109,10 +109,10 @@ def run(options: argparse.Namespace) -> int:
     experiment = experiment_of(options.seed)
 
     def draw(names: Sequence[str]) -> float:
-        """Draws figures and returns the seconds of drawing alone."""
+        """Draws figures and returns the time of the drawing alone, in seconds."""
         drawn_s = 0.0
         for name in names:
-            data = FIGURE_DATA[name](experiment)  # does the stages it needs, which say their own time
+            data = FIGURE_DATA[name](experiment)  # runs the stages that the figure needs; these report their own time
             drawing = time.perf_counter()
             save(name, data, folder, caption_of(name, experiment), is_smoke, figures=FIGURES)
             drawn_s += time.perf_counter() - drawing
@@ -122,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
 
     chosen, records, drawn_s = chosen_figures(options.only), [], 0.0
     early = [] if options.only else [name for name in chosen if name in WITHOUT_TRAINING]
-    if early:  # something to look at in the minutes that the training takes
+    if early:  # drawn first, before the minutes of training
         drawn_s += draw(early)
         tell(f"figures {listed(early)} drawn in {folder}/ before any training")
     if not options.only:
@@ -155,7 +155,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def run_experiment(options: argparse.Namespace, folder: Path) -> int:
-    """Runs the experiment on robustness, below the figures' folder, and returns the exit code."""
+    """Runs the experiment on robustness in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.publish.report import report, verdict_lines
     from enhsim_tf.reproduce.robustness.run import FOLDER, run
     from enhsim_tf.reproduce.settings import make_settings
@@ -174,7 +174,7 @@ def run_experiment(options: argparse.Namespace, folder: Path) -> int:
 
 
 def run_labelled(options: argparse.Namespace, folder: Path) -> int:
-    """Runs the study of real telemetry, below the figures' folder, and returns the exit code."""
+    """Runs the study of real telemetry in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.publish.report import findings_of, report
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.spacecraft.run import FOLDER, lines, run
@@ -182,7 +182,7 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
 
     out = folder / FOLDER
     chosen = None if options.channels is None else [name.strip() for name in options.channels.split(",")]
-    cache, is_shown = options.cache or default_cache(), not is_other(options)  # asked before the run writes over what is shown
+    cache, is_shown = options.cache or default_cache(), not is_other(options)  # checked before the run overwrites the published results
     found = run(make_settings(options.budget), cache, options.data, out, chosen, options.fresh, tell)
     tell("\n" + "\n".join(lines(found)))
     kept = findings_of(Path(), "robustness")
@@ -193,7 +193,7 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
 
 
 def check(options: argparse.Namespace) -> None:
-    """Refuses what cannot be used before anything is made; needs no TensorFlow."""
+    """Rejects options that cannot be used, before anything is computed and without importing TensorFlow."""
     from enhsim_tf.common.errors import InputError
 
     if not 0 <= options.seed < 2**32 - max(options.spread, 0):
@@ -236,7 +236,7 @@ def check(options: argparse.Namespace) -> None:
 
 
 def location_of(place: str) -> str:
-    """Where in InfluxDB `--store` puts the telemetry."""
+    """The location in InfluxDB to which `--store` writes the telemetry."""
     from enhsim_tf.common.errors import InputError
     from enhsim_tf.reproduce.settings import LOCATION
 
@@ -246,7 +246,7 @@ def location_of(place: str) -> str:
 
 
 def chosen_figures(only: str | None) -> list[str]:
-    """Names of the figures to draw: all, or the one that is named by its number or in full."""
+    """Names of the figures to draw: all, or the one given by its number or full name."""
     from enhsim_tf.common.errors import InputError
     from enhsim_tf.reproduce.settings import FIGURES
 
@@ -257,13 +257,13 @@ def chosen_figures(only: str | None) -> list[str]:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Numbers of figures in words, such as 2, 3 and 11."""
+    """Numbers of figures as text, such as `2, 3 and 11`."""
     *numbers, last = [str(int(name.removeprefix("fig")[:2])) for name in names]
     return f"{', '.join(numbers)} and {last}" if numbers else last
 
 
 def out_folder(options: argparse.Namespace) -> Path:
-    """Where figures go; a smoke run, a real channel and what is a part of an experiment have folders of their own."""
+    """The output folder. Smoke runs, real channels and partial experiments have separate folders."""
     default = "smoke" if options.budget == "smoke" else "figures"
     if options.telemetry is not None:
         default = f"{default}_{options.telemetry.stem}"
@@ -273,7 +273,7 @@ def out_folder(options: argparse.Namespace) -> Path:
 
 
 def is_other(options: argparse.Namespace) -> bool:
-    """Whether an experiment is not the one that the project shows: fewer seeds, one environment, other channels."""
+    """Whether the experiment differs from the published one: fewer seeds, a single environment or other channels."""
     if options.experiment != "labelled":
         return options.seeds is not None or options.environment is not None
     from enhsim_tf.reproduce.publish.report import findings_of
@@ -284,7 +284,7 @@ def is_other(options: argparse.Namespace) -> bool:
 
 
 def make_folders(options: argparse.Namespace) -> Path:
-    """Makes the folders that the options name, before anything slow is imported; returns the one that figures go to."""
+    """Creates the folders that the options name, before any slow import, and returns the folder of the figures."""
     from enhsim_tf.common.atomic_files import make_folder, remove_leftovers
 
     out = make_folder(out_folder(options))

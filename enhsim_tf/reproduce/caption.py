@@ -1,4 +1,4 @@
-"""The small print of a figure: what ran, and the command that draws the figure again."""
+"""The caption line of a figure: what was run, and the command that draws the figure again."""
 
 import os
 import shlex
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def caption_of(name: str, experiment: "Experiment") -> str:
-    """The caption line of a figure, with every option that is not the default and that the picture depends on.
+    """The caption line of a figure, with every option that differs from its default and affects the figure.
 
     Args:
         name: One of `settings.FIGURES`.
@@ -24,7 +24,7 @@ def caption_of(name: str, experiment: "Experiment") -> str:
         options += ["--telemetry", _as_typed(source.path)]
         options += [] if source.column is None else ["--column", source.column]
         options += [] if source.time is None else ["--time", source.time]
-    if location := str(getattr(experiment, "location", "")):  # of a store that is not the default one
+    if location := str(getattr(experiment, "location", "")):  # only for stores other than the default
         options += ["--store", "influxdb" if location == LOCATION else location]
     options += [] if settings.budget == "full" else ["--budget", settings.budget]
     options += ["--seed", str(settings.seed)] if settings.seed else []
@@ -33,18 +33,18 @@ def caption_of(name: str, experiment: "Experiment") -> str:
 
 
 def caption_of_findings(found: Mapping[str, Any], command: str) -> str:
-    """The caption line of an experiment's figures: its `seeds`, its `budget` and the command that runs it."""
+    """The caption line of the figures of an experiment: its `seeds`, its `budget` and its command."""
     seeds = found["seeds"]
     ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
     return f"{ran} · {found['budget']} budget · {command}"
 
 
 def in_seeds(seeds: Sequence[int]) -> str:
-    """How many seeds, in words."""
+    """The number of seeds as text."""
     return "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
 
 
 def _as_typed(path: Path) -> str:
-    """A path as one types it: from the current folder where it lies below that, which keeps the machine's folders out of the figure."""
+    """A path relative to the current folder if it lies in that folder, so that no absolute path of the machine appears in the figure."""
     here = Path(os.path.abspath(path))  # without following links: the name is the user's
     return str(here.relative_to(Path.cwd())) if here.is_relative_to(Path.cwd()) else str(path)

@@ -1,4 +1,4 @@
-"""What a figure of the reproduction is, and how it is saved."""
+"""A figure of the reproduction, and functions that save figures."""
 
 import dataclasses
 import os
@@ -25,8 +25,8 @@ class Figure:
     Args:
         number: Its number; 14 is the one the paper commented out.
         title: The paper's caption.
-        alt: What it shows, in words, for those who do not see it.
-        drawn_by: Makes it from its arrays.
+        alt: Text alternative for readers who cannot see the figure.
+        drawn_by: Function that draws the figure from its arrays.
     """
 
     number: int
@@ -35,7 +35,7 @@ class Figure:
     drawn_by: Callable[[Mapping[str, np.ndarray]], matplotlib.figure.Figure]
 
     def draw(self, data: Mapping[str, np.ndarray]) -> matplotlib.figure.Figure:
-        """Draws the figure in the style of all.
+        """Draws the figure in the common style.
 
         Args:
             data: The arrays that `figure_data.FIGURE_DATA` makes for it.
@@ -54,7 +54,7 @@ def save(
     *,
     figures: Mapping[str, Figure],
 ) -> list[Path]:
-    """Draws a figure and writes it, with its caption line and, where it is due, the mark of a smoke run.
+    """Draws a figure and writes it with its caption line, and with a watermark if it comes from a smoke run.
 
     The same data give the same bytes.
 
@@ -62,7 +62,7 @@ def save(
         name: One of `figures`.
         data: Its arrays.
         folder: An existing folder.
-        caption: What ran, in small print at the bottom.
+        caption: Caption line, printed at the bottom.
         is_smoke: Whether the arrays come from a smoke run.
         saved_as: File types.
         figures: The figures by name.
@@ -96,8 +96,8 @@ def save_all(
         figures: The experiment's figures by name.
         found: Its findings.
         folder: An existing folder.
-        command: What runs it, for the captions.
-        names: Which; none for all.
+        command: The command of the experiment, for the captions.
+        names: Names of the figures; empty for all.
 
     Returns:
         The paths of the files.
@@ -107,5 +107,5 @@ def save_all(
 
 
 def _shape(words: np.ndarray) -> str:
-    """The samples of a Keras shape such as `(None, 500, 1)`."""
+    """The number of samples in a Keras shape such as `(None, 500, 1)`."""
     return str(words).strip("()").split(", ")[1]

@@ -1,7 +1,8 @@
-"""Known noise processes: the ground truth that a learned noise can be held against.
+"""Known noise processes, which serve as ground truth for learned noise.
 
-Each draws any length, has mean zero and knows its overall `standard_deviation`, and re-estimates its own parameters from
-windows, as Wunderlich and Sklar (2023) judge generated noise: a generator that learnt a process gives its parameters back.
+Each process generates noise of any length and mean zero, knows its overall `standard_deviation`, and estimates its own
+parameters from windows. Generated noise is evaluated as in Wunderlich and Sklar (2023): if a generator has learnt a process,
+the parameters estimated from its noise are those of the process.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 
 
 class NoiseProcess(Protocol):
-    """What every process does; its parameters are its fields, and `standard_deviation` is overall."""
+    """Interface of all processes. Parameters are the fields of the class; `standard_deviation` is that of the whole process."""
 
     standard_deviation: float
 
@@ -95,7 +96,7 @@ class FractionalGaussianNoise:
 
 @dataclass(frozen=True)
 class ShotNoise:
-    """Pulses of one sample that arrive as a Poisson process, on white noise; the mean of the pulses is taken off.
+    """Poisson pulses of one sample on white noise, with the mean of the pulses subtracted.
 
     Args:
         rate: Pulses a sample.

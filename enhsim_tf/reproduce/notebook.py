@@ -1,7 +1,7 @@
-"""What the notebooks share: the experiment, its figures and its claims, shown in Jupyter.
+"""Functions that the notebooks share: the experiment, its figures and its claims, displayed in Jupyter.
 
-It trains, measures and draws nothing of its own: stages come from the cache that `reproduce` fills, figures from the
-function that writes `figures/`, sentences and verdicts from the ledger.
+This module trains, measures and draws nothing itself. Stages come from the cache that `reproduce` fills, figures from the
+functions that write `figures/`, and sentences and verdicts from `claims`.
 """
 
 import contextlib
@@ -51,21 +51,21 @@ _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 
 
 class Arrays(dict):
-    """Arrays by name, of which Jupyter shows the shapes instead of the contents."""
+    """Arrays by name; Jupyter displays their shapes instead of their contents."""
 
     def __repr__(self) -> str:
         return "\n".join(f"{name}: {np.shape(values)} {np.asarray(values).dtype}" for name, values in self.items())
 
 
 class _MissingStageError(Exception):
-    """A stage that was looked for and is still to be done."""
+    """Raised for a stage that was looked up and has not been run."""
 
 
 class _Lookup(Stages):
-    """Stages that are looked for and never done."""
+    """Stages that are looked up in the cache and never run."""
 
     def run(self, name: str, make: Callable[[Path], None], *others: Any, **options: Any) -> Path:
-        @functools.wraps(make)  # a stage is found by the source of what makes it
+        @functools.wraps(make)  # stages are identified by the source of the functions that make them
         def refuse(folder: Path) -> None:
             raise _MissingStageError(name)
 
@@ -98,7 +98,7 @@ def open_experiment(budget: str | None = None) -> Experiment:
 
 
 def prepare(experiment: Experiment) -> list[str]:
-    """Does every stage; returns those that could not be done, because the experiment's stages are only looked up."""
+    """Runs every stage. Returns the names of stages that are missing if the experiment only looks stages up."""
     missing = []
     for stage, attribute in _STAGES.items():
         try:
@@ -118,7 +118,7 @@ def show(experiment: Experiment, name: str) -> Arrays:
 
 
 def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
-    """The experiment on robustness as it was run and kept: its findings, and the tables they come from."""
+    """The published results of the experiment on robustness: its findings, and the tables they are computed from."""
     found = json.loads((_KEPT / "findings.json").read_text(encoding="utf-8"))
     print(
         f"{found['num_replicates']} replicates: {in_seeds(found['seeds'])} in {len(found['environments'])} environments, kept in figures/."
@@ -127,7 +127,7 @@ def open_findings() -> "tuple[dict, dict[str, pd.DataFrame]]":
 
 
 def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
-    """The study of real telemetry as it was run and kept: its findings, and the tables they come from."""
+    """The published results of the study of real telemetry: its findings, and the tables they are computed from."""
     folder = _ROOT / "figures" / labelled_run.FOLDER
     found = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
     print(f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in figures/.")
@@ -145,10 +145,10 @@ def show_finding(found: dict, name: str) -> None:
 
 @contextlib.contextmanager
 def drawing(alt: str, columns: int = 1, height: float = 2.4, **shared: bool) -> Iterator:
-    """A row of panels in the style of all, shown when the `with` block ends.
+    """A row of panels in the common style, displayed when the `with` block ends.
 
     Args:
-        alt: What they show, in words.
+        alt: Text alternative.
         columns: Number of panels.
         height: Height in inches.
         **shared: What `matplotlib.figure.Figure.subplots` takes, for example `sharey`.
@@ -169,7 +169,7 @@ def _show_picture(png: bytes, alt: str) -> None:
 
 
 def claim(*ids: str) -> None:
-    """Shows claims of the paper, from the ledger: the sentence, where it stands, and what it is held to."""
+    """Displays claims of the paper: the sentence, its section, the statistic and the tolerance."""
     for known in (_LEDGER[id] for id in ids):
         held = f"{known.statistic}; {known.tolerance}"
         place = f"section {known.section}" if known.section[0].isdigit() else known.section
@@ -177,7 +177,7 @@ def claim(*ids: str) -> None:
 
 
 def verdict(experiment: Experiment, *ids: str) -> list[dict]:
-    """Judges claims by the ledger, shows verdicts and findings, and returns the records that `results.json` holds."""
+    """Evaluates claims, displays verdicts and findings, and returns the records as stored in `results.json`."""
     records = claims.judge(tuple(_LEDGER[id] for id in ids), experiment)
     for record in records:
         display(Markdown(f"> **{record['id']}: {record['verdict']}.** {record['finding'][0].upper()}{record['finding'][1:]}."))

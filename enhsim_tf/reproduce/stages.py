@@ -1,9 +1,9 @@
-"""Stages that are done once: each is kept under the hash of what it depends on and found again by the next run.
+"""Cached stages: each result is stored under a hash of what it depends on and reused by the next run.
 
-A stage is a function that fills a folder. The folder appears whole, under a name that holds the hash of the stage's
-settings, of its code with all modules that it imports, of the stages before it, and of the versions it ran on. A killed run
-therefore leaves only whole stages, and the next one goes on behind the last of them and clears away what was half done.
-The checksums of its files stand in `stage.json`: a stage that was damaged since is told and done again.
+A stage is a function that fills a folder. The folder is moved into place when it is complete. Its name contains a hash of the
+stage's settings, of its code with all modules that it imports, of the stages before it, and of package versions. An interrupted
+run therefore leaves only complete stages; the next run continues after the last one and removes incomplete ones. `stage.json`
+holds the checksums of the files: a stage that was damaged since is reported and run again.
 """
 
 import ast
@@ -30,7 +30,7 @@ VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "k
 
 
 def default_cache() -> Path:
-    """Where stages are kept: `ENHSIM_TF_CACHE`, or `.cache` beside the package's sources, or the user's cache folder."""
+    """The default cache: `ENHSIM_TF_CACHE`, or `.cache` in the folder of a source checkout, or the user's cache folder."""
     if "ENHSIM_TF_CACHE" in os.environ:
         return Path(os.environ["ENHSIM_TF_CACHE"])
     checkout = _PACKAGE.parent
@@ -42,7 +42,7 @@ class Stages:
 
     Args:
         cache: Folder the stages are kept in.
-        fresh: Whether to do every stage anew.
+        fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
         speaks: Whether a long stage also tells how far it is.
     """
@@ -65,7 +65,7 @@ class Stages:
         after: Iterable[str] = (),
         helpers: Iterable[Callable] = (),
     ) -> Path:
-        """Does a stage, or finds it done.
+        """Runs a stage, or finds it in the cache.
 
         Args:
             name: Name of the stage.
@@ -89,7 +89,7 @@ class Stages:
         if done is None:
             self.tell(f"{name:12} ...")
             began = time.perf_counter()
-            # of two runs at once the first to end keeps its place, so that nothing goes away that a run reads
+            # if two runs make the same stage, the first result is kept, because the other run may read it
             with replace_folder(folder, None if self.fresh else lambda path: _read(path, name)[1] is None) as temporary:
                 self._make(name, make, temporary)
                 done = {"stage": name, "seconds": time.perf_counter() - began, "sha256": _checksums(temporary)}
@@ -177,7 +177,7 @@ def _checksums(folder: Path) -> dict[str, str]:
 
 
 def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -> None:
-    """Keeps arrays and numbers of a stage.
+    """Stores arrays and numbers of a stage.
 
     Args:
         folder: Where.
@@ -189,7 +189,7 @@ def save_arrays(folder: Path, arrays: Mapping[str, Any], name: str = "arrays") -
 
 
 def load_arrays(folder: Path, name: str = "arrays") -> dict[str, np.ndarray]:
-    """The arrays and numbers that `save_arrays` kept; numbers come back as arrays of shape `()`."""
+    """The arrays and numbers that `save_arrays` stored; numbers are returned as arrays of shape `()`."""
     with np.load(folder / f"{name}.npz", allow_pickle=False) as archive:
         return dict(archive)
 
@@ -199,7 +199,7 @@ def _code(modules: Iterable[str]) -> str:
     waiting, seen = list(modules), {}
     while waiting:
         module = waiting.pop()
-        if module not in seen and module != "reproduce.settings":  # a stage depends on their values, not on how they are worded
+        if module not in seen and module != "reproduce.settings":  # a stage depends on the values of settings, not on their descriptions
             source = _file_of(module).read_text(encoding="utf-8")
             seen[module] = what_runs(source)
             waiting += imports_of(source)
@@ -212,7 +212,7 @@ def _file_of(module: str) -> Path:
 
 
 def what_runs(source: str) -> str:
-    """A source as its syntax tree in text, without comments and docstrings: what is said about code changes no result."""
+    """The syntax tree of a source as text, without comments and docstrings, because these do not affect results."""
     try:
         tree = ast.parse(textwrap.dedent(source))
     except SyntaxError:  # of a lambda, Python knows the lines around it alone

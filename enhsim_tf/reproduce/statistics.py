@@ -1,8 +1,7 @@
-"""What an experiment allows to be said: intervals and tests whose replicates are environments, seeds and blocks of time.
+"""Confidence intervals and tests in which environments, seeds and blocks of time are the replicates.
 
-Windows of one trained detector share its training, so they are no replicates: a hundred thousand of them still make one
-run. What is resampled or tested here is therefore always a whole cluster. A table is a pandas DataFrame, a row an
-observation.
+Windows that are scored by one trained detector share its training, so they are not independent replicates. All functions here
+therefore resample or test whole clusters. A table is a pandas DataFrame with one row per observation.
 """
 
 import dataclasses
@@ -38,16 +37,16 @@ class Interval:
 
 @dataclasses.dataclass(frozen=True)
 class Contrast:
-    """What one arm does against another, over paired replicates; `dataclasses.asdict` makes it plain.
+    """Difference between two arms over paired replicates; `dataclasses.asdict` converts it to plain types.
 
     Args:
         first: The arm that is subtracted from.
         second: The arm that is subtracted.
-        num_replicates: Pairs.
+        num_replicates: Number of pairs.
         num_clusters: Clusters of pairs that share draws.
         mean: Mean of the differences, with a crossed bootstrap interval.
         median: Their median, with its interval.
-        p_value: Two-sided, of the Wilcoxon signed-rank test of the clusters' means.
+        p_value: Two-sided p-value of the Wilcoxon signed-rank test of the cluster means.
         adjusted_p_value: The same by Holm over all contrasts that were declared together.
         pooled_p_value: That of the same test of all pairs, as if they shared nothing: too small where they do.
         parts: Mean difference in each label of the first factor.
@@ -136,12 +135,12 @@ def crossed_interval(
     level: float = 0.95,
     seed: int = 0,
 ) -> Interval:
-    """Percentile interval by a bootstrap over crossed factors, such as environments that all were run with the same seeds.
+    """Percentile interval by a bootstrap over crossed factors, such as environments that were all run with the same seeds.
 
-    Each resample draws, with replacement, labels of every factor, each factor for itself; takes the cells in which they
-    meet; and draws as many rows of each cell as it has, such as blocks of time (the pigeonhole bootstrap of Owen 2007,
-    with rows). What a seed does in all environments then stays together, where the nested bootstrap would average it
-    away. It errs on the wide side, but for a factor of few labels: with four the interval is narrow.
+    Each resample draws labels of every factor independently, with replacement. It takes the cells in which the drawn labels meet,
+    and draws as many rows of each cell as it has, such as blocks of time (the pigeonhole bootstrap of Owen 2007, with rows). Effects
+    that a seed has in all environments are thus preserved, whereas the nested bootstrap would average them out. The interval is
+    rather too wide, except for factors with few labels: with four labels it is too narrow.
 
     Args:
         table: The observations, the same number of rows in each cell.
@@ -182,12 +181,12 @@ def crossed_interval(
 
 
 def wilcoxon_signed_rank(differences: np.ndarray) -> float:
-    """Two-sided p-value of the Wilcoxon signed-rank test that differences of pairs are symmetric around zero.
+    """Two-sided p-value of the Wilcoxon signed-rank test that paired differences are symmetric around zero.
 
-    It is exact, with ties as without: all signs are counted out.
+    The test is exact with and without ties: it enumerates all signs.
 
     Args:
-        differences: One a replicate, shape `(replicates,)`; zeros are left out, as Wilcoxon did.
+        differences: One difference for each replicate, shape `(replicates,)`; zeros are ignored, as in Wilcoxon's original test.
 
     Returns:
         The p-value; 1 if all differences are zero.
@@ -213,7 +212,7 @@ def wilcoxon_signed_rank(differences: np.ndarray) -> float:
 
 
 def holm(p_values: Sequence[float]) -> np.ndarray:
-    """P-values adjusted for their number by Holm's step-down method: below 0.05, at most 5 % chance of any false finding.
+    """P-values adjusted by Holm's step-down method. Below 0.05, the probability of any false positive is at most 5 %.
 
     Raises:
         InputError: If one is not from 0 to 1.
@@ -228,7 +227,7 @@ def holm(p_values: Sequence[float]) -> np.ndarray:
 
 
 def detector_averaged_log_odds(table: "pd.DataFrame", levels: Sequence[str] = ("environment", "seed")) -> "pd.DataFrame":
-    """The primary statistic of a replicate: log-odds of its false alarms, mean over detectors; a column an arm.
+    """The primary statistic of a replicate: the log-odds of a false alarm, as the mean over detectors; one column per arm.
 
     Args:
         table: Rows with the columns of `levels`, `arm`, `detector`, `alarms` and `trials`; rows that agree in the first
@@ -263,12 +262,12 @@ def declared_contrasts(
     level: float = 0.95,
     seed: int = 0,
 ) -> list[Contrast]:
-    """Tests the contrasts that were declared before the experiment, all of them together.
+    """Tests contrasts between arms that were declared before the experiment, with adjustment for their number.
 
-    A difference is that of the detector-averaged log-odds of two arms in one replicate. Below zero the first arm has the
-    fewer false alarms. Replicates of one seed share draws (of telemetry, weights and places), so the test takes the mean
-    of each seed over the environments, and speaks of the very environments that were tried; the interval draws
-    environments too, so it speaks of their like.
+    A difference is that of the detector-averaged log-odds of two arms in one replicate. If it is negative, the first arm has fewer
+    false alarms. Replicates of one seed share draws (of telemetry, weights and positions), so the test uses the mean of each seed
+    over the environments and applies to these environments only. The interval resamples environments too, so it applies to similar
+    environments.
 
     Args:
         table: As `detector_averaged_log_odds` takes it.
@@ -330,7 +329,7 @@ def rank_correlation(
         x: One variable, shape `(rows,)`.
         y: The other, same shape.
         clusters: Label of each row's cluster, the rows of which stay together; None if rows are independent.
-        num_resamples: Bootstrap resamples; those that leave a variable constant say nothing and do not count.
+        num_resamples: Bootstrap resamples; resamples in which a variable is constant are ignored.
         level: Confidence, between 0 and 1.
         seed: Seed of the draws.
 
@@ -367,7 +366,7 @@ def _percentile_interval(estimate: float, found: list[float], level: float) -> I
 
 
 def _resamples(labels: list[np.ndarray], num_resamples: int, seed: int) -> Iterator[np.ndarray]:
-    """Row numbers of each resample; many resamples are drawn at once, a level at a time."""
+    """Row numbers of each resample; many resamples are drawn at once, level by level."""
     rng = np.random.default_rng(seed)
     codes = np.stack([np.unique(label, return_inverse=True)[1] for label in labels])
     order = np.lexsort(codes[::-1])  # rows of a cluster are neighbours in this order

@@ -1,4 +1,4 @@
-"""The tables of an experiment as they are kept: small enough to be committed, and read back as they were."""
+"""Tables of an experiment in compact files, small enough to be committed."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class KeptTables:
-    """What an experiment keeps, a Parquet file a table.
+    """The tables that an experiment stores, one Parquet file each.
 
     Args:
-        names: The tables.
-        labels: Columns of few different words, which are kept as dictionaries.
+        names: Names of the tables.
+        labels: Columns with few distinct values, which are stored as dictionaries.
         digits: Decimals that numbers are rounded to.
-        kind: What made the tables, for messages: an `experiment` or a `study`.
-        command: The command that makes them.
-        digits_of: Decimals of those tables that have others.
+        kind: Word for messages: an `experiment` or a `study`.
+        command: The command that produces them.
+        digits_of: Decimals of tables that differ from `digits`.
     """
 
     names: tuple[str, ...]
@@ -35,7 +35,7 @@ class KeptTables:
     digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
 
     def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
-        """Writes each table, labels as dictionaries and numbers with the digits that their counts support.
+        """Writes all tables: labels as dictionaries, and numbers rounded to the precision that their counts support.
 
         Args:
             tables: By name.
@@ -52,7 +52,7 @@ class KeptTables:
                 compact.to_parquet(temporary, compression="zstd", index=False)
 
     def read(self, folder: Path) -> "dict[str, pd.DataFrame]":
-        """The tables that `write` wrote.
+        """Reads the tables that `write` wrote.
 
         Raises:
             InputError: If one is missing.
@@ -65,5 +65,5 @@ class KeptTables:
         tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in self.names}
         for table in tables.values():
             for column in set(self.labels) & set(table.columns):
-                table[column] = table[column].astype(str)  # plain labels again
+                table[column] = table[column].astype(str)  # categories back to strings
         return tables

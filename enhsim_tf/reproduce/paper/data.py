@@ -1,6 +1,6 @@
-"""The data of a run: telemetry placed in the store and read back, its parts, and the windows cut from them.
+"""The data of a run: telemetry written to the store and read back, its parts, and windows of them.
 
-Everything that the stages of `experiments` share and that trains nothing.
+This module contains what all stages of the pipeline share and nothing that is trained.
 """
 
 import dataclasses
@@ -49,10 +49,10 @@ class Channel:
     Args:
         telemetry: The whole series.
         train: Its training part.
-        calibration: The part that thresholds come from, or None.
-        test: The part that everything is measured on.
+        calibration: The part on which thresholds are set, or None.
+        test: The part on which results are measured.
         coarse: Its coarse simulator.
-        periods_s: Periods of the sines it is made of, or None where nobody knows.
+        periods_s: Periods of its sines in seconds, or None if unknown.
         amplitudes: Their amplitudes, or None.
     """
 
@@ -66,7 +66,7 @@ class Channel:
 
     @property
     def truth(self) -> Callable[[np.ndarray], np.ndarray] | None:
-        """The noiseless signal as a function of time, or None where nobody knows it."""
+        """The noiseless signal as a function of time, or None if it is unknown."""
         return None if self.periods_s is None else functools.partial(sines, periods_s=self.periods_s, amplitudes=self.amplitudes)
 
 
@@ -82,12 +82,12 @@ def waves_of(settings: Settings) -> dict[str, tuple[tuple[float, ...], tuple[flo
 
 
 def least_part(settings: Settings) -> int:
-    """Fewest samples of a part: ten overlapping windows of noise, and what the moving average cuts off around them."""
+    """The smallest number of samples in a part: ten overlapping windows of noise, and the edges that the moving average removes."""
     return settings.telemetry.window + 9 + settings.noise.moving_average - 1
 
 
 def draw(settings: Settings, purpose: str) -> np.random.Generator:
-    """The generator of one purpose: draws for one do not move those for another."""
+    """The random generator of one purpose. Draws for one purpose do not affect those for another."""
     return np.random.default_rng([settings.seed, zlib.crc32(purpose.encode())])
 
 
@@ -95,12 +95,12 @@ def draw_noise(settings: Settings, num_samples: int, rng: np.random.Generator) -
     """The noise of the example telemetry, float64 of shape `(num_samples,)`.
 
     Args:
-        settings: Every number; `telemetry.noise` names the process.
+        settings: All settings; `telemetry.noise` names the process.
         num_samples: Length of the series.
-        rng: Owner of the draws.
+        rng: Random generator.
 
     Raises:
-        InputError: If nobody knows a process of that name.
+        InputError: If there is no process of that name.
     """
     chosen = settings.telemetry
     if chosen.noise not in NOISES:
@@ -110,11 +110,11 @@ def draw_noise(settings: Settings, num_samples: int, rng: np.random.Generator) -
 
 
 def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -> None:
-    """Places the telemetry in the store: the paper's example, or a real channel.
+    """Writes the telemetry to the store: the paper's example or a real channel.
 
     Args:
         store: The store.
-        settings: Every number.
+        settings: All settings.
         source: A file of real telemetry, or None for the paper's example.
     """
     chosen = settings.telemetry
@@ -133,7 +133,7 @@ class Data:
 
     Args:
         store: The store.
-        settings: Every number.
+        settings: All settings.
         is_paper: Whether the store holds the paper's example, where the truth is known.
     """
 
@@ -166,17 +166,17 @@ class Data:
         return Channel(series, train, None, test, SquareWaveSimulator.fit(train, num_levels=self.settings.enhancer.num_levels))
 
     def draw(self, purpose: str) -> np.random.Generator:
-        """The generator of one purpose."""
+        """The random generator of one purpose."""
         return draw(self.settings, purpose)
 
     @property
     def num_test_windows(self) -> int:
-        """Test windows that share no sample: the sample size of every rate measured on the test part."""
+        """Number of disjoint test windows: the sample size of every rate that is measured on the test part."""
         return sum(len(channel.test) // self.window for channel in self.channels)
 
     @functools.cached_property
     def units(self) -> tuple[float, float, float]:
-        """Offset and scale of the signal and scale of the noise; a real channel is normalised, the paper's is not."""
+        """Offset and scale of the signal and scale of the noise. A real channel is normalised; the paper's example is not."""
         channel = self.channels[0]
         if channel.truth is not None:
             return 0.0, 1.0, 1.0
@@ -185,13 +185,13 @@ class Data:
         )
 
     def windows(self, part: str, num_windows: int | None, purpose: str = "", synchronised: bool = False) -> dict[str, np.ndarray]:
-        """Paired windows of one part of every channel, as many of each.
+        """Paired windows of one part, with equal numbers of windows from each channel.
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
-            purpose: Names the draw of the offsets.
-            synchronised: Whether the coarse simulator's clock is set to each window, instead of running on from training.
+            num_windows: Number of windows at random offsets; None for all disjoint windows in order of time.
+            purpose: Name of the random draw of the offsets.
+            synchronised: Whether the phase of the coarse simulator is aligned to each window instead of continuing from training.
 
         Returns:
             `coarse`, `target` (the telemetry) and `truth` (the noiseless signal where known, else the telemetry),
@@ -210,12 +210,12 @@ class Data:
         return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}
 
     def noise_windows(self, part: str, num_windows: int | None, purpose: str = "") -> np.ndarray:
-        """Windows of the noise that the moving average leaves of a part.
+        """Windows of the noise that remains when the moving average is subtracted from a part.
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
-            purpose: Names the draw of the offsets.
+            num_windows: Number of windows at random offsets; None for all disjoint windows in order of time.
+            purpose: Name of the random draw of the offsets.
 
         Returns:
             float32 array of shape `(windows, samples)`.
@@ -232,7 +232,7 @@ class Data:
         return even_offsets(num_samples, self.window, min(200, num_samples - self.window + 1) if few else disjoint)
 
     def degraded_times(self) -> np.ndarray:
-        """Times of the windows that degraded modes are measured on, shape `(windows, samples)`."""
+        """Times of the windows on which degraded modes are measured, shape `(windows, samples)`."""
         begins = self.draw("degraded windows").integers(0, 10**6, self.settings.detectors.num_windows)
         return self.settings.telemetry.interval_s * (begins[:, None] + np.arange(self.window, dtype=np.float64))
 
@@ -241,7 +241,7 @@ class Data:
         return self.channels[0].coarse.simulate(self.degraded_times(), scenario, self.draw(f"degraded {scenario}"))
 
     def degraded_truth(self, scenario: Degraded | None, noisy: bool) -> np.ndarray:
-        """What the true vehicle of the paper's example sends in that mode, at the same times, with the same draws."""
+        """The true signal of the paper's example in a degraded mode, at the same times and with the same draws."""
         channel, rng = self.channels[0], self.draw(f"degraded {scenario}")
         size = sum(channel.amplitudes)
         clean = degrade(channel.truth, self.degraded_times(), scenario, (-size, size), min(channel.periods_s), rng)

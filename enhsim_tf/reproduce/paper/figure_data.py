@@ -1,8 +1,8 @@
-"""The arrays behind each figure: what is asked of the experiment, and nothing drawn.
+"""The arrays behind each figure.
 
-Each function takes the `Experiment` and returns plain arrays by name: numbers as arrays of shape `()`, words as unicode
-arrays, so that `numpy.savez` keeps them without pickle. It asks only for what its figure shows: a figure of windows, or of
-how a network is built, trains none.
+Each function takes the `Experiment` and returns plain arrays by name: numbers as arrays of shape `()` and text as unicode
+arrays, so that `numpy.savez` stores them without pickle. It requests only the stages that its figure needs, so a figure of
+windows or of the layers of a network trains nothing.
 """
 
 import collections
@@ -27,7 +27,7 @@ _STORE_STRETCH = 3_600  # samples of figure 14: an hour of the paper's example
 
 
 def pipeline(experiment: Experiment) -> Arrays:
-    """Figure 1: the waveforms of one held-out window on their way, and the widths of the networks."""
+    """Figure 1: the waveforms of one held-out window in each step, and the widths of the networks."""
     simulator, data = experiment.simulator, combined(experiment)
     held_out = _windows(experiment, "test", 1, "figure 13")
     noise, _ = _noise_of(experiment, held_out["offset"][0])
@@ -177,7 +177,7 @@ WITHOUT_TRAINING = (
 """Figures that show nothing a network has learnt; they can be drawn before any is trained."""
 
 
-# -- what several of them need ---------------------------------------------------------------------------------------------
+# -- shared helpers ---------------------------------------------------------------------------------------------
 
 
 def _windows(experiment: Experiment, part: str, num_windows: int, purpose: str) -> Arrays:
@@ -211,13 +211,13 @@ def _axis(experiment: Experiment, num_samples: int | None = None) -> Arrays:
 
 
 def _unit(experiment: Experiment, series: Telemetry) -> np.ndarray:
-    """The unit of the values in words; a file seldom says it."""
+    """The unit of the values as text; most files do not give it."""
     unit = series.unit
     return np.array(unit if unit != "1" else "dimensionless" if experiment.is_paper else "as recorded")
 
 
 def _shuffled(real: np.ndarray, generated: np.ndarray, rng: np.random.Generator) -> Arrays:
-    """Real and generated rows in an order that `rng` draws, and which is which."""
+    """Real and generated rows in random order, and which rows are generated."""
     is_generated = np.repeat([False, True], [len(real), len(generated)])
     order = rng.permutation(len(is_generated))
     return {"rows": np.concatenate([real, generated])[order], "is_generated": is_generated[order]}
@@ -228,7 +228,7 @@ def _seed(rng: np.random.Generator) -> int:
 
 
 def _layers(model: "keras.Model") -> Arrays:
-    """A Keras model as a table: one row a layer."""
+    """A Keras model as a table, one row per layer."""
     rows = {
         "layer": _names(model.layers),
         "type": [type(layer).__name__ for layer in model.layers],

@@ -1,7 +1,7 @@
-"""The figures of the paper by name: what each is called, what it shows to those who do not see it, how it is drawn and kept.
+"""The figures of the paper by name, with their number, caption, text alternative and drawing function.
 
-`figure_data` makes the arrays, `curves` and `diagrams` draw them. Drawing takes arrays alone: it trains nothing, saves
-nothing and shows nothing, and needs neither TensorFlow nor a screen.
+`figure_data` makes the arrays; `curves` and `diagrams` draw them. Drawing depends on the arrays only. It trains, saves and
+displays nothing, and needs neither TensorFlow nor a screen.
 """
 
 from enhsim_tf.reproduce.figure import Figure, _shape

@@ -1,6 +1,6 @@
-"""The paper's experiment with InfluxDB 2 as the storage and retrieval system of its "Goal": `--store influxdb`.
+"""The paper's experiment with InfluxDB 2 as the storage and retrieval system ("Goal" in Figure 1): `--store influxdb`.
 
-A room of its own, so that neither the database nor its client is among what the other stages depend on.
+This is a separate module, so that the other stages do not depend on the database or its client.
 """
 
 import dataclasses
@@ -25,8 +25,8 @@ class InfluxExperiment(Experiment):
 
     Args:
         location: Where in InfluxDB; what is placed there gets a tag `run` by its content, so that no two runs meet.
-        settings: Every number.
-        stages: Keeps what is done.
+        settings: All settings.
+        stages: Runs stages and caches their results.
         source: A file of real telemetry, or None for the paper's example.
         verbose: Progress bars: 0 none, 1 one for each training.
     """

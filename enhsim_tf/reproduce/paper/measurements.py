@@ -1,4 +1,4 @@
-"""What the claims are judged by: measures of networks and windows, each a dictionary of numbers and arrays."""
+"""Measurements for the claims: measures of networks and windows, each returned as a dictionary of numbers and arrays."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, float]:
-    """Error of the enhancer and of its baselines against the truth, in training and on held-out time.
+    """Error of the enhancer and of its baselines with respect to the truth, on training data and on held-out data.
 
     Args:
         enhance: From coarse to enhanced windows.
@@ -48,7 +48,7 @@ def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, f
 def resemblance(
     generated: np.ndarray, real: np.ndarray, real_again: np.ndarray, seed: int, on_comparison: Callable[[int], None] = lambda done: None
 ) -> dict[str, float]:
-    """How close generated windows are to real ones, each measure beside its real-against-real floor.
+    """Similarity of generated and real windows; each measure is returned together with its real-vs-real baseline.
 
     Args:
         generated: Generated windows.
@@ -74,15 +74,15 @@ def resemblance(
 
 
 def speed(simulator: "EnhancedSimulator", num_windows: int, repeats: int = 5) -> dict[str, float]:
-    """Seconds of telemetry made in one second of work, coarse and with everything; medians over repeats.
+    """Seconds of telemetry generated per second of computation, for the coarse simulator and the whole pipeline; medians over repeats.
 
     Args:
         simulator: The enhanced simulator.
         num_windows: Windows generated at a time.
-        repeats: How often.
+        repeats: Number of repeats.
     """
     seconds = {"coarse": [], "generate": []}
-    simulator.generate(num_windows, seed=0)  # the first call builds the networks' functions
+    simulator.generate(num_windows, seed=0)  # the first call traces the networks, and is not timed
     for repeat in range(repeats):
         for name, work in (("coarse", simulator.generate_coarse), ("generate", simulator.generate)):
             began = time.perf_counter()
@@ -96,11 +96,11 @@ def speed(simulator: "EnhancedSimulator", num_windows: int, repeats: int = 5) ->
 def false_alarms(
     arms: Mapping, test: np.ndarray, degraded: Mapping, settings: DetectorSettings, seed: int, progress: Progress = SILENT
 ) -> dict[str, np.ndarray]:
-    """False alarms and recall of detectors trained on each arm; the threshold comes from held-out windows of the arm.
+    """False-alarm rate and recall of detectors trained on each arm. Thresholds are set on held-out windows of the arm.
 
     Args:
         arms: From the name of an arm to its `(training, threshold)` windows.
-        test: Real nominal windows that share no sample.
+        test: Disjoint real nominal windows.
         degraded: From a degraded mode to real degraded windows.
         settings: The detectors' settings.
         seed: Seed of the detectors.
@@ -129,7 +129,7 @@ def false_alarms(
 
 
 def make_detectors(settings: DetectorSettings, seed: int) -> dict:
-    """The detectors of claims C3 and C8 by name, untrained."""
+    """The untrained detectors of claims C3 and C8, by name."""
     return {
         "PCA residual": PCAResidual(settings.num_components, seed=seed),
         "isolation forest": IsolationForestOnFeatures(settings.num_trees, seed=seed),
@@ -138,7 +138,7 @@ def make_detectors(settings: DetectorSettings, seed: int) -> dict:
 
 
 def degraded_error(enhance: Callable, coarse: Callable, truth: Callable, modes: list[str], severity: float) -> dict[str, np.ndarray]:
-    """Error of the enhanced signal in each degraded mode, where the degraded truth is known.
+    """Error of the enhanced signal in each degraded mode, if the true degraded signal is known.
 
     Args:
         enhance: From coarse to enhanced windows.

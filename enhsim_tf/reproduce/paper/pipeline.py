@@ -1,6 +1,6 @@
-"""The paper's experiment, stage by stage: what is trained and measured, from what, and what is kept of it.
+"""The paper's experiment as cached stages.
 
-Each property is done when a figure or a claim asks for it, once, and kept by `stages`; `--only fig02` trains nothing.
+Each property is computed once, when a figure or a claim needs it, and cached by `stages`; `--only fig02` trains nothing.
 """
 
 import functools
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 _DATA = ("reproduce.paper.data",)
 _ENHANCER = (*_DATA, "enhancer.network", "keras_tools.training")
 _NOISE = (*_DATA, "noise.gan", "noise.generator", "noise.discriminator", "realism.measures")
-_MEASURED = ("reproduce.paper.pipeline",)  # how the networks are put together is part of what is measured
+_MEASURED = ("reproduce.paper.pipeline",)  # the results depend on the architecture of the networks
 
 
 class Experiment:
     """The reproduction on the paper's example, or the same pipeline on a real channel.
 
     Args:
-        settings: Every number.
-        stages: Keeps what is done.
+        settings: All settings.
+        stages: Runs stages and caches their results.
         source: A file of real telemetry, or None for the paper's example.
         verbose: Progress bars: 0 none, 1 one for each training.
     """
@@ -45,7 +45,7 @@ class Experiment:
 
     @property
     def is_paper(self) -> bool:
-        """Whether this is the paper's own example, where the truth is known."""
+        """Whether this is the paper's own example, for which the true signal is known."""
         return self.source is None
 
     @functools.cached_property
@@ -73,7 +73,7 @@ class Experiment:
 
     @functools.cached_property
     def enhancer_folder(self) -> Path:
-        """Network one and its history."""
+        """Folder of the trained enhancer (the paper's first network) and its history."""
         _ = self.data
         depends = (
             self.settings.telemetry,
@@ -86,7 +86,7 @@ class Experiment:
         return self.stages.run("enhancer", self._make_enhancer, _ENHANCER, depends, ("telemetry",), helpers)
 
     def untrained_enhancer(self) -> "keras.Model":
-        """Network one before it has learnt anything."""
+        """The enhancer before training."""
         from enhsim_tf.enhancer.network import build_enhancer
 
         chosen = self.settings.enhancer
@@ -121,14 +121,14 @@ class Experiment:
 
     @functools.cached_property
     def noise_folder(self) -> Path:
-        """Network two, its history and how its noise changed while it learned."""
+        """Folder of the trained noise GAN (the paper's second network), its history and the statistics of its noise during training."""
         _ = self.data
         depends = (self.settings.telemetry, self.settings.split, self.settings.noise, self.settings.adversarial, self.settings.seed)
         helpers = (Experiment.untrained_noise_networks,)
         return self.stages.run("noise GAN", self._make_noise, _NOISE, depends, ("telemetry",), helpers)
 
     def untrained_noise_networks(self) -> "tuple[keras.Model, keras.Model]":
-        """Network two, generator and discriminator, before they have learnt anything."""
+        """The generator and the discriminator before training."""
         from enhsim_tf.noise.discriminator import build_discriminator
         from enhsim_tf.noise.generator import build_generator
 
@@ -187,7 +187,7 @@ class Experiment:
 
     @functools.cached_property
     def simulator(self) -> "EnhancedSimulator":
-        """The `EnhancedSimulator` of the first channel, put together from both networks."""
+        """The `EnhancedSimulator` of the first channel, made of both networks."""
         from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
         from enhsim_tf.keras_tools.backend import keras
         from enhsim_tf.noise.gan import NoiseGAN
@@ -202,7 +202,7 @@ class Experiment:
         channel = self.data.channels[0]
         return EnhancedSimulator(channel.coarse, enhancer, noise, channel.telemetry.interval_s, offset, scale)
 
-    # -- what the claims are judged by ---------------------------------------------------------------------------------
+    # -- measurements for the claims ---------------------------------------------------------------------------------
 
     def _measure(self, name: str, make: Callable[[Path], None]) -> dict[str, np.ndarray]:
         _ = self.enhancer_folder, self.noise_folder
@@ -217,19 +217,19 @@ class Experiment:
         train = self.data.windows("train", self.settings.telemetry.num_windows, "training windows")
         test = self.data.windows("test", None)
         found = measurements.enhancement(self.simulator.enhance, train, test)
-        if not self.is_paper:  # a real period wanders: show what remains of the error when the phase is not to blame
+        if not self.is_paper:  # the period of a real channel varies: also report the error without the phase error
             in_step = measurements.enhancement(self.simulator.enhance, train, self.data.windows("test", None, synchronised=True))
             found |= {f"synchronised_{key}": value for key, value in in_step.items() if key.endswith("nrmse")}
         save_arrays(folder, found)
 
     @functools.cached_property
     def resemblance(self) -> dict[str, np.ndarray]:
-        """How close the generated noise (C6) and the sum (C7) are to the real ones, beside their floors."""
+        """Similarity of the generated noise (C6) and of the sum (C7) to real windows, with real-vs-real baselines."""
         return self._measure("resemblance", self._make_resemblance)
 
     def _make_resemblance(self, folder: Path) -> None:
         seed, noise_of, told = self.settings.seed, self.simulator.noise.generate, self.stages.progress.loop("comparison", 4)
-        # windows that share no sample, in the order of time: an overlap across the classifier's folds would give itself away
+        # disjoint windows in order of time: overlapping windows in different folds would bias the classifier
         real, again = (self.data.noise_windows(part, None) for part in ("test", "train"))
         noise = measurements.resemblance(noise_of(len(real), seed + 1), real, again, seed, told.within(0))
         real, again = (self.data.windows(part, None) for part in ("test", "train"))
@@ -241,7 +241,7 @@ class Experiment:
 
     @functools.cached_property
     def speed(self) -> dict[str, np.ndarray]:
-        """Seconds of telemetry made in a second of work (C2)."""
+        """Seconds of telemetry generated per second of computation (C2)."""
         return self._measure("speed", self._make_speed)
 
     def _make_speed(self, folder: Path) -> None:
@@ -249,7 +249,7 @@ class Experiment:
 
     @functools.cached_property
     def false_alarms(self) -> dict[str, np.ndarray] | None:
-        """False alarms and recall by training arm (C3, C8); None for a real channel, whose degraded truth nobody knows."""
+        """False-alarm rate and recall by training arm (C3, C8); None for a real channel, whose true degraded signal is unknown."""
         return self._measure("false alarms", self._make_false_alarms) if self.is_paper else None
 
     def _make_false_alarms(self, folder: Path) -> None:

@@ -1,6 +1,6 @@
-"""The figures of the paper that show series: 2, 4 to 8 and 12 to 14, one function each, drawn from arrays alone.
+"""The figures of the paper that show series (2, 4 to 8 and 12 to 14), one function each.
 
-Their titles say what the arrays hold, whichever run they come from; nothing is computed here but what a title counts.
+Titles depend on the arrays only, so that they are correct for any run.
 """
 
 from collections.abc import Mapping
@@ -137,7 +137,7 @@ def accuracy_loss(data: Arrays) -> matplotlib.figure.Figure:
     accuracy, loss = panels(figure, down + 0.22, 1, 2, right=0.75, gap=(0, 1.15))[0]
     before, *after = zip(data["loss_real"], data["loss_generated"], strict=True)
     top = 1.4 * np.max(after, initial=np.log(2))
-    if max(before) > top:  # an untrained discriminator may be so wrong that the training itself could not be read
+    if max(before) > top:  # the loss before training may be so large that the rest of the curve could not be read
         beyond = [f"{value:.2g} {kind}" for value, kind in zip(before, ("real", "generated"), strict=True) if value > top]
         note = f"before training, off scale:\n{', '.join(beyond)}"
         loss.annotate(note, (0.22, 0.99), xycoords="axes fraction", size=7, color=QUIET, va="top")
@@ -196,7 +196,7 @@ def telemetry_store(data: Arrays) -> matplotlib.figure.Figure:
 
 
 def _plot_judgements(axes: Axes, data: Arrays, measure: str, top: float, label: str, chance: tuple[float, str]) -> None:
-    """The accuracy or the loss of both kinds of rows by iteration, with the line of a discriminator that guesses."""
+    """Accuracy or loss on real and generated rows by iteration, with a line at the level of chance."""
     axes.set(ylim=(0, top), ylabel=label, xlabel="iteration")
     axes.margins(x=0.03)
     axes.axhline(chance[0], color=LINE, linewidth=0.8, linestyle=(0, (1, 1.5)))
@@ -214,11 +214,11 @@ def _plot_judgements(axes: Axes, data: Arrays, measure: str, top: float, label: 
     label_ends(axes, ends)
 
 
-# -- what several of them need ---------------------------------------------------------------------------------------------
+# -- shared helpers ---------------------------------------------------------------------------------------------
 
 
 def _guess(data: Arrays, what: str, remark: str = "", columns: int = 4) -> matplotlib.figure.Figure:
-    """Real and generated rows among each other, to be told apart; the answer stands upside down at the foot."""
+    """Real and generated rows in random order; the answer is printed upside down at the bottom."""
     number, generated = len(data["rows"]), int(data["is_generated"].sum())
     rows = -(-number // columns)
     counted = {1: "One", 2: "Two", 3: "Three", 4: "Four"}.get(generated, str(generated))
@@ -245,7 +245,7 @@ def _guess(data: Arrays, what: str, remark: str = "", columns: int = 4) -> matpl
 
 
 def _moment(begin: float, unit: str) -> str:
-    """When a window begins, in words."""
+    """The time at which a window begins, as text."""
     if unit != "s":
         return f"begins at sample {begin:,.0f}"
     days, rest = divmod(round(begin), 86_400)

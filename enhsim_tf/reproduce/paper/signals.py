@@ -1,4 +1,4 @@
-"""Closed-form signals: the ground truth that a measurement can be held against. Noise: `noise_processes`."""
+"""Closed-form signals that serve as ground truth. `noise_processes` has the noise."""
 
 from collections.abc import Sequence
 

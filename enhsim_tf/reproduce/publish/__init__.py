@@ -1,1 +1,1 @@
-"""What a run writes for readers: `results.json`, the parts of the README, the report, and the page."""
+"""Output for readers: `results.json`, the generated parts of the README, the report on robustness, and the HTML page."""

@@ -1,7 +1,8 @@
-"""`report.html`: the whole run on one page that needs no network, for a screen, a phone, a printer and a screen reader.
+"""`report.html`: the whole run on one HTML page, which can be read offline.
 
-Owns how a run is shown as a page; the words and numbers come from `results.json`, the pictures from the files that
-`figures.save` wrote beside it. The page runs no script and loads nothing: its content policy forbids both.
+The page is designed for screens, phones, printers and screen readers. Text and numbers come from `results.json`, and pictures
+from the files that `figure.save` wrote to the same folder. The page contains no script and loads no other resource, and its
+content security policy forbids both.
 """
 
 import base64
@@ -31,7 +32,7 @@ NAME = "report.html"
 PIPELINE = "fig01_pipeline"
 # the sign and the colour of each verdict in the style sheet; one that it does not know is shown as not measured
 _KINDS = {REPRODUCED: "good", PARTLY: "half", NOT_REPRODUCED: "bad", NOT_TESTED: "open", NOT_MEASURED: "none"}
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")  # no such letter belongs on a page
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")  # control characters are removed
 _TYPES = {"png": "image/png", "svg": "image/svg+xml"}
 _ORIGINS = {
     "paper": "from the paper’s text",
@@ -42,13 +43,13 @@ _ORIGINS = {
 
 @dataclasses.dataclass(frozen=True)
 class Picture:
-    """A figure as the page holds it.
+    """A figure on the page.
 
     Args:
         name: One of `FIGURES`.
         number: Its number in the paper.
         title: Its caption.
-        alt: What it shows, in words.
+        alt: Text alternative.
         width: Pixels of the PNG.
         height: Pixels of the PNG.
         png: The PNG as a data URI, to download.
@@ -70,7 +71,7 @@ class Picture:
 
 
 def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -> Path:
-    """Writes the report of a run beside its figures.
+    """Writes the HTML report of a run to the folder of its figures.
 
     Args:
         folder: Holds each figure as PNG and SVG, and `spread.json` where further seeds were run.
@@ -87,7 +88,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     pictures = [_picture(folder, name, found["claims"]) for name in figures]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,  # names of files and channels come from outside
+        autoescape=True,  # names of files and channels are untrusted input
         finalize=lambda value: _CONTROL.sub("?", value) if type(value) is str else value,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -126,7 +127,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
 
 
 def _experiment(folder: Path) -> dict[str, Any] | None:
-    """What the experiment on robustness found, if its findings lie below the folder of the figures: they hold for themselves."""
+    """The findings of the experiment on robustness, if they are in a subfolder of the figures' folder; otherwise None."""
     path = folder / robustness_run.FOLDER / "findings.json"
     if not path.is_file():
         return None
@@ -162,7 +163,7 @@ def _picture(folder: Path, name: str, claims: Sequence[Mapping[str, Any]], figur
 
 
 def _tally(words: Sequence[str], order: Mapping[str, str]) -> dict[str, int]:
-    """How often each word occurs, in the order given; those that do not occur are left out."""
+    """The number of occurrences of each word, in the given order, without words that do not occur."""
     return {word: words.count(word) for word in [*order, *sorted(set(words) - set(order))] if word in words}
 
 
@@ -172,7 +173,7 @@ def _origin(source: str) -> str:
 
 
 def _ribbon() -> dict[str, str]:
-    """The idea in one line, as paths of a drawing of 1,200 by 100: the coarse signal, the enhanced one, the one with noise."""
+    """The pipeline as three curves (coarse, enhanced, with noise) on a drawing of 1,200 by 100, as SVG paths."""
     across = np.arange(0, 1201, 2)
     waves = [(0.5, np.sin(2 * np.pi * (across + 1) / 480)), (0.25, np.sin(2 * np.pi * (across + 1) / 120))]
     coarse, enhanced = (sum(amplitude * form(wave) for amplitude, wave in waves) for form in (np.sign, np.positive))

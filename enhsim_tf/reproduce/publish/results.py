@@ -1,4 +1,4 @@
-"""What a run leaves behind: the table on the terminal, `results.json`, and the generated parts of the README."""
+"""Results of a run: the table on the terminal, `results.json`, and the generated parts of the README."""
 
 import collections
 import json
@@ -23,7 +23,7 @@ PAPER = "the paper's example"  # what `results.json` names as the source where n
 
 
 def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s: float) -> dict[str, Any]:
-    """Everything a run found, as `results.json` holds it; each stage with the seconds it took when it was done.
+    """All results of a run, as stored in `results.json`. The time of each stage is that of its original run.
 
     Args:
         experiment: What was run.
@@ -47,7 +47,7 @@ def results(experiment: Experiment, claims: list[dict], drawn_s: float, total_s:
 
 
 def table(claims: list[dict]) -> str:
-    """The claims as a table for the terminal, as wide as it is."""
+    """The claims as a table that fits the width of the terminal."""
     width = max(60, min(shutil.get_terminal_size((120, 24)).columns, 140))
     lines = []
     for claim in claims:
@@ -80,7 +80,7 @@ def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None
 
 
 def disagreement(spread: Mapping[str, Any] | None, claim_id: str) -> str:
-    """The verdicts on a claim over seeds, counted, where seeds come to different ones; else nothing."""
+    """The number of seeds with each verdict, if seeds differ; otherwise an empty string."""
     counted = collections.Counter(spread["claims"][claim_id]["verdicts"]) if spread is not None else {}
     return ", ".join(f"{number} {name}" for name, number in counted.items()) if len(counted) > 1 else ""
 
@@ -96,7 +96,7 @@ def fill_readme(path: Path, folder: Path) -> None:
         return
     found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     text, spread = path.read_text(encoding="utf-8"), read_spread(folder, found)
-    if ": generated -->" not in text:  # somebody else's
+    if ": generated -->" not in text:  # not the README of this project
         return
     parts = {
         "claims": claims_table(found, spread),
@@ -111,7 +111,7 @@ def fill_readme(path: Path, folder: Path) -> None:
 
 
 def fill_parts(text: str, parts: Mapping[str, str], where: str) -> str:
-    """A text with new contents between its markers.
+    """Replaces the text between markers.
 
     Args:
         text: Markdown that holds the markers of each part once.
@@ -146,14 +146,14 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
 
 
 def short(value: float | None) -> str:
-    """A number with three significant digits, from 1,000 on with all before the point; a dash where there is none."""
+    """A number with three significant digits, or without decimals from 1,000 on; a dash if there is no number."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.3g}" if abs(value) < 999.5 else f"{value:,.0f}"
 
 
 def channels_table(files: Sequence[Path]) -> str:
-    """What the pipeline reached on real channels, one row a `results.json`, in Markdown."""
+    """Results on real channels in Markdown, one row for each `results.json`."""
     names, judged = ("nrmse", "ridge_nrmse", "identity_nrmse"), ("C1", "C4", "C5", "C6", "C7")
     lines = [
         "| channel | enhanced | ridge regression | coarse | enhanced, in step | ridge, in step | coarse, in step "
@@ -164,7 +164,7 @@ def channels_table(files: Sequence[Path]) -> str:
         found = json.loads(file.read_text(encoding="utf-8"))
         claims = {claim["id"]: claim for claim in found["claims"]}
         errors = [f"{claims['C1']['details'][prefix + name]:.3f}" for prefix in ("", "synchronised_") for name in names]
-        number = claims["C3"]["finding"].partition(" ")[0]  # why C3 is not measured begins with it
+        number = claims["C3"]["finding"].partition(" ")[0]  # the finding of an unmeasured C3 begins with this number
         verdicts = " | ".join(claims[name]["verdict"] for name in judged)
         lines.append(f"| `{found['source']}` | {' | '.join(errors)} | {number} | {verdicts} |")
     return "\n".join(lines)
@@ -178,7 +178,7 @@ def deviations_table() -> str:
 
 
 def timings_table(found: Mapping[str, Any]) -> str:
-    """Seconds of each stage in Markdown."""
+    """Time of each stage in seconds, in Markdown."""
     rows = [f"| {name} | {seconds:.1f} |" for name, seconds in found["timings"].items()]
     total = sum(found["timings"].values())
     lines = ["| stage | seconds |", "|---|---|", *rows, f"| **sum** | **{total:.0f}** |"]

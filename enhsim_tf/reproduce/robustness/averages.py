@@ -1,4 +1,4 @@
-"""What the findings on robustness are averages of: rates of replicates and of blocks of time, with their intervals."""
+"""Averages for the findings on robustness: means over replicates and blocks of time, with confidence intervals."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ REPLICATE = ["environment", "seed"]
 
 
 def rates(alarms: "pd.DataFrame") -> "pd.DataFrame":
-    """False-alarm rate of each environment, seed, arm and detector, blocks of time added up: column `rate`."""
+    """False-alarm rate of each environment, seed, arm and detector, over all blocks of time: column `rate`."""
     counts = alarms.groupby([*REPLICATE, "arm", "detector"], as_index=False)[["alarms", "windows"]].sum()
     return counts.assign(rate=counts["alarms"] / counts["windows"])
 
@@ -26,15 +26,15 @@ def trained(table: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def by_replicate(table: "pd.DataFrame", value: str) -> "pd.DataFrame":
-    """Mean of a value over the detectors that learn, and over all else, of each replicate: arms in columns."""
+    """Mean of a value over the trained detectors and all other columns, for each replicate; one column per arm."""
     return trained(table).groupby([*REPLICATE, "arm"])[value].mean().unstack("arm")
 
 
 def by_block(alarms: "pd.DataFrame") -> "pd.DataFrame":
-    """False alarms of each block of time, mean over the detectors that learn: arms in columns.
+    """Mean false-alarm rate of the trained detectors in each block of time; one column per arm.
 
-    Blocks may differ by a window. Each counts its alarms against an equal share of the windows, so that the mean over
-    blocks is the rate of the replicate.
+    Blocks can differ in size by one window. The alarms of each block are divided by the mean number of windows per block, so that
+    the mean over blocks is the rate of the replicate.
     """
     blocks = trained(alarms)
     groups = blocks.groupby([*REPLICATE, "arm", "detector"])["windows"]
@@ -43,11 +43,13 @@ def by_block(alarms: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def interval(values: "pd.Series", environment: str | None = None) -> dict[str, float]:
-    """Mean and crossed interval of a series that is indexed by replicates, and by their blocks of time where it has any.
+    """Mean of a series and its bootstrap interval over crossed factors.
+
+    The series is indexed by replicates, and by their blocks of time if it has any.
 
     Args:
         values: The series.
-        environment: The one that is meant, whose seeds and blocks are drawn; None for all, which are drawn too.
+        environment: The environment, whose seeds and blocks are resampled; None for all, which are resampled too.
     """
     chosen = values if environment is None else values.loc[[environment]]
     factors: Sequence[str] = REPLICATE if environment is None else REPLICATE[1:]
@@ -56,7 +58,7 @@ def interval(values: "pd.Series", environment: str | None = None) -> dict[str, f
 
 
 def gap_closed(mean_rate: "pd.DataFrame", arm: str) -> "pd.Series":
-    """Share of the gap in false alarms between the coarse and the real-trained arm that an arm closes, replicate by replicate.
+    """Share of the difference in false-alarm rate between the arms `coarse` and `real` that an arm removes, for each replicate.
 
     Args:
         mean_rate: False-alarm rate of each replicate (rows) and arm (columns).

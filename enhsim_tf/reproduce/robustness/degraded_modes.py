@@ -1,7 +1,8 @@
-"""Degraded modes (claim C9), in full: where does the enhanced simulator stay near the truth, and does it know where not?
+"""Detailed test of degraded modes (claim C9).
 
-In the example the true degraded signal is known. Enhancers and baselines are compared with it, mode by mode, inside and
-outside the severities that the randomised ones were trained on; and the out-of-range score of each window with its error.
+It measures where the enhanced simulator is close to the truth, and whether the out-of-range score shows where it is not. The
+true degraded signal of the example is known. Enhancers and baselines are compared with it in each mode, inside and outside the
+range of severities that the randomised ones were trained on, and the out-of-range score of each window with its error.
 """
 
 import functools
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from enhsim_tf.keras_tools.backend import keras
 
 SEVERITIES = (0.1, 0.25, 0.5, 0.75, 1.0)
-LARGEST_TRAINED = 0.5  # severity up to which the randomised enhancer has seen each mode
-WIDTHS = (11, 25, 49, 75, 121, 181, 241)  # of the moving average that smooths the coarse signal; the best in training is taken
+LARGEST_TRAINED = 0.5  # largest severity in the training of the randomised enhancer
+WIDTHS = (11, 25, 49, 75, 121, 181, 241)  # of the moving average of the coarse signal; the best on training windows is selected
 METHODS = {
     "identity": "the coarse signal as it is",
     "moving average": "the coarse signal, smoothed",
@@ -42,7 +43,7 @@ TABLES = ("degraded", "trust", "trust_correlation")
 
 
 class DegradedModes:
-    """The grid of one replicate: methods by modes by severities.
+    """All methods, modes and severities of one replicate.
 
     Args:
         replicate: The replicate, which has trained both nominal enhancers.
@@ -120,7 +121,7 @@ class DegradedModes:
             pd.DataFrame(rows).assign(seed=self.settings.seed).to_parquet(folder / f"{name}.parquet")
 
     def _pairs(self, scenario: Degraded | None, num_windows: int, purpose: str) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse windows in a mode, and what the true vehicle's noiseless signal is, at the same times with the same draws."""
+        """Coarse windows in a mode, and the true noiseless signal at the same times and with the same draws."""
         channel, chance = self.data.channels[0], int(self.data.draw(purpose).integers(2**31))
         begins = np.random.default_rng(chance).integers(0, 10**6, num_windows)
         times = self.settings.telemetry.interval_s * (begins[:, None] + np.arange(self.data.window, dtype=np.float64))
@@ -134,7 +135,7 @@ class DegradedModes:
         return windows["coarse"], windows["target"]
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse and noisy true windows of configurations drawn at random: a seventh nominal, the rest degraded."""
+        """Coarse and noisy true windows of random configurations: one seventh nominal, the others degraded."""
         chosen, draws = self.settings, self.data.draw("configurations")
         per_configuration = chosen.modes.windows_per_configuration
         parts = []
@@ -172,7 +173,7 @@ class DegradedModes:
         return dict(zip(METHODS, estimates, strict=True))
 
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
-        """The second pipeline's enhancer, as it is trained there, on other windows."""
+        """Trains the enhancer of the residual pipeline on other windows."""
         from enhsim_tf.enhancer.network import build_enhancer
         from enhsim_tf.keras_tools.backend import keras
         from enhsim_tf.keras_tools.training import EpochProgress, fit_windows

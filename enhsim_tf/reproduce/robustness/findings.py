@@ -1,6 +1,6 @@
-"""What the experiment on robustness found: tables of all replicates, and every number that the report states, from them.
+"""Findings of the experiment on robustness: all numbers of the report, computed from the tables of all replicates.
 
-The tables are what is committed; `summarise` needs nothing else, so whoever doubts a sentence recomputes it in a minute.
+The tables are committed, and `summarise` needs nothing else, so that all numbers can be recomputed in a minute.
 """
 
 import dataclasses
@@ -47,18 +47,18 @@ KEPT = KeptTables(
     digits=4,
     kind="experiment",
     command="python -m enhsim_tf.reproduce --experiment robustness",
-    digits_of={"recall": 3, "parameters": 6},  # shares of 150 windows, in by far the largest table; rates of one in a hundred
+    digits_of={"recall": 3, "parameters": 6},  # recall: shares of 150 windows, in the largest table; parameters: rates of about 1 %
 )
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
-    """Every number that the report, the README and the page state about the experiment.
+    """All numbers about the experiment that appear in the report, the README and the HTML page.
 
     Args:
         tables: As `KEPT.read` gives them.
 
     Returns:
-        Plain JSON types: what ran, and a part for each thing that was asked.
+        Plain JSON types: what was run, and one entry for each question.
     """
     rate, realism = rates(trained(tables["alarms"])), tables["realism"]
     environments = [name for name in bars.BARS if name in set(rate["environment"])]
@@ -128,15 +128,15 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
 
 
 def _share(found: Mapping[str, float]) -> dict[str, float]:
-    """An interval of a share: a resample of the blocks that are a window longer can be above one."""
+    """The interval of a share, limited to 1: a bootstrap sample of the larger blocks can exceed it."""
     return {name: min(value, 1.0) for name, value in found.items()}
 
 
 def _keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
-    """Whether each keeps the ledger's rule of claim C8: arms in columns.
+    """Whether each row meets the criterion of claim C8; one column per arm.
 
-    False alarms are at most twice the real-trained rate plus a point, and recall is at most five points below the
-    real-trained one.
+    The false-alarm rate has to be at most twice that of training on real telemetry plus one percentage point, and recall at most
+    five points lower.
 
     Args:
         rate: False-alarm rates, indexed by `arm` and more.
@@ -147,7 +147,7 @@ def _keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
 
 
 def _alarms_on_everything(rate: "pd.DataFrame", environments: Sequence[str]) -> dict[str, Any]:
-    """What a first trial found on one seed: the principal components of the paper's generated noise tell every real window."""
+    """The finding of a first trial on one seed: the PCA residual, trained with noise of the paper's GAN, flags every real window."""
     chosen = rate[(rate["arm"] == "enhanced + GAN") & (rate["detector"] == "PCA residual")].groupby("environment")["rate"]
     return {
         name: {
@@ -221,7 +221,10 @@ def _contrasts(alarms: "pd.DataFrame") -> dict[str, list[dict[str, Any]]]:
 
 
 def _variations(variations: "pd.DataFrame") -> list[dict[str, Any]]:
-    """Means by arm, noise scale, real share and whether real windows help to set the threshold; all real is one for all arms."""
+    """Means by arm, noise scale, share of real windows, and whether real windows also set the threshold.
+
+    A share of 1 is the same for all arms.
+    """
     import pandas as pd
 
     real = variations[variations["arm"] == "real"]

@@ -1,7 +1,7 @@
-"""Noises whose fault is known: what each measure of realism can see, and what it cannot.
+"""Noises with a known error, which show what each measure of realism can detect and what it cannot.
 
-The process behind them has memory (AR(1), 0.7), heavy tails (innovations of Student's t with 5 degrees of freedom) and a
-scale that differs from window to window. A measure that passes a control is blind to its fault; none passes all.
+The real process has memory (AR(1), 0.7), heavy tails (innovations of Student's t with 5 degrees of freedom) and a scale that
+differs between windows. A measure that accepts a control cannot detect its error; no control is accepted by all measures.
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ def process(num_windows: int, samples: int, rng: np.random.Generator) -> np.ndar
     Args:
         num_windows: Number of windows.
         samples: Samples of each.
-        rng: Owner of the draws.
+        rng: Random generator.
     """
     from scipy.signal import lfilter
 
@@ -75,17 +75,17 @@ NEGATIVE_CONTROLS: Mapping[str, Control] = {
 
 
 def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int, progress: Progress = SILENT) -> "pd.DataFrame":
-    """Measures every control, and real windows as the one without a fault.
+    """Measures all controls, and real windows as the control without an error.
 
     Args:
-        num_windows: Windows a side.
+        num_windows: Windows in each sample.
         samples: Samples of a window.
-        num_resplits: Re-splits of the floor at most.
-        seed: Seed of the process, the controls and the re-splits.
+        num_resplits: Maximum number of resamples of the real-vs-real baseline.
+        seed: Seed of the process, the controls and the resamples.
         progress: Tells how many controls are done.
 
     Returns:
-        A row a control and measure, with the fields of `realism.Row`, `control` and `num_windows`.
+        One row for each control and measure, with the fields of `realism.Row`, `control` and `num_windows`.
     """
     import pandas as pd
 

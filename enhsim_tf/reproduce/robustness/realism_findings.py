@@ -1,4 +1,4 @@
-"""How realistic the noises of the experiment are: measures beside their floors, parameters, and what they are worth."""
+"""Findings on realism: measures compared with their real-vs-real baselines, parameters of the noise, and their relation to false alarms."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -15,21 +15,23 @@ if TYPE_CHECKING:
 
 
 def floor_ratios(realism: "pd.DataFrame") -> "pd.DataFrame":
-    """Departure from real noise in units of the floor, each a mean over seeds: a row a noise and environment, a column a measure.
+    """Departure from real noise divided by the mean baseline, as means over seeds.
+
+    There is one row for each noise and environment, and one column for each measure.
 
     Args:
-        realism: The table of that name.
+        realism: The table `realism`.
     """
     means = realism.groupby(["noise", "environment", "measure"])[["departure", "floor_mean"]].mean()
     return (means["departure"] / means["floor_mean"]).unstack("measure")
 
 
 def measures(mean_rate: "pd.DataFrame", realism: "pd.DataFrame") -> dict[str, Any]:
-    """Which measure of realism predicts what a noise is worth to a detector, and which noises are within their floors.
+    """Correlation of each measure of realism with the false-alarm gap closed, and the noises that are within their baselines.
 
     Args:
         mean_rate: False-alarm rate of each replicate (rows) and arm (columns).
-        realism: The table of that name.
+        realism: The table `realism`.
     """
     import pandas as pd
 
@@ -67,12 +69,14 @@ def measures(mean_rate: "pd.DataFrame", realism: "pd.DataFrame") -> dict[str, An
 
 
 def beside_floors(realism: "pd.DataFrame", noise: str, environments: Sequence[str]) -> dict[str, Any]:
-    """Value of every measure of a noise with its floor's mean and 95th percentile, means over seeds, by measure and environment.
+    """Value of every measure of a noise with the mean and 95th percentile of its baseline, as means over seeds.
+
+    The result is indexed by measure and environment.
 
     Args:
-        realism: The table of that name.
-        noise: Which noise.
-        environments: Which environments.
+        realism: The table `realism`.
+        noise: Name of the noise.
+        environments: Names of the environments.
     """
     columns = ["value", "departure", "floor_mean", "floor_95"]
     means = realism[realism["noise"] == noise].groupby(["measure", "environment"], sort=False)[columns].mean()
@@ -83,7 +87,7 @@ def beside_floors(realism: "pd.DataFrame", noise: str, environments: Sequence[st
 
 
 def negative_controls(table: "pd.DataFrame") -> dict[str, Any]:
-    """Departure of each control in units of the mean floor, by control and measure."""
+    """Departure of each control divided by the mean baseline, by control and measure."""
     return {
         "num_windows": int(table["num_windows"].max()),
         "ratios": {
@@ -94,14 +98,14 @@ def negative_controls(table: "pd.DataFrame") -> dict[str, Any]:
 
 
 def parameters(table: "pd.DataFrame", environments: Sequence[str]) -> list[dict[str, Any]]:
-    """The parameters of each process as they are estimated from real noise and from what pipelines made of it.
+    """Parameters of each process, estimated from real noise and from the noises of the pipelines.
 
     Args:
-        table: The table of that name: an estimate of each block of windows.
-        environments: Which.
+        table: The table `parameters`, with an estimate for each block of windows.
+        environments: Names of the environments.
 
     Returns:
-        A row a parameter: the `true` one, and for each noise the `mean` estimate and the `distance`: the Wasserstein
+        One row for each parameter: its `true` value, and for each noise the `mean` estimate and the `distance`: the Wasserstein
         distance of its blocks' estimates to those of held-out real noise in units of their mean, mean over seeds.
     """
     from scipy.stats import wasserstein_distance

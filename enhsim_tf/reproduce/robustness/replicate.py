@@ -1,6 +1,6 @@
-"""The experiment on robustness, replicate by replicate: one environment and one seed, everything trained anew.
+"""Replicates of the experiment on robustness: one environment and one seed each, with all networks trained again.
 
-A replicate is kept once it is done: a killed run goes on behind the last one.
+Finished replicates are cached, so an interrupted run continues after the last one.
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 ENVIRONMENTS = ("white", "autoregressive", "heteroscedastic", "shot")
-TABLES = {  # by stage
+TABLES = {  # tables by stage
     "arms": ("alarms", "recall", "traces"),
     "variations": ("variations",),
     "realism": ("realism", "parameters"),
@@ -76,11 +76,11 @@ QUICK_DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolati
 
 
 class Replicate:
-    """One environment and one seed of the experiment.
+    """One replicate of the experiment: an environment and a seed.
 
     Args:
-        settings: Every number; `telemetry.noise` is the environment, `seed` covers data, networks and detectors.
-        stages: Keeps what is done.
+        settings: All settings; `telemetry.noise` is the environment, `seed` covers data, networks and detectors.
+        stages: Runs stages and caches their results.
         verbose: Progress bars: 0 none, 1 one for each training.
     """
 
@@ -90,7 +90,7 @@ class Replicate:
 
     @functools.cached_property
     def second_simulator(self) -> "EnhancedSimulator":
-        """The second pipeline: more windows in fewer epochs, noise by the enhancer, the convolutional GAN."""
+        """The simulator of the residual pipeline, with more windows in fewer epochs and the convolutional GAN."""
         _ = self.experiment.data
         chosen = self.settings
         depends = (chosen.telemetry, chosen.split, chosen.adversarial, chosen.second, chosen.seed)
@@ -122,13 +122,13 @@ class Replicate:
 
     @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
-        """Every table of `TABLES` by name, a stage for each of the three parts of the replicate."""
+        """All tables of `TABLES` by name. Each of the three parts of the replicate is a stage."""
         import pandas as pd
 
         _ = self.experiment.enhancer_folder, self.experiment.noise_folder, self.second_simulator
         modules, after = ("reproduce.robustness.replicate",), ("telemetry", "enhancer", "noise GAN", "second")
         chosen = self.settings
-        which = dataclasses.replace(chosen.robustness, num_seeds=0, first_seed=0)  # how many there are changes none
+        which = dataclasses.replace(chosen.robustness, num_seeds=0, first_seed=0)  # the number of replicates does not affect a replicate
         depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.noise, chosen.adversarial, which, chosen.seed)
         folders = {
             name: self.stages.run(name, make, modules, depends, after)
@@ -154,7 +154,7 @@ class Replicate:
         self._save(folder, rows)
 
     def _make_variations(self, folder: Path) -> None:
-        """Noise at other scales, and real windows mixed in: detectors that train in a second, alarms and mean recall."""
+        """Varies the scale of the noise and the share of real windows, with detectors that train in a second."""
         chosen, seed = self.settings.robustness, self.settings.seed
         trial = self.trial(chosen.num_anomalous_varied)
         quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
@@ -179,7 +179,7 @@ class Replicate:
         self._save(folder, {"variations": rows})
 
     def _make_realism(self, folder: Path) -> None:
-        """Measures A1 to A7 of every noise against the true noise, and its parameters."""
+        """Compares every noise with the true noise by measures A1 to A7, and estimates its parameters."""
         floor, held_out = self.floor()
         number, seed = len(held_out), int(self.experiment.data.draw("realism").integers(2**31))
         judged = {"real": held_out}
@@ -208,7 +208,7 @@ class Replicate:
             table.to_parquet(folder / f"{name}.parquet")
 
     def trial(self, num_anomalous: int | None = None) -> robustness.Trial:
-        """The real side: held-out nominal windows, anomalies put into them, and a trace.
+        """The test data: held-out nominal windows, the same windows with anomalies, and a continuous trace.
 
         Args:
             num_anomalous: Anomalous windows of each kind and severity; None for the number in the settings.
@@ -228,26 +228,26 @@ class Replicate:
         )
 
     def floor(self) -> tuple[realism.RealFloor, np.ndarray]:
-        """What two samples of true noise differ by, and windows of a third that are held out."""
+        """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample."""
         real, again, held_out = (self.true_noise(part) for part in ("test", "train", "calibration"))
         number = min(self.settings.robustness.num_windows, len(real), len(again), len(held_out))
         floor = realism.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
         return floor, held_out[:number]
 
     def true_noise(self, part: str, num_windows: int | None = None, purpose: str = "") -> np.ndarray:
-        """Windows of the noise itself: what the telemetry has beside the noiseless signal.
+        """Windows of the true noise, which is the telemetry minus the noiseless signal.
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: How many, at random offsets; None for all that share no sample, in the order of time.
-            purpose: Names the draw of the offsets.
+            num_windows: Number of windows at random offsets; None for all disjoint windows in order of time.
+            purpose: Name of the random draw of the offsets.
         """
         windows = self.experiment.data.windows(part, num_windows, purpose)
         return windows["target"] - windows["truth"]
 
     @functools.cached_property
     def extracted(self) -> dict[str, np.ndarray]:
-        """The noise of each pipeline: the very windows that its GAN learnt from, and that its surrogates are fitted to."""
+        """The extracted noise of each pipeline, to which its GAN and the other noise models are fitted."""
         data, number = self.experiment.data, self.settings.telemetry.num_windows
         draws = np.random.default_rng([self.settings.seed, 1])
         return {
@@ -257,13 +257,13 @@ class Replicate:
 
     @property
     def disjoint_extracted(self) -> dict[str, np.ndarray]:
-        """The same noise in windows that share no sample, as the measures of realism want them."""
+        """The extracted noise of each pipeline in disjoint windows, as the measures of realism require."""
         data, windows = self.experiment.data, self.experiment.data.windows("train", None)
         return {PAPER: data.noise_windows("train", None), RESIDUAL: windows["target"] - self.second_simulator.enhance(windows["coarse"])}
 
     @functools.cached_property
     def surrogates(self) -> Mapping[str, Mapping[str, object]]:
-        """The noises of both pipelines by name."""
+        """The noise models of both pipelines by name."""
         chosen, noise = self.settings.robustness, self.extracted
         return {
             PAPER: {GANS[PAPER]: self.experiment.simulator.noise, "Gaussian": GaussianNoise.fit(noise[PAPER])}
@@ -278,7 +278,7 @@ class Replicate:
         return {"AR": GaussianAutoregression.fit(noise, order), "bootstrap": BlockBootstrap.fit(noise, chosen.block)}
 
     def arms(self, purpose: str) -> dict[str, np.ndarray]:
-        """Windows of every arm; one purpose draws what detectors learn from, another what sets their thresholds."""
+        """Windows of every arm. One purpose draws the training windows, and another the windows that set thresholds."""
         data, number = self.experiment.data, self.settings.robustness.num_windows
         simulated = data.windows("train", number, purpose)
         clean = {
@@ -297,7 +297,7 @@ class Replicate:
 
 
 def _scaled(arms: Mapping[str, np.ndarray], arm: str, scale: float) -> np.ndarray:
-    """Windows of an arm with its noise at another scale; an arm without noise stays as it is."""
+    """Windows of an arm with its noise scaled by a factor; an arm without noise is returned unchanged."""
     prefix, plus, _ = arm.partition(" + ")
     clean = arms[CLEAN[prefix] if plus else arm]
     return clean + np.float32(scale) * (arms[arm] - clean)
@@ -307,8 +307,8 @@ def replicate(settings: Settings, stages: Stages, environment: str, number: int,
     """The replicate of an environment and of one of the reporting seeds.
 
     Args:
-        settings: Every other number.
-        stages: Keeps what is done.
+        settings: All other settings.
+        stages: Runs stages and caches their results.
         environment: One of `ENVIRONMENTS`.
         number: Which of the reporting seeds, counted from 0.
         verbose: Progress bars: 0 none, 1 one for each training.

@@ -1,4 +1,4 @@
-"""`python -m enhsim_tf.reproduce --experiment robustness`: every replicate, its tables, findings, figures and report."""
+"""`python -m enhsim_tf.reproduce --experiment robustness`: runs all replicates and writes tables, findings, figures and the report."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -19,14 +19,14 @@ FOLDER = "robustness"  # below the folder of the figures
 def run(
     settings: Settings, cache: Path, out: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Runs the experiment and writes what it found; finished replicates are taken from the cache.
+    """Runs the experiment and writes its results; finished replicates are read from the cache.
 
     Args:
-        settings: Every number; `robustness.num_seeds` says how many seeds.
-        cache: Where stages are kept.
-        out: Where tables, findings and figures go.
-        environments: Which environments.
-        fresh: Whether to do every stage anew.
+        settings: All settings; `robustness.num_seeds` says how many seeds.
+        cache: Folder of cached stages.
+        out: Output folder for tables, findings and figures.
+        environments: Names of the environments.
+        fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
 
     Returns:
@@ -49,13 +49,13 @@ def run(
 def collect(
     settings: Settings, cache: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
 ) -> "dict[str, pd.DataFrame]":
-    """The tables of all replicates, seed by seed: whoever stops early has all environments of the first seeds.
+    """The tables of all replicates. Replicates run seed by seed, so an interrupted run has all environments of the first seeds.
 
     Args:
-        settings: Every number.
-        cache: Where stages are kept.
-        environments: Which environments; degraded modes are looked at in the first.
-        fresh: Whether to do every stage anew.
+        settings: All settings.
+        cache: Folder of cached stages.
+        environments: Names of the environments; degraded modes are tested in the first.
+        fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
     """
     import pandas as pd
@@ -76,14 +76,14 @@ def collect(
             turns.end(stages)
             from enhsim_tf.keras_tools.backend import keras
 
-            keras.backend.clear_session()  # hundreds of networks would fill the memory
+            keras.backend.clear_session()  # frees the memory of the replicate's networks
     return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()} | {
         "controls": _controls(settings, cache, fresh, tell)
     }
 
 
 def _controls(settings: Settings, cache: Path, fresh: bool, tell: Callable[[str], None]) -> "pd.DataFrame":
-    """What the measures of realism make of noises whose fault is known; one process, no network."""
+    """The measures of realism for noises with a known error; one process and no network."""
     import pandas as pd
 
     chosen = settings.robustness

@@ -1,4 +1,4 @@
-"""The second generator against what it was asked for: aims that were fixed before the runs, and whether they are reached."""
+"""Targets for the convolutional GAN, which were fixed before the runs, and whether they are reached."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,13 +17,15 @@ MARGIN = 0.005
 
 
 def bars(alarms: "pd.DataFrame", recall: "pd.DataFrame", ratios: "pd.DataFrame", environments: Sequence[str]) -> dict[str, Any]:
-    """Excess of false alarms, recall, false alarms against a fitted autoregression's, and realism, environment by environment.
+    """Compares the convolutional GAN with its targets in each environment.
+
+    The targets are the excess of false alarms, recall, false alarms compared with a fitted autoregression, and realism.
 
     Args:
-        alarms: The table of that name.
-        recall: The table of that name.
+        alarms: The table `alarms`.
+        recall: The table `recall`.
         ratios: As `realism_findings.floor_ratios` gives them.
-        environments: Which.
+        environments: Names of the environments.
     """
     rate, found = by_block(alarms), by_replicate(recall, "recall")
     excess, over = rate["residual + convolutional GAN"] - rate["real"], rate["residual + convolutional GAN"] - rate["residual + AR"]
@@ -51,7 +53,7 @@ def bars(alarms: "pd.DataFrame", recall: "pd.DataFrame", ratios: "pd.DataFrame",
 
 
 def not_inferior(alarms: "pd.DataFrame") -> dict[str, Any]:
-    """False alarms with each pipeline's GAN against those with blocks of the noise that it learnt from, within the margin."""
+    """Compares the false alarms of each pipeline's GAN with those of the bootstrap of the noise that it learnt from."""
     rate, found = by_block(alarms), {}
     for pipeline, gan in (("enhanced", "enhanced + GAN"), ("residual", "residual + convolutional GAN")):
         about = interval(rate[gan] - rate[f"{pipeline} + bootstrap"])

@@ -1,4 +1,4 @@
-"""The figures of the study of real telemetry, drawn from its findings alone."""
+"""The figures of the study of real telemetry, drawn from its findings."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,7 +22,7 @@ def _colour(arm: str) -> str:
 
 
 def errors(found: Findings) -> matplotlib.figure.Figure:
-    """Error of the coarse signal, ridge regression and the enhanced signal on nominal test windows, a channel a row."""
+    """Error of the coarse signal, ridge regression and the enhanced signal on nominal test windows, one row per channel."""
     channels = dict(list(found["channels"].items())[:_MOST])
     all_errors = [about["nrmse"] for about in found["channels"].values()]
     nearest = [min(each, key=each.get) for each in all_errors]
@@ -54,7 +54,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
 
 
 def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
-    """False alarms on nominal test windows, and labelled sequences found, by what detectors were trained on."""
+    """False alarms on nominal test windows and labelled sequences found, for each training arm."""
     arms = found["arms"]
     generated, real = arms[GENERATED_ARM], arms["real"]
     number = len(found["channels"])

@@ -1,4 +1,4 @@
-"""What the study of real telemetry found: every number that figures and report state, from the tables of its channels."""
+"""Findings of the study of real telemetry: all numbers of its figures and report, computed from the tables of its channels."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,7 @@ KEPT = KeptTables(
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
-    """Every number of the study.
+    """All numbers of the study.
 
     Args:
         tables: As `KEPT.read` returns them.
@@ -65,7 +65,7 @@ def _channel(tables: "Mapping[str, pd.DataFrame]", name: str) -> dict[str, Any]:
     counts = rates.set_index(["arm", "detector"])
     ratios = {
         detector: float(
-            # half an alarm on both sides: a rate of zero is no proof of perfection
+            # half an alarm is added on both sides, because zero alarms do not prove a rate of zero
             (counts.loc[(GENERATED_ARM, detector), "alarms"] + 0.5) / (counts.loc[("real", detector), "alarms"] + 0.5)
         )
         for detector in false_alarms["real"]
@@ -125,13 +125,13 @@ def _control(tables: "Mapping[str, pd.DataFrame]", name: str) -> dict[str, Any]:
 
 
 def _interval(table: "pd.DataFrame", value: str, levels: list[str]) -> dict[str, float]:
-    """Mean with its bootstrap interval over channels, or sequences within them; detectors stay together."""
+    """Mean with its bootstrap interval over channels, or over sequences within channels; detectors stay together."""
     found = inference.hierarchical_interval(table, value, levels)
     return {"mean": found.estimate, "low": found.low, "high": found.high}
 
 
 def _bars(channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Which of the aims that were set before the first run are reached, channel by channel."""
+    """For each channel, which of the targets that were set before the first run are reached."""
     errors = {name: about["nrmse"] for name, about in channels.items()}
     found_by = {name: [_found_by(sequence) for sequence in about["sequences"]] for name, about in channels.items()}
     return {

@@ -1,4 +1,4 @@
-"""`python -m enhsim_tf.reproduce --experiment labelled --data FOLDER`: every channel, its tables, findings, figures and report."""
+"""`python -m enhsim_tf.reproduce --experiment labelled --data FOLDER`: runs all channels and writes tables, findings, figures and the report."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -22,22 +22,22 @@ FOLDER = "labelled"  # below the folder of the figures
 def run(
     settings: Settings, cache: Path, data: Path, out: Path, channels: Sequence[str] | None, fresh: bool, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Runs the study and writes what it found; finished channels are taken from the cache.
+    """Runs the study and writes its results; finished channels are read from the cache.
 
     Args:
-        settings: Every number.
-        cache: Where stages are kept.
+        settings: All settings.
+        cache: Folder of cached stages.
         data: Folder with `train/`, `test/` and `labeled_anomalies.csv`.
-        out: Where tables, findings and figures go.
-        channels: Which channels. None: all of the folder.
-        fresh: Whether to do every stage anew.
+        out: Output folder for tables, findings and figures.
+        channels: Names of the channels; None for all in the folder.
+        fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
 
     Returns:
         The findings.
 
     Raises:
-        InputError: If the folder is none of this layout, a channel is not in it, or no channel can be used.
+        InputError: If the folder does not have this layout, a channel is missing, or no channel can be used.
     """
     from enhsim_tf.reproduce.figure import save_all
     from enhsim_tf.reproduce.spacecraft.figures import FIGURES
@@ -56,14 +56,14 @@ def run(
 def collect(
     settings: Settings, cache: Path, data: Path, channels: Sequence[str] | None, fresh: bool, tell: Callable[[str], None]
 ) -> "tuple[dict[str, pd.DataFrame], dict[str, str]]":
-    """The tables of all channels, and why a channel could not be used, by its name.
+    """The tables of all channels, and the reason for each channel that could not be used.
 
     Args:
-        settings: Every number.
-        cache: Where stages are kept.
+        settings: All settings.
+        cache: Folder of cached stages.
         data: Folder of the data set.
-        channels: Which channels. None: all.
-        fresh: Whether to do every stage anew.
+        channels: Names of the channels; None for all.
+        fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
     """
     import pandas as pd

@@ -1,7 +1,7 @@
-"""Real telemetry with labelled anomalies: what detectors trained on generated telemetry do on a real spacecraft.
+"""Study of real telemetry with labelled anomalies: detectors trained on generated telemetry, tested on a real spacecraft.
 
-Each channel's simulator is fitted to its nominal `train` part; every detector learns from each arm, sets its threshold on
-further windows of that arm, and is judged on the `test` part. A channel is kept once it is done.
+The simulator of a channel is fitted to its nominal `train` part. Every detector is trained on each arm, sets its threshold on
+further windows of that arm, and is tested on the `test` part. Finished channels are cached.
 """
 
 import functools
@@ -55,8 +55,8 @@ class ChannelStudy:
 
     Args:
         channel: The channel with its labels.
-        settings: Every number; `labelled` and `seed` are looked at.
-        stages: Keeps what is done.
+        settings: All settings; `labelled` and `seed` are looked at.
+        stages: Runs stages and caches their results.
         verbose: Progress bars: 0 none, 1 one for each training.
     """
 
@@ -124,11 +124,11 @@ class ChannelStudy:
         found = robustness.false_alarm_rates([row for row in rows["alarms"] if row["arm"] == arm])
         return ", ".join(f"{rate:.0%}" for rate in found.values())
 
-    # -- what the detectors learn from -------------------------------------------------------------------------------------
+    # -- training windows of the detectors -------------------------------------------------------------------------------------
 
     @functools.cached_property
     def noises(self) -> dict[str, Any]:
-        """Every model of the noise that the enhancer leaves of the train part, by name."""
+        """Models of the residual noise of the train part, by name."""
         from enhsim_tf.noise.discriminator import build_discriminator
         from enhsim_tf.noise.gan import NoiseGAN
         from enhsim_tf.noise.generator import build_generator
@@ -148,7 +148,7 @@ class ChannelStudy:
         }
 
     def arms(self, seed: int) -> dict[str, np.ndarray]:
-        """Windows of every arm; the real ones of one seed and the next come from the two parts of the train part.
+        """Windows of every arm. For real windows, different seeds select different thirds of the train part.
 
         Args:
             seed: Seed of what is generated; `self.seed + 1` gives what detectors learn from, another what sets thresholds.
@@ -163,7 +163,7 @@ class ChannelStudy:
         return {arm: arms[arm] for arm in ARMS}
 
     def _real(self, number: int, is_training: bool) -> np.ndarray:
-        """Windows of the first two thirds of the train part, or of its last third, a window's gap between them."""
+        """Windows of the first two thirds of the train part or of its last third, with a gap of one window between them."""
         train, window = self.channel.train, self.simulator.window
         cut = 2 * len(train) // 3
         part = train.part(0, cut) if is_training else train.part(min(cut + window, len(train) - window), len(train))
@@ -175,7 +175,7 @@ class ChannelStudy:
         each = max(1, self.settings.labelled.num_arm_windows // len(scenarios))
         return np.concatenate([self.simulator.generate(each, scenario, seed + number) for number, scenario in enumerate(scenarios)])
 
-    # -- how they are judged -----------------------------------------------------------------------------------------------
+    # -- evaluation -----------------------------------------------------------------------------------------------
 
     @functools.cached_property
     def _test(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -198,7 +198,7 @@ class ChannelStudy:
         held_out: np.ndarray,
         labels: np.ndarray,
     ) -> None:
-        """Adds what one detector of one arm does to the tables."""
+        """Adds the results of one detector and one arm to the tables."""
         begins, windows, is_nominal = self._test
         window, about = self.simulator.window, {"arm": arm, "detector": name}
         threshold = float(np.quantile(score(held_out), 1 - self.settings.labelled.false_alarm_rate))
@@ -242,7 +242,7 @@ class ChannelStudy:
         windows = {
             "coarse": by_edges.coarse_rescaled,
             "ridge": ridge(cut_pairs([train], simulator.coarse, places, window, follow=True), by_edges),
-            "ridge, same clock": ridge(simulator.pairs(train, places), by_shape),  # what the network itself is worth
+            "ridge, same clock": ridge(simulator.pairs(train, places), by_shape),  # the same alignment, without the network
             "enhanced": simulator.follow(by_shape),
         }
         found = []
