@@ -11,14 +11,14 @@ from enhsim_tf.common.console import Parser, run_command, tell
 EXAMPLES = """\
 examples:
   python -m enhsim_tf.reproduce                      everything at full budget, about four minutes on two cores
-  python -m enhsim_tf.reproduce --budget smoke       the same path with small counts, below a minute, into smoke/
-  python -m enhsim_tf.reproduce --only fig04         one figure and what it needs
+  python -m enhsim_tf.reproduce --budget smoke       every step with small counts, in less than a minute, written to smoke/
+  python -m enhsim_tf.reproduce --only fig04         one figure and the stages that it needs
   python -m enhsim_tf.reproduce --telemetry my.csv --column volts --time utc --out my_figures
-  python -m enhsim_tf.reproduce --store influxdb     through a server that INFLUXDB_V2_URL, _TOKEN and _ORG name
+  python -m enhsim_tf.reproduce --store influxdb     with the server given by INFLUXDB_V2_URL, _TOKEN and _ORG
   python -m enhsim_tf.reproduce --experiment robustness
-                                                     what the noise is worth to detectors: hours; stop it and go on at will
+                                                     effect of each kind of noise on detectors; takes hours, can be interrupted
   python -m enhsim_tf.reproduce --experiment labelled --data DIR
-                                                     real telemetry with labelled anomalies: some minutes a channel
+                                                     real telemetry with labelled anomalies; some minutes per channel
 
 exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
 """
@@ -31,7 +31,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Reads the command line without slow imports.
 
     Raises:
-        InputError: If an option is unknown or its value is not of its kind.
+        InputError: If an option is unknown or its value has the wrong type.
     """
     parser = Parser(
         prog="python -m enhsim_tf.reproduce",
@@ -40,38 +40,40 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "--budget", choices=("smoke", "full"), default="full", help="how many windows, epochs and iterations (default: full)"
+        "--budget", choices=("smoke", "full"), default="full", help="numbers of windows, epochs and iterations (default: full)"
     )
     parser.add_argument("--telemetry", type=Path, metavar="PATH", help="run the pipeline on a real channel: .npy, .csv or .parquet")
-    parser.add_argument("--column", help="which column of the file holds the values: a number for .npy, else a name")
-    parser.add_argument("--time", help="which column of a table holds the times (default: samples are counted)")
+    parser.add_argument("--column", help="column with the values: a number for .npy, otherwise a name")
+    parser.add_argument("--time", help="column with the timestamps (default: samples are numbered)")
     parser.add_argument(
         "--store",
         default="parquet",
         metavar="STORE",
-        help="where the telemetry is placed and read back from: parquet (default), influxdb, or influxdb://bucket/measurement/field",
+        help="where the telemetry is stored and read back from: parquet (default), influxdb, or influxdb://bucket/measurement/field",
     )
-    parser.add_argument("--only", metavar="FIGURE", help="draw one figure, for example fig04, and judge no claim")
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything drawn (default: 0)")
+    parser.add_argument("--only", metavar="FIGURE", help="draw one figure, for example fig04, and evaluate no claim")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all random draws (default: 0)")
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
-        help="where figures and results.json go (default: figures; smoke: smoke; a channel or part of an experiment: its own)",
+        help="output folder for figures and results.json (default: figures; separate folders for smoke runs, channels and partial experiments)",
     )
-    parser.add_argument("--spread", type=int, default=0, metavar="N", help="judge the claims for N further seeds, ranges in spread.json")
+    parser.add_argument(
+        "--spread", type=int, default=0, metavar="N", help="evaluate the claims for N further seeds and write the ranges to spread.json"
+    )
     parser.add_argument(
         "--experiment",
         choices=("robustness", "labelled"),
-        help="instead of the paper: train detectors on every kind of noise; judge them on real telemetry with labelled anomalies",
+        help="instead of the paper: robustness trains detectors with each kind of noise; labelled tests them on real telemetry with labelled anomalies",
     )
     parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
-    parser.add_argument("--channels", metavar="A,B", help="only these channels of it (default: all)")
-    parser.add_argument("--environment", choices=NOISES, help="only this noise in the experiment (default: all four)")
-    parser.add_argument("--seeds", type=int, metavar="N", help="seeds of the experiment (default: 10; smoke: 2)")
-    parser.add_argument("--arrays", action="store_true", help="save the arrays behind each figure beside it, as .npz")
-    parser.add_argument("--fresh", action="store_true", help="do every stage anew, whatever the cache holds")
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="where finished stages are kept (default: .cache in a checkout)")
+    parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
+    parser.add_argument("--environment", choices=NOISES, help="run the experiment with this kind of noise only (default: all four)")
+    parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds of the experiment (default: 10; smoke: 2)")
+    parser.add_argument("--arrays", action="store_true", help="also save the arrays behind each figure, as .npz")
+    parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached stages (default: .cache in a checkout)")
     return parser.parse_args(arguments)
 
 

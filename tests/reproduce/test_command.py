@@ -355,7 +355,7 @@ def test_a_full_run_into_figures_fills_the_readme_and_no_other_run_does(pretende
     assert filled.startswith("# [Re, in part] Title\n") and filled.count("| words (words) |") == filled.count("| words |") == 9
 
 
-def test_a_readme_of_somebody_else_does_not_spoil_a_run(pretended, tmp_path):
+def test_a_foreign_readme_does_not_stop_a_run(pretended, tmp_path):
     (tmp_path / "README.md").write_text("# My own project\n")
     assert pretended() == 0
     assert (tmp_path / "README.md").read_text() == "# My own project\n"

@@ -1,4 +1,4 @@
-"""The report: its structure and escaping read by an HTML parser; its behaviour, colours and print seen by a headless browser."""
+"""Tests the HTML page: structure and escaping with a parser, behaviour, colours and print with a headless browser."""
 
 import base64
 import fcntl
@@ -214,7 +214,7 @@ def test_ranges_over_seeds_only_where_they_belong_to_the_run(folder):
         (folder / "spread.json").unlink()
 
 
-def test_a_smoke_run_says_so_and_judges_nothing(folder, tree):
+def test_a_smoke_run_is_marked_and_has_no_verdict(folder, tree):
     smoke = read(folder, found_of(budget="smoke"))
     (strip,) = smoke.find("aside")
     assert strip.text.startswith("Smoke run – no results")
@@ -231,7 +231,7 @@ def test_a_channel_is_named_and_expects_nothing(folder):
 # -- how it is built -------------------------------------------------------------------------------------------------------
 
 
-def test_hostile_names_stay_words(folder, tree):
+def test_hostile_names_are_escaped(folder, tree):
     hostile = read(folder, hostile_of(found_of()))
     for tag in ("img", "table", "figure", "td", "dd"):  # the hostile run has one stage and one package less
         assert sum(1 for _ in tree.find(tag)) - sum(1 for _ in hostile.find(tag)) == (3 if tag == "td" else 0)
@@ -501,7 +501,7 @@ def test_cards_on_a_phone_are_still_tables_to_a_screen_reader(browser):
     assert counts[0] == counts[1] and counts[0]["table"] == 4 and counts[0]["rowheader"] > len(CLAIMS) + len(deviations())
 
 
-def test_paper_shows_the_folded_settings_in_light_colours(browser):
+def test_print_shows_all_settings_in_light_colours(browser):
     browser.view(718, "dark", "print")
     assert browser.ask("[...document.querySelectorAll('.setting')].filter(row => row.checkVisibility()).length") == len(deviations())
     assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"

@@ -1,4 +1,4 @@
-"""What a run leaves behind: the table, results.json and the generated parts of the README hold what the records say."""
+"""Tests that the table, results.json and the generated parts of the README agree with the records."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Every number once, with its unit and source; what a smoke run may change; that each open question can be turned."""
+"""Tests units and sources of settings, the smoke budget, and that a setting exists for each open question of the paper."""
 
 import dataclasses
 import inspect
@@ -84,7 +84,7 @@ def test_the_papers_numbers(name):
     assert about["source"].startswith("paper, section 2")
 
 
-def test_a_group_is_frozen_and_small_enough_to_hold_in_mind():
+def test_groups_are_frozen_and_small():
     for group in groups(Settings()).values():
         assert 1 <= len(dataclasses.fields(group)) <= 12
         with pytest.raises(dataclasses.FrozenInstanceError):
@@ -100,7 +100,7 @@ def test_smoke_changes_counts_only():
         assert 0 < smoke[name] < full[name]
 
 
-def test_one_setting_turned_turns_no_other():
+def test_changing_one_setting_changes_no_other():
     for budget in ("full", "smoke"):
         before, after = _flat(make_settings(budget, 3)), _flat(make_settings(budget, 3, noise__dropout=0.3))
         assert {name for name in before if before[name] != after[name]} == {"noise.dropout"}
@@ -275,7 +275,7 @@ def run_tiny(tmp_path_factory):
 
 
 @pytest.mark.parametrize("setting", VARIANTS)
-def test_a_turned_setting_runs_and_changes_the_result(run_tiny, setting):
+def test_a_changed_setting_runs_and_changes_the_result(run_tiny, setting):
     value, moved = VARIANTS[setting]
     assert FIELDS[setting.replace("__", ".")][0] != value
     (base, _), (turned, _) = run_tiny(moved), run_tiny(moved, **{setting: value})
@@ -287,7 +287,7 @@ def test_a_turned_setting_runs_and_changes_the_result(run_tiny, setting):
 @pytest.mark.parametrize(
     ("setting", "done", "anew"), [("enhancer__epochs", "noise GAN", "enhancer"), ("noise__latent", "enhancer", "noise GAN")]
 )
-def test_what_a_setting_does_not_touch_is_found_done(run_tiny, setting, done, anew):
+def test_unaffected_stages_are_found_in_the_cache(run_tiny, setting, done, anew):
     run_tiny(BOTH)
     _, cached = run_tiny(BOTH, **{setting: 2})
     assert cached["telemetry"] and cached[done] and not cached[anew]

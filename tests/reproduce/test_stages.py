@@ -1,4 +1,4 @@
-"""Stages: done once, found again, done anew when anything they depend on changed, and never left half done."""
+"""Tests that stages run once, are reused, run again when a dependency changes, and are never left incomplete."""
 
 import ast
 import json
@@ -20,8 +20,8 @@ PACKAGE = Path(enhsim_tf.__file__).parent
 
 
 @pytest.fixture
-def rooms(tmp_path, monkeypatch):
-    """A package of three rooms: `upper` works with `lower`, `apart` stands by itself."""
+def toy_package(tmp_path, monkeypatch):
+    """A package of three modules: `upper` works with `lower`, `apart` stands by itself."""
     package = tmp_path / "enhsim_tf"
     (package / "reproduce").mkdir(parents=True)
     (package / "reproduce" / "upper.py").write_text("from enhsim_tf.lower import x\n")
@@ -37,13 +37,13 @@ class Work:
     def __init__(self, cache):
         self.cache, self.made = cache, []
 
-    def run(self, settings=("a", 1), rooms=("reproduce.upper",), fresh=False, name="work", before=None):
+    def run(self, settings=("a", 1), modules=("reproduce.upper",), fresh=False, name="work", before=None):
         done = Stages(self.cache, fresh, tell=lambda line: None)
         after = ()
         if before is not None:
             done.run("before", self.make, (), before)
             after = ("before",)
-        folder = done.run(name, self.make, rooms, settings, after)
+        folder = done.run(name, self.make, modules, settings, after)
         return folder, done.cached[name]
 
     def make(self, folder):
@@ -52,7 +52,7 @@ class Work:
 
 
 @pytest.fixture
-def work(tmp_path, rooms):
+def work(tmp_path, toy_package):
     return Work(tmp_path / "cache")
 
 
@@ -71,32 +71,32 @@ def test_what_it_depends_on_is_a_value_not_an_object(work):
     assert work.run(settings=make_settings("smoke", 2)) != (first, True)
 
 
-@pytest.mark.parametrize("changed", ["settings", "name", "rooms", "upstream"])
+@pytest.mark.parametrize("changed", ["settings", "name", "modules", "upstream"])
 def test_a_changed_dependence_does_it_anew(work, changed):
     first, _ = work.run(before="one")
-    turned = {"settings": {"settings": ("a", 2)}, "name": {"name": "other"}, "rooms": {"rooms": ("apart",)}, "upstream": {}}[changed]
+    turned = {"settings": {"settings": ("a", 2)}, "name": {"name": "other"}, "modules": {"modules": ("apart",)}, "upstream": {}}[changed]
     folder, cached = work.run(before="two" if changed == "upstream" else "one", **turned)
     assert not cached and folder != first
-    assert first.is_dir(), "what was done stays: turning back finds it"
+    assert first.is_dir(), "the earlier result is still in the cache"
     assert work.run(before="one") == (first, True)
 
 
-def test_changed_code_of_a_module_or_of_one_below_does_it_anew(work, rooms):
+def test_changed_code_of_a_module_or_of_one_below_does_it_anew(work, toy_package):
     first, _ = work.run()
-    (rooms / "apart.py").write_text("y = 2\n")
-    assert work.run() == (first, True), "a room it does not work with"
-    (rooms / "lower.py").write_text("x = 2\n")
+    (toy_package / "apart.py").write_text("y = 2\n")
+    assert work.run() == (first, True), "a module that it does not import"
+    (toy_package / "lower.py").write_text("x = 2\n")
     second, cached = work.run()
-    assert not cached and second != first, "a room below"
-    (rooms / "reproduce" / "upper.py").write_text("from enhsim_tf.lower import x\n\nx += 1\n")
+    assert not cached and second != first, "an imported module"
+    (toy_package / "reproduce" / "upper.py").write_text("from enhsim_tf.lower import x\n\nx += 1\n")
     third, cached = work.run()
     assert not cached and third not in (first, second), "its own module"
 
 
-def test_what_is_said_about_code_changes_no_stage(work, rooms):
+def test_what_is_said_about_code_changes_no_stage(work, toy_package):
     first, _ = work.run()
-    (rooms / "reproduce" / "upper.py").write_text('"""What it is."""\n\nfrom enhsim_tf.lower import x  # why\n')
-    (rooms / "lower.py").write_text("# an explanation\nx = (\n    1  # one\n)\n")
+    (toy_package / "reproduce" / "upper.py").write_text('"""What it is."""\n\nfrom enhsim_tf.lower import x  # why\n')
+    (toy_package / "lower.py").write_text("# an explanation\nx = (\n    1  # one\n)\n")
     assert work.run() == (first, True)
 
 
@@ -116,7 +116,7 @@ def test_the_hash_of_code_leaves_comments_and_docstrings_out(before, after, is_s
     assert (stages.what_runs(before) == stages.what_runs(after)) == is_same
 
 
-def test_changed_code_of_the_stage_itself_does_it_anew(tmp_path, rooms):
+def test_changed_code_of_the_stage_itself_does_it_anew(tmp_path, toy_package):
     def one(folder):
         save_arrays(folder, {"x": 1})
 
@@ -127,7 +127,7 @@ def test_changed_code_of_the_stage_itself_does_it_anew(tmp_path, rooms):
     assert values == [1, 2, 1]
 
 
-def test_changed_code_of_a_helper_does_it_anew(tmp_path, rooms):
+def test_changed_code_of_a_helper_does_it_anew(tmp_path, toy_package):
     def one():
         return 1
 
@@ -160,7 +160,7 @@ def test_fresh_does_it_anew_in_place_of_the_old(work):
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_a_stage_that_fails_leaves_nothing(tmp_path, rooms, error):
+def test_a_stage_that_fails_leaves_nothing(tmp_path, toy_package, error):
     def fails(folder):
         (folder / "half.txt").write_text("half")
         raise error
@@ -280,11 +280,11 @@ def test_arrays_come_back_as_they_went(tmp_path):
         load_arrays(tmp_path)
 
 
-def test_where_the_cache_is(tmp_path, monkeypatch, rooms):
+def test_where_the_cache_is(tmp_path, monkeypatch, toy_package):
     monkeypatch.delenv("ENHSIM_TF_CACHE", raising=False)
     assert default_cache() == Path.home() / ".cache" / "enhsim_tf"  # an installed package has no checkout around it
-    (rooms.parent / "pyproject.toml").touch()
-    assert default_cache() == rooms.parent / ".cache"
+    (toy_package.parent / "pyproject.toml").touch()
+    assert default_cache() == toy_package.parent / ".cache"
     monkeypatch.setenv("ENHSIM_TF_CACHE", str(tmp_path / "elsewhere"))
     assert default_cache() == tmp_path / "elsewhere"
 
@@ -314,7 +314,7 @@ def test_imports_of_reads_every_form():
 
 
 def test_the_modules_of_every_stage_import_in_a_form_that_its_hash_follows():
-    waiting, seen = {room for rooms in vars(experiments).values() if isinstance(rooms, tuple) for room in rooms}, set()
+    waiting, seen = {module for modules in vars(experiments).values() if isinstance(modules, tuple) for module in modules}, set()
     while waiting - seen:
         seen.add(room := (waiting - seen).pop())
         source = stages._file_of(room).read_text(encoding="utf-8")  # each name is a module's

@@ -1,4 +1,4 @@
-"""Intervals and tests against hand-worked cases, closed forms, SciPy, and coverage in worlds whose mean is known."""
+"""Tests intervals and tests against hand-worked cases, closed forms, SciPy, and coverage in simulations with a known mean."""
 
 import itertools
 
@@ -279,7 +279,7 @@ def test_declared_contrasts_find_the_effects_that_are_there():
     assert results[0].mean.high < 0 and results[1].median.high < 0
 
 
-def test_what_one_seed_does_in_all_environments_is_one_finding():
+def test_effects_of_one_seed_count_as_one_observation():
     """Ten seeds by four environments that only repeat them: as sure as ten, where the pooled test takes them for forty."""
     once = alarms({"a1": 0.1, "a2": 0.0}).query("environment == 'white'")
     (single,) = declared_contrasts(once, [("a1", "a2")])

@@ -174,7 +174,7 @@ WITHOUT_TRAINING = (
     "fig11_gan_training",
     "fig14_telemetry_store",
 )
-"""Figures that show nothing a network has learnt; they can be drawn before any is trained."""
+"""Figures that need no trained network and can be drawn before training."""
 
 
 # -- shared helpers ---------------------------------------------------------------------------------------------

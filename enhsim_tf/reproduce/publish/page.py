@@ -30,9 +30,11 @@ from enhsim_tf.reproduce.settings import deviations
 
 NAME = "report.html"
 PIPELINE = "fig01_pipeline"
-# the sign and the colour of each verdict in the style sheet; one that it does not know is shown as not measured
+# icon and colour of each verdict in the style sheet; unknown verdicts are shown like those not measured
 _KINDS = {REPRODUCED: "good", PARTLY: "half", NOT_REPRODUCED: "bad", NOT_TESTED: "open", NOT_MEASURED: "none"}
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")  # control characters are removed
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)  # characters that are replaced by a question mark
 _TYPES = {"png": "image/png", "svg": "image/svg+xml"}
 _ORIGINS = {
     "paper": "from the paper’s text",

@@ -28,17 +28,17 @@ SEVERITIES = (0.1, 0.25, 0.5, 0.75, 1.0)
 LARGEST_TRAINED = 0.5  # largest severity in the training of the randomised enhancer
 WIDTHS = (11, 25, 49, 75, 121, 181, 241)  # of the moving average of the coarse signal; the best on training windows is selected
 METHODS = {
-    "identity": "the coarse signal as it is",
+    "identity": "the coarse signal, unchanged",
     "moving average": "the coarse signal, smoothed",
-    "ridge": "linear regression from nominal coarse windows",
-    "ridge, randomised": "the same from windows of all modes, with their true response",
+    "ridge": "ridge regression, trained on nominal windows",
+    "ridge, randomised": "ridge regression, trained on windows of all modes with their true response",
     "paper": "the paper's enhancer: 1,500 nominal windows, 40 epochs",
-    "more windows": "15,000 nominal windows, 2 epochs, a rate that falls",
-    "randomised": "the same over nominal and degraded configurations, with their true response",
+    "more windows": "the same network: 15,000 nominal windows, 2 epochs, decaying learning rate",
+    "randomised": "trained like *more windows*, on nominal and degraded configurations with their true response",
 }
-"""From coarse windows to an estimate of the true ones."""
+"""Methods that estimate the true windows from coarse windows."""
 SCORED = {"paper": "nominal", "more windows": "nominal", "randomised": "randomised"}
-"""Enhancers whose windows are scored, and which windows trained them."""
+"""Enhancers with an out-of-range score, and the windows on which they are trained."""
 TABLES = ("degraded", "trust", "trust_correlation")
 
 

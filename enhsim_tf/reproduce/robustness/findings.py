@@ -32,15 +32,15 @@ TABLES = (
     "trust_correlation",
 )
 CONTRASTS = (("enhanced + GAN", "enhanced"), ("enhanced + GAN", "enhanced + AR"), ("enhanced + GAN", "enhanced + bootstrap"))
-"""Declared before the runs, for the paper's GAN: does noise help, does the GAN help over an autoregression, how far from real noise."""
+"""Declared before the runs, for the paper's GAN: compared with no noise, with an autoregression and with extracted noise."""
 SECOND_CONTRASTS = (
     ("residual + convolutional GAN", "residual + AR"),
     ("residual + convolutional GAN", "residual + bootstrap"),
     ("residual + convolutional GAN", "real"),
 )
-"""The same for the second generator, in whose place the third asks how far from real telemetry."""
+"""The same for the convolutional GAN: compared with an autoregression, with extracted noise and with real telemetry."""
 EVERYTHING = 0.99
-"""Share of real nominal windows above which a detector alarms on everything."""
+"""Share of real nominal windows above which a detector counts as alarming on every window."""
 KEPT = KeptTables(
     TABLES,
     labels=("environment", "arm", "detector", "kind", "noise", "measure", "section", "method", "mode", "parameter", "control"),

@@ -71,7 +71,7 @@ NEGATIVE_CONTROLS: Mapping[str, Control] = {
     "twenty windows memorised": _memorised,
     "sixteen linear dimensions": _linear_latent,
 }
-"""From real windows and an owner of the draws to as many windows with a fault."""
+"""Functions from real windows and a random generator to as many windows with a known error."""
 
 
 def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int, progress: Progress = SILENT) -> "pd.DataFrame":

@@ -35,14 +35,14 @@ PAPER, RESIDUAL = "paper", "residual"
 """The two pipelines: the paper's, which extracts noise with a moving average and learns it with the paper's GAN; and the one that
 extracts noise as the residual of the enhancer and learns it with the convolutional GAN."""
 PREFIXES = {PAPER: "enhanced", RESIDUAL: "residual"}
-"""What the names of a pipeline's arms begin with."""
+"""Prefix of the names of each pipeline's arms."""
 CLEAN = {"enhanced": "enhanced", "residual": "residual, no noise"}
 """The arm without noise of each prefix."""
 GANS = {PAPER: "GAN", RESIDUAL: "convolutional GAN"}
 ARMS = {
     "coarse": "the coarse simulator",
-    "truth": "the noiseless signal: a perfect simulator without environment",
-    "enhanced": "the paper's enhanced signal, clean",
+    "truth": "the noiseless signal, as from a perfect simulator without environmental noise",
+    "enhanced": "the enhanced signal of the paper's pipeline, without noise",
     "enhanced + GAN": "plus noise of the paper's GAN",
     "enhanced + Gaussian": "plus Gaussian noise of the same standard deviation",
     "enhanced + AR": "plus a fitted autoregression",
@@ -54,7 +54,7 @@ ARMS = {
     "residual + bootstrap": "plus blocks of the same noise",
     "real": "real nominal telemetry",
 }
-"""What detectors are trained on, in the order of the figures."""
+"""Training windows of detectors, in the order of the figures."""
 SCALES, SCALED = (0.5, 0.75, 1.0, 1.5, 2.0), ("enhanced + GAN", "enhanced + AR", "residual + convolutional GAN", "residual + AR")
 SHARES, MIXED = (0.0, 0.01, 0.05, 0.25), ("enhanced", "enhanced + GAN", "residual, no noise", "residual + convolutional GAN")
 VARIATIONS = tuple(
@@ -67,11 +67,11 @@ VARIATIONS = tuple(
         ]
     )
 )
-"""Arm, scale of its noise, share of its training windows that real ones replace (which are the same for all arms), and
-whether they replace as many of the windows that set the threshold."""
+"""Arm, scale of its noise, share of its training windows that are replaced by real windows (the same for all arms), and
+whether the same share of the windows that set the threshold is replaced."""
 # The seed of a random draw depends on its name. The published results were drawn under these names, so that a new run repeats them.
 _DRAW_NAMES = {"residual, no noise": "ours", "residual + convolutional GAN": "ours + GAN", "residual + AR": "ours + AR"}
-NUM_BLOCKS = 10  # of windows, in each of which the parameters of a noise are estimated
+NUM_BLOCKS = 10  # blocks of windows for which the parameters of a noise are estimated
 QUICK_DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest", "one-class SVM")
 
 

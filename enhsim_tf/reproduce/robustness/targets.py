@@ -10,10 +10,10 @@ if TYPE_CHECKING:
 
 KINDS_OF_NOISE = {"Gaussian": ("white", "autoregressive"), "not Gaussian": ("heteroscedastic", "shot")}
 BARS = {"white": (0.01, 0.02), "autoregressive": (0.01, 0.02), "heteroscedastic": (0.01, 0.02), "shot": (0.03, None)}
-"""Largest excess of the second generator's false-alarm rate over the real-trained arm's, and of its upper 95 % bound."""
+"""Largest excess of the false-alarm rate over that of training on real telemetry, for its mean and its upper 95 % bound."""
 LARGEST_RECALL_DIFFERENCE, LARGEST_RATIO = 0.02, 2.0
 MARGIN = 0.005
-"""False alarms by which an arm may be above another and still count as not worse, at its upper 95 % bound."""
+"""An arm is not worse than another if its false-alarm rate is higher by at most this, at the upper 95 % bound."""
 
 
 def bars(alarms: "pd.DataFrame", recall: "pd.DataFrame", ratios: "pd.DataFrame", environments: Sequence[str]) -> dict[str, Any]:

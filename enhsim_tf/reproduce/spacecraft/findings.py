@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LARGEST_RATIO = 1.5
-"""Of false alarms, trained on generated over trained on real telemetry: fixed before the first run."""
+"""Largest ratio of false alarms, trained on generated to trained on real telemetry; fixed before the first run."""
 NEARER = 2 / 3
-"""Largest error of the enhanced over the coarse signal that counts as nearer by a third."""
+"""Largest ratio of the errors of the enhanced and the coarse signal for an error that is lower by a third."""
 SATURATED = 0.9
-"""Where both trainings alarm on more than this share of nominal windows, their ratio says nothing."""
+"""If detectors of both trainings alarm on more than this share of nominal windows, their ratio is not informative."""
 _CONTROLS = ("random score", "largest step", "moving deviation", "oracle")
 KEPT = KeptTables(
     TABLES,

@@ -41,9 +41,9 @@ ARMS = {
     "enhanced + convolutional": "plus noise of the convolutional GAN: what `fit` and `generate` make",
     "real + generated": "as many windows of the train part as of `enhanced + convolutional`",
 }
-"""What detectors are trained on, in the order of the figures."""
+"""Training windows of detectors, in the order of the figures."""
 DEGRADED_ARM = "nominal + degraded"
-"""A classifier between generated nominal and generated degraded windows; for detectors that need no label it is no arm."""
+"""A classifier that separates generated nominal from generated degraded windows; it is not an arm for detectors without labels."""
 GENERATED_ARM = "enhanced + convolutional"
 _STRIDES = 8  # scored windows a window's length
 _NUM_BLOCKS = 10  # of consecutive windows, that false alarms are counted in
@@ -238,7 +238,7 @@ class ChannelStudy:
         begins, places = disjoint_offsets(len(test), window), evenly_spaced_starts([train], window, len(train))
         begins = begins[self._is_nominal(begins)]
         by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
-        by_shape = simulator.pairs(test, begins)  # set to the clock and level by the enhanced shape
+        by_shape = simulator.pairs(test, begins)  # aligned in phase and offset with the enhanced waveform
         windows = {
             "coarse": by_edges.coarse_rescaled,
             "ridge": ridge(cut_pairs([train], simulator.coarse, places, window, follow=True), by_edges),

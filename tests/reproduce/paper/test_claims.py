@@ -1,4 +1,4 @@
-"""The ledger: what it says of each claim, and that each verdict turns exactly at its tolerance."""
+"""Tests the claims: their records, and that each verdict changes exactly at its tolerance."""
 
 import json
 from pathlib import Path
@@ -71,7 +71,7 @@ def test_nine_claims_in_order_each_complete():
     assert [claim.id for claim in CLAIMS if not claim.tested_by_paper] == ["C8", "C9"]
 
 
-def test_where_everything_holds_everything_is_reproduced():
+def test_all_claims_are_reproduced_if_all_statistics_hold():
     records = judge(CLAIMS, _stand_in())
     assert [record["verdict"] for record in records] == [YES] * 7 + [NOT_TESTED] * 2
     assert all(record["finding"].startswith("holds here: ") for record in records[7:])
@@ -82,7 +82,7 @@ def test_where_everything_holds_everything_is_reproduced():
         assert {"id", "sentence", "section", "figure", "statistic", "tolerance", "expected", "value", "verdict"} <= set(record)
 
 
-def test_a_real_channel_is_judged_by_what_can_be_known_of_it():
+def test_a_real_channel_is_evaluated_without_the_unknown_truth():
     experiment = _stand_in(is_paper=False, false_alarms=None, degraded=None)
     in_step = _numbers(synchronised_nrmse=0.0711, synchronised_identity_nrmse=0.0722, synchronised_ridge_nrmse=0.0733)
     experiment.enhancement |= _numbers(nrmse=0.19) | in_step  # its truth is its noisy telemetry: only the baselines count
@@ -139,7 +139,7 @@ def test_c4(scale, lag, verdict):
     assert outcome.value == pytest.approx(abs(scale)) and outcome.verdict == verdict
 
 
-def test_c4_says_since_when():
+def test_c4_reports_the_first_iteration_within_tolerance():
     # scale is right from 300 on, and the correlation too; at 100 the scale was right and the correlation was not
     assert "from iteration 300 on" in _outcome("C4", _stand_in()).finding
     experiment = _stand_in()
@@ -173,7 +173,7 @@ def test_c6(values, verdict):
     assert (outcome.value, outcome.verdict) == (values.get("noise_rank_ratio", 0.9), verdict)
 
 
-def test_c6_says_but_only_where_the_noise_fills_less():
+def test_c6_says_but_only_if_the_rank_is_lower():
     less, more = (_outcome("C6", _with("resemblance", noise_rank_ratio=ratio)).finding for ratio in (0.8 - TINY, 1.28))
     assert "; but it has an effective rank of 360" in less and "; it has an effective rank of 360" in more
 
@@ -248,11 +248,11 @@ def test_changed_names_the_claims_whose_verdict_is_not_the_expected_one():
         ([YES, PARTLY, NO], "[¬Re]"),
     ],
 )
-def test_the_title_carries_the_overall_verdict(verdicts, title):
+def test_title_contains_the_overall_verdict(verdicts, title):
     assert title_verdict([{"id": str(number), "verdict": verdict} for number, verdict in enumerate(verdicts)]) == title
 
 
-def test_over_seeds_the_title_goes_by_the_verdict_of_most_and_on_a_tie_by_the_worse():
+def test_title_follows_the_verdict_of_most_seeds_and_the_worse_on_a_tie():
     assert [of_most(verdicts) for verdicts in ([YES, NO, NO], [YES, YES, NO], [YES, NO], [PARTLY, YES], [NOT_TESTED] * 2)] == [
         *(NO, YES, NO, PARTLY, NOT_TESTED)
     ]

@@ -71,7 +71,7 @@ def test_windows_seen_in_training_are_counted(doubled):
 # -- resemblance -----------------------------------------------------------------------------------------------------------
 
 
-def test_real_windows_stand_at_their_floor():
+def test_real_windows_are_at_their_baseline():
     real, again = _normal(80, 0), _normal(90, 1)
     found = measurements.resemblance(again[:80], real, again, 0)
     floors = {key for key in found if key.startswith("floor_")}
@@ -168,7 +168,7 @@ def test_degraded_error_by_hand():
     assert found["nrmse"] == pytest.approx([1, 1]) and found["identity_nrmse"] == pytest.approx([0, 0.5])
 
 
-def test_speed_by_a_clock_of_our_own(monkeypatch):
+def test_speed_with_a_fake_clock(monkeypatch):
     clock, calls = SimpleNamespace(now=0.0), []
     seconds = {"coarse": itertools.cycle([1.0, 2.0, 30.0, 2.0, 2.0]), "generate": itertools.cycle([8.0, 8.0, 90.0, 1.0, 8.0])}
 

@@ -1,4 +1,4 @@
-"""What the experiment states: recomputed from tables made by hand, and the report's numbers from the tables that are kept."""
+"""Tests the findings of the experiment with hand-made tables, and the report against the committed tables."""
 
 import json
 import re
@@ -148,7 +148,7 @@ def test_contrasts_are_differences_of_log_odds(found):
     assert found["contrasts"]["second, Gaussian"][0]["num_replicates"] == 6
 
 
-def test_bars_hold_the_excess_against_what_was_asked_for(found):
+def test_targets_on_excess_false_alarms(found):
     bar = found["bars"]["white"]
     assert bar["excess"]["mean"] == pytest.approx(0.01) and bar["recall_difference"]["mean"] == pytest.approx(0)
     assert bar["ratios"] == pytest.approx({"follows": 103 / 60, "does not": 97 / 60}) and bar["measures_within"] == 2
@@ -160,7 +160,7 @@ def test_bars_hold_the_excess_against_what_was_asked_for(found):
     assert not bar["excess_reached"] and bar["excess"]["mean"] == pytest.approx((0.18 + 2 * 0.01) / 3)
 
 
-def test_bars_on_recall_and_the_autoregression(found):
+def test_targets_on_recall_and_the_autoregression(found):
     for name, asked in (("white", "not worse"), ("shot", "better")):
         bar = found["bars"][name]
         assert (bar["autoregression_asked"], bar["autoregression_reached"]) == (asked, True)
@@ -225,7 +225,7 @@ def test_a_measure_that_follows_the_alarms_predicts_them(found):
     assert found["measures"]["num_rows"] == 12 * sum(" + " in arm for arm in ARMS)
 
 
-def test_measures_within_their_floors_are_counted_for_every_noise():
+def test_measures_within_their_baselines_are_counted_for_every_noise():
     louder = tables()
     realism = louder["realism"]
     one = (realism["noise"] == "real") & (realism["measure"] == "follows")
@@ -236,7 +236,7 @@ def test_measures_within_their_floors_are_counted_for_every_noise():
     assert within["enhanced + GAN"] == {"twice": dict.fromkeys(ENVIRONMENTS, 1), "all_below_95": 0}  # 160 and 40 of 60
 
 
-def test_tries_are_counted_and_the_furthest_measure_is_named(found):
+def test_tries_show_the_count_and_the_largest_departure(found):
     ratios = {measure.name: "1.5" for measure in MEASURES} | {"coverage": "2.01", "tail ratio": "7.04", "density": "2"}
     row = {
         "environment": "white",
@@ -252,7 +252,7 @@ def test_tries_are_counted_and_the_furthest_measure_is_named(found):
     assert "Changes that were tried where" not in robustness_report.render({**found, "budget": "full"})
 
 
-def test_what_the_tries_show_is_counted():
+def test_summary_of_tries():
     counts = (
         ("white", "real noise", 15),
         ("white", "as it is", 6),
@@ -274,7 +274,7 @@ def test_what_the_tries_show_is_counted():
 
 
 @pytest.mark.parametrize("value, text", [(-0.0004, "0.0 %"), (0.0004, "0.0 %"), (-0.0006, "-0.1 %"), (0.123, "12.3 %"), (1.0, "100.0 %")])
-def test_what_rounds_to_nought_has_no_sign(value, text):
+def test_numbers_that_round_to_zero_have_no_sign(value, text):
     assert report_words.per_cent(value) == text
     assert report_words.interval({"mean": value, "low": value, "high": value}).startswith(text + " (")
 
@@ -292,7 +292,7 @@ def test_errors_in_degraded_modes(found):
     assert found["modes"]["nrmse"]["paper"] == pytest.approx({"inside": 0.4, "nominal": 0.1, "outside": 0.8})
 
 
-def test_c8_by_the_rule_of_the_ledger(found):
+def test_c8_by_its_criterion(found):
     assert report_words.verdict_c8(found) == "does not hold" and report_words.share_c8(found) == (0, 28)
     quiet = tables()
     quiet["alarms"].loc[quiet["alarms"]["arm"] == "enhanced + GAN", "alarms"] = 4  # below twice two, plus one
@@ -322,7 +322,7 @@ def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
     assert some["arms"]["residual + convolutional GAN"]["c8"]["missed"] == dict.fromkeys(ENVIRONMENTS, 0) | {"white": 1}
 
 
-def test_sentences_follow_from_their_comparison(found):
+def test_sentences_agree_with_the_comparisons(found):
     assert report_words.opposite_signs(found) == ""
     mixed = tables()
     alarms = mixed["alarms"]
@@ -348,7 +348,7 @@ def test_sentences_follow_from_their_comparison(found):
     )
 
 
-def test_the_first_trial_is_judged_environment_by_environment(found):
+def test_first_trial_by_environment(found):
     assert report_words.first_trial(found).startswith("**Refuted** on white (0 of 3 replicates; 60.0 %), autoregressive (0 of 3")
     most = tables()
     alarms = most["alarms"]
@@ -381,7 +381,7 @@ def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):
 
 
 @pytest.mark.parametrize(("seeds", "words", "ran"), [([7], "one seed", "seed 7"), ([7, 8, 9], "3 seeds", "seeds 7 to 9")])
-def test_one_seed_is_no_seeds(found, seeds, words, ran):
+def test_one_seed_is_written_in_singular(found, seeds, words, ran):
     some = {**found, "seeds": seeds, "modes": {**found["modes"], "seeds": seeds}, "budget": "full"}
     text = " ".join(robustness_report.render(some).split())
     assert f"severities and {words};" in text and f"replicates: {words} ({seeds[0]} to {seeds[-1]}) in" in text
@@ -393,7 +393,7 @@ def test_findings_are_plain_json(found):
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-def test_the_templates_words_hold_no_number():
+def test_template_text_contains_no_number():
     text = (ROOT / "enhsim_tf" / "reproduce" / "publish" / "report.md.jinja").read_text(encoding="utf-8")
     prose = re.sub(r"\{\{.*?\}\}|\{%.*?%\}", "", text)
     allowed = ("Feldman 2020", "arXiv 2008.12082", "(C8 of", "on C8", "C8's", "95 % interval", "95 % bound", "95th percentile")
@@ -403,7 +403,7 @@ def test_the_templates_words_hold_no_number():
     assert not re.findall(r".*\d.*", prose), "a number that no table filled in"
 
 
-def test_the_report_is_what_the_tables_say(near):
+def test_report_matches_the_tables(near):
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
@@ -420,7 +420,7 @@ def test_the_report_is_what_the_tables_say(near):
     assert min(kept["seeds"]) == make_settings().robustness.first_seed
 
 
-def test_the_tries_cover_every_environment_that_misses_a_bar():
+def test_tries_cover_every_environment_that_misses_a_target():
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
     rows = robustness_report.designs_of(ROOT / robustness_report.TABLES[1])
@@ -431,7 +431,7 @@ def test_the_tries_cover_every_environment_that_misses_a_bar():
             assert tried[name] == {report_words.REAL_NOISE, *designs.DESIGNS}, name
 
 
-def test_the_readmes_words_hold():
+def test_readme_statements_agree_with_the_findings():
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))

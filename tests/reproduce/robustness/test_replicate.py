@@ -1,4 +1,4 @@
-"""A replicate gives each arm what its name says: clean windows of one pipeline, its noise, and the same windows for all."""
+"""Tests that each arm of a replicate has the enhanced signal and the noise that its name says, for the same windows."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ NOISES = {PAPER: ("GAN", "Gaussian", "AR", "bootstrap"), RESIDUAL: ("convolution
 
 
 class Constant:
-    """A noise that is one number, and remembers the seeds that it was asked with."""
+    """A constant noise that records the seeds it was called with."""
 
     def __init__(self, value):
         self.value, self.seeds = value, []
@@ -72,7 +72,7 @@ def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise(replicate):
     assert {len(windows) for windows in arms.values()} == {make_settings("smoke").robustness.num_windows}
 
 
-def test_what_is_learnt_and_what_sets_the_threshold_are_drawn_apart(replicate):
+def test_training_and_threshold_windows_are_drawn_separately(replicate):
     replicate.arms("arms, training"), replicate.arms("arms, threshold")
     purposes = replicate.experiment.data.purposes
     assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == ["train", "train", "train", "calibration"]
@@ -100,7 +100,7 @@ def test_each_variation_is_made_once():
 
 
 @pytest.mark.usefixtures("narrow_enhancer")
-def test_surrogates_are_fitted_to_the_very_windows_that_the_networks_learn(tmp_path, monkeypatch):
+def test_surrogates_are_fitted_to_the_training_windows_of_the_networks(tmp_path, monkeypatch):
     learnt, fit = [], NoiseGAN.fit
 
     def spied(self, windows, *args, **kwargs):

@@ -48,7 +48,7 @@ def test_every_table_has_every_row(done):
     assert len(tables["degraded"]) == len(METHODS) * (1 + len(MODES) * len(SEVERITIES))
 
 
-def test_what_must_be_so_whatever_the_networks_learnt(done):
+def test_properties_that_hold_for_any_training(done):
     tables = KEPT.read(done[0] / "out" / "robustness")
     errors = tables["degraded"].set_index(["method", "mode", "severity"])["nrmse"]
     # of two sines of amplitudes a the square waves miss sqrt(1.5 - 4 / pi) a, each on its own; the signal is a / sqrt(2)
