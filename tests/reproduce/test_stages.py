@@ -316,12 +316,12 @@ def test_imports_of_reads_every_form():
 def test_the_modules_of_every_stage_import_in_a_form_that_its_hash_follows():
     waiting, seen = {module for modules in vars(experiments).values() if isinstance(modules, tuple) for module in modules}, set()
     while waiting - seen:
-        seen.add(room := (waiting - seen).pop())
-        source = stages._file_of(room).read_text(encoding="utf-8")  # each name is a module's
+        seen.add(module := (waiting - seen).pop())
+        source = stages._file_of(module).read_text(encoding="utf-8")  # each name is a module's
         waiting |= set(imports_of(source))
         for node in ast.walk(ast.parse(source)):
-            assert not (isinstance(node, ast.Import) and any(alias.name.startswith("enhsim_tf") for alias in node.names)), room
-            assert not (isinstance(node, ast.ImportFrom) and node.level), room
+            assert not (isinstance(node, ast.Import) and any(alias.name.startswith("enhsim_tf") for alias in node.names)), module
+            assert not (isinstance(node, ast.ImportFrom) and node.level), module
     networks = {
         "enhancer.network",
         "keras_tools.training",
@@ -349,6 +349,6 @@ def test_how_the_networks_are_put_together_is_part_of_the_measured_stages(tmp_pa
         return Stages(tmp_path / "cache", tell=lambda line: None).run("work", lambda folder: None, experiments._MEASURED, ()).name
 
     before = key()
-    (room,) = (file for file in (tmp_path / "enhsim_tf" / "reproduce").rglob("*.py") if "return EnhancedSimulator(" in file.read_text())
-    room.write_text(room.read_text().replace("return EnhancedSimulator(", "return 2 * EnhancedSimulator("))
-    assert key() != before, f"what the claims are measured on was changed in {room.name}, and the cache does not see it"
+    (module,) = (file for file in (tmp_path / "enhsim_tf" / "reproduce").rglob("*.py") if "return EnhancedSimulator(" in file.read_text())
+    module.write_text(module.read_text().replace("return EnhancedSimulator(", "return 2 * EnhancedSimulator("))
+    assert key() != before, f"what the claims are measured on was changed in {module.name}, and the cache does not see it"
