@@ -297,7 +297,7 @@ def make_folders(options: argparse.Namespace) -> Path:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command; a user's mistake is one line and exit code 2."""
+    """Runs the command. An error of the user is reported as one line, with exit code 2."""
     return run_command(lambda: run(parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them")
 
 

@@ -19,7 +19,7 @@ def rates(alarms: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def trained(table: "pd.DataFrame") -> "pd.DataFrame":
-    """The rows of detectors that learn from an arm: without the controls and the oracle."""
+    """The rows of detectors that are trained on an arm, without the controls and the oracle."""
     from enhsim_tf.detection.registry import DETECTORS
 
     return table[table["detector"].isin(list(DETECTORS))]

@@ -286,7 +286,8 @@ FIGURES: dict[str, Figure] = {
         21,
         "False alarms by training arm",
         "Four panels, one for each kind of noise. Thirteen training arms from top to bottom, the false-alarm rate on a logarithmic axis: a dot "
-        f"with an interval for the mean over {in_words(len(DETECTORS))} detectors, small marks for each of them, a line at the one per cent they are set for.",
+        f"with an interval for the mean over {in_words(len(DETECTORS))} detectors, a small mark for each detector, and a line at the target "
+        "rate of one per cent.",
         false_alarms,
     ),
     "recall": Figure(

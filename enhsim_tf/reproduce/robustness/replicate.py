@@ -148,7 +148,7 @@ class Replicate:
             for name, found in judged.items():
                 rows[name] += [{"arm": arm, **row} for row in found]
             rates = robustness.false_alarm_rates(judged["alarms"]).values()
-            self.stages.tell(f"  {arm:22} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
+            self.stages.tell(f"  {arm:28} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
         oracle = robustness.detection.vus_pr(trial.labels, trial.labels.astype(float), trial.max_buffer)
         rows["traces"].append({"arm": "real", "detector": "oracle", "vus_pr": oracle})
         self._save(folder, rows)

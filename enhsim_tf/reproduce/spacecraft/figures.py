@@ -64,8 +64,8 @@ def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
         f"On a real spacecraft, detectors trained on generated telemetry raise false alarms on {100 * generated['false_alarms']['mean']:.0f} % of nominal windows "
         f"and find {100 * generated['found']['mean']:.0f} % of the labelled anomalies; trained on the channel's own past, on {100 * real['false_alarms']['mean']:.0f} % "
         f"and {100 * real['found']['mean']:.0f} %",
-        f"Set for 1 % (line). Dot and bar: mean over {in_words(len(DETECTORS))} detectors and {number} channels, with its 95 % interval over channels; small marks: "
-        f"each detector. {found['num_sequences']} labelled sequences.",
+        f"Vertical line: the rate that thresholds are set for, 1 %. Dot and bar: mean over {in_words(len(DETECTORS))} detectors and {number} "
+        f"channels, with its 95 % interval over channels; small marks: single detectors. {found['num_sequences']} labelled sequences.",
     )
     grid = panels(figure, down + 0.12, 1, 2, gap=(0.3, 0.12), sharey=True)
     left, width = 1.75 / DOUBLE, (1 - 1.9 / DOUBLE) / 2

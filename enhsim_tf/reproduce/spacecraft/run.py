@@ -120,10 +120,10 @@ def table(found: dict[str, Any]) -> str:
         rows.append(f"| {name} | {' | '.join(cells)} |")
     pairs = found["pairs"]
     return "\n".join(rows) + (
-        "\n\nNRMSE: median over nominal test windows, once clock, level and amplitude are set to each window from that window; *same clock*: the one "
-        f"that the enhanced shape finds. Alarms and finds: means over {in_words(len(DETECTORS))} detectors set for 1 %; {found['num_sequences']} labelled sequences; one "
-        f"training seed. In {pairs['saturated']} of {pairs['number']} pairs of channel and detector both trainings alarm on more than "
-        f"{100 * pairs['above']:.0f} % of nominal windows. From `figures/labelled/findings.json`."
+        "\n\n*NRMSE* is the median over nominal test windows, after phase, offset and gain are aligned to each window. *Ridge, same clock* is aligned with "
+        f"the phase that the enhanced signal finds. False alarms and sequences found are means over {in_words(len(DETECTORS))} detectors whose thresholds are set for 1 %, with "
+        f"{found['num_sequences']} labelled sequences and one training seed. In {pairs['saturated']} of {pairs['number']} pairs of channel and detector, the detectors "
+        f"of both trainings alarm on more than {100 * pairs['above']:.0f} % of nominal windows. From `figures/labelled/findings.json`."
     )
 
 
