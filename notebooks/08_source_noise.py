@@ -3,7 +3,7 @@
 #
 # **What the paper says** (section 2.3): "Noise and other stochastic environmental effects of real telemetry are extracted using a
 # moving average filter. This average is subtracted from the original signal, leaving the noise that needs to be simulated." It cites
-# pandas' rolling mean and gives no width; ours is 25 samples.
+# pandas' rolling mean and gives no width; this project uses 25 samples.
 
 # %%
 import sys
