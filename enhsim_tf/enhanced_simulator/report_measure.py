@@ -142,5 +142,5 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     half = len(residual) // 2
     floor = realism.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
     generated = simulator.noise.generate(-(-half // pieces), seed)[:, : short * pieces].reshape(-1, short)[:half]
-    rows = [dataclasses.asdict(row) for row in floor.judge(generated).rows]
+    rows = [dataclasses.asdict(row) for row in floor.evaluate(generated).rows]
     return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is not valid JSON

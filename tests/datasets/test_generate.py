@@ -101,7 +101,7 @@ def test_a_second_run_finds_all_shards(undisturbed, tmp_path, here):
     assert lines[0].startswith("20 of 20 shards") and here == [] and content_of(folder) == content_of(undisturbed)
 
 
-READ_ERRORS = {
+DAMAGES = {
     "shards removed": lambda folder: [(folder / file_of(shard)).unlink() for shard in (3, 7)],
     "shards cut": lambda folder: [os.truncate(folder / file_of(shard), 1_000) for shard in (3, 7)],
     "a byte changed": lambda folder: [flip(folder / file_of(shard)) for shard in (3, 7)],
@@ -121,10 +121,10 @@ def exchange(one, other):
     one.with_suffix(".x").rename(other)
 
 
-@pytest.mark.parametrize("name", READ_ERRORS)
+@pytest.mark.parametrize("name", DAMAGES)
 def test_damaged_shards_are_found_and_generated_again(name, undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
-    READ_ERRORS[name](folder)
+    DAMAGES[name](folder)
     lines = told(verify, folder)
     assert len(lines) == 2 and [line.split(":")[0] for line in lines] == [file_of(3), file_of(7)]
     assert told(generate_fleet, folder, plan())[0].startswith("18 of 20 shards") and here == [3, 7]

@@ -123,6 +123,7 @@ def test_an_unknown_budget_is_refused():
 def test_the_library_knows_the_same_defaults():
     from enhsim_tf.coarse_simulator import square_waves as simulator
     from enhsim_tf.detection import detectors
+    from enhsim_tf.detection.autoencoders import DenseAutoencoder
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.enhancer.network import build_enhancer
     from enhsim_tf.keras_tools.training import fit_windows
@@ -167,7 +168,7 @@ def test_the_library_knows_the_same_defaults():
         },
         detectors.PCAResidual: {"num_components": "detectors.num_components"},
         detectors.IsolationForestOnFeatures: {"num_trees": "detectors.num_trees"},
-        detectors.DenseAutoencoder: {"epochs": "detectors.autoencoder_epochs"},
+        DenseAutoencoder: {"epochs": "detectors.autoencoder_epochs"},
         simulator.Degraded: {"severity": "detectors.severity"},
         simulator.SquareWave: {"num_levels": "enhancer.num_levels"},
         simulator.SquareWaveSimulator.fit: {"num_levels": "enhancer.num_levels"},

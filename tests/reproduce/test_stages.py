@@ -180,7 +180,7 @@ def test_what_a_killed_run_left_is_not_taken_for_a_stage(work):
     assert work.run() == (folder, False) and len(work.made) == 3
 
 
-READ_ERRORS = {
+DAMAGES = {
     "a changed array": (lambda folder: flip(folder / "below" / "arrays.npz"), "below/arrays.npz is not as it was written"),
     "a file cut short": (lambda folder: os.truncate(folder / "result.txt", 0), "result.txt is not as it was written"),
     "a missing file": (lambda folder: (folder / "result.txt").unlink(), "result.txt is missing"),
@@ -204,8 +204,8 @@ def retime(path):
     path.write_text(json.dumps(content | {"seconds": content["seconds"] + 1}))
 
 
-@pytest.mark.parametrize("damage", READ_ERRORS)
-def test_a_damaged_stage_is_told_and_done_again(tmp_path, rooms, damage):
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_stage_is_told_and_done_again(tmp_path, toy_package, damage):
     def make(folder):
         (folder / "result.txt").write_text("whole")
         (folder / "below").mkdir()
@@ -214,7 +214,7 @@ def test_a_damaged_stage_is_told_and_done_again(tmp_path, rooms, damage):
     told = []
     folder = Stages(tmp_path / "cache", tell=told.append).run("work", make, (), ())
     before = stages._checksums(folder)
-    do, words = READ_ERRORS[damage]
+    do, words = DAMAGES[damage]
     do(folder)
     for cached in (False, True):
         del told[:]

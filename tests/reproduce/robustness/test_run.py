@@ -69,7 +69,7 @@ def test_figures_are_marked_and_findings_are_json(done):
     for name in FIGURES:
         assert 'id="watermark"' in (folder / f"{name}.svg").read_text(encoding="utf-8")
         assert Image.open(folder / f"{name}.png").width == 1_440
-    assert "C8" in done[1] and "second generator: excess of false alarms" in done[1]
+    assert "C8" in done[1] and "convolutional GAN: against training on real telemetry, false alarms" in done[1]
 
 
 def test_a_second_run_trains_nothing_and_says_the_same(done):
