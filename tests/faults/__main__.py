@@ -53,7 +53,7 @@ def fill_readme(table):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Faults, tried for real.")
+    parser = argparse.ArgumentParser(prog="python -m tests.faults", description="Faults, tried for real.")
     choices = [*BENCHES, "readme"]
     parser.add_argument(
         "of", choices=choices, help="what is tried: large data sets, or the cache of the paper's reproduction; readme: nothing"
