@@ -98,14 +98,9 @@ mean = {arm: about["false_alarms"]["mean"] for arm, about in found["arms"].items
 for arm in ("enhanced", "enhanced + GAN", "residual + convolutional GAN", "real"):
     print(f"{arm:28} {mean[arm]:6.1%}")
 assert mean["enhanced"] > 0.5 and mean["enhanced + GAN"] > 5 * mean["real"]
-assert (
-    mean["residual + convolutional GAN"] < mean["enhanced + GAN"] / 5
-    and mean["residual + convolutional GAN"] < mean["real"] + 0.02
-)
-at = {
-    name: found["arms"]["residual + AR"]["by_environment"][name]["false_alarms"]["mean"]
-    for name in found["environments"]
-}
+assert mean["residual + convolutional GAN"] < min(mean["enhanced + GAN"] / 5, mean["real"] + 0.02)
+arm = found["arms"]["residual + AR"]["by_environment"]
+at = {name: arm[name]["false_alarms"]["mean"] for name in found["environments"]}
 assert max(at["white"], at["autoregressive"]) < 0.05 < 0.2 < min(at["heteroscedastic"], at["shot"])
 assert mean["residual, no noise"] > 0.8
 
@@ -146,11 +141,8 @@ show_finding(found, "scale_and_share")
 # dashed curve shows what those windows teach the detector itself.
 
 # %%
-rows = [
-    row
-    for row in found["variations"]
-    if row["arm"] == "residual + convolutional GAN" and row["real_share"] == 0
-]
+arm = "residual + convolutional GAN"
+rows = [row for row in found["variations"] if row["arm"] == arm and row["real_share"] == 0]
 at_scale = {row["scale"]: row["false_alarms"] for row in rows}
 assert at_scale[1.0] < min(at_scale[0.75], at_scale[1.5])
 quiet = next(row for row in rows if row["scale"] == 0.75)["by_environment"]

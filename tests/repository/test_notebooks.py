@@ -265,7 +265,7 @@ def test_missing_stages_are_listed_first_and_nothing_is_computed(tmp_path, monke
 
 
 def test_every_stage_of_the_experiment_is_prepared():
-    source = (ROOT / "enhsim_tf" / "reproduce" / "experiments.py").read_text(encoding="utf-8")
+    source = (ROOT / "enhsim_tf" / "reproduce" / "paper" / "pipeline.py").read_text(encoding="utf-8")
     assert set(re.findall(r'(?:stages\.run|self\._measure)\("([^"]+)"', source)) == set(teaching._STAGES)
 
 
