@@ -69,9 +69,8 @@ class _BlockedDense:
             upstream = tf.where(outputs > 0, upstream, 0.0)
         before, belows = [upstream], []
         for part, block in zip(self.parts_of(inputs), self.blocks, strict=True):
-            with tf.control_dependencies(
-                before
-            ):  # processes the blocks one after the other; otherwise all gradients would be computed first
+            # process the blocks one after the other; otherwise all gradients would be computed first
+            with tf.control_dependencies(before):
                 gradient = tf.matmul(part, upstream, transpose_a=True)
                 belows += [] if is_first else [tf.matmul(upstream, block.value, transpose_b=True)]
             with tf.control_dependencies(belows[-1:]):  # the gradient of the inputs needs the weights before the update

@@ -16,7 +16,7 @@ import pytest
 
 from enhsim_tf.reproduce.paper.claims import CLAIMS, NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
 from enhsim_tf.reproduce.paper.figures import FIGURES
-from enhsim_tf.reproduce.publish import page as room
+from enhsim_tf.reproduce.publish import page
 from enhsim_tf.reproduce.settings import deviations
 
 HOSTILE = "\"'><img src=x onerror=alert(1)><script>alert(2)</script></table>{{ 7 * 7 }}&lt;" + "T1_" * 80 + ".npy"
@@ -129,7 +129,7 @@ class Reader(html.parser.HTMLParser):
 
 
 def read(folder, found=None):
-    path = room.write_page(folder, found or found_of(), list(FIGURES))
+    path = page.write_page(folder, found or found_of(), list(FIGURES))
     assert path == folder / "report.html"
     return Reader(path.read_text(encoding="utf-8")).tree
 
@@ -164,7 +164,7 @@ def test_every_figure_is_there_with_title_words_and_download(tree, folder):
 
 
 def test_the_pipeline_comes_first_whatever_the_order(folder):
-    text = room.write_page(folder, found_of(), sorted(FIGURES, reverse=True)).read_text(encoding="utf-8")
+    text = page.write_page(folder, found_of(), sorted(FIGURES, reverse=True)).read_text(encoding="utf-8")
     names = [figure.attributes["id"] for figure in Reader(text).tree.find("figure")]
     assert names == ["fig01_pipeline", *sorted(FIGURES, reverse=True)[:-1]]
 
@@ -283,28 +283,28 @@ def test_headings_landmarks_tables_and_targets(tree):
 
 
 def test_the_same_run_gives_the_same_page(folder):
-    pages = [room.write_page(folder, found_of(), list(FIGURES)).read_bytes() for _ in range(2)]
+    pages = [page.write_page(folder, found_of(), list(FIGURES)).read_bytes() for _ in range(2)]
     assert pages[0] == pages[1]
 
 
 def test_a_missing_or_broken_figure_is_refused_and_the_old_page_stays(folder, tmp_path, refused):
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
-    before = room.write_page(tmp_path, found_of(), list(FIGURES)).read_bytes()
+    before = page.write_page(tmp_path, found_of(), list(FIGURES)).read_bytes()
     with refused("fig99"):
-        room.write_page(tmp_path, found_of(), ["fig99_nothing"])
+        page.write_page(tmp_path, found_of(), ["fig99_nothing"])
     (tmp_path / "fig08_source_noise.png").write_bytes(b"")
     with refused("fig08_source_noise.png", "PNG"):
-        room.write_page(tmp_path, found_of(), list(FIGURES))
+        page.write_page(tmp_path, found_of(), list(FIGURES))
     (tmp_path / "fig04_enhanced_simulation.svg").unlink()
     with refused("fig04_enhanced_simulation.svg"):
-        room.write_page(tmp_path, found_of(), list(FIGURES))
+        page.write_page(tmp_path, found_of(), list(FIGURES))
     assert (tmp_path / "report.html").read_bytes() == before
     assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("value", VALUES)
 def test_numbers_in_short(value):
-    assert room.short(value) == VALUES[value]
+    assert page.short(value) == VALUES[value]
 
 
 # -- what a browser makes of it --------------------------------------------------------------------------------------------
@@ -390,7 +390,7 @@ def chromium(tmp_path_factory):
 @pytest.fixture(params=["full", "smoke and hostile"])
 def browser(request, chromium, folder):
     found = found_of() if request.param == "full" else hostile_of(found_of(budget="smoke"))
-    chromium.open(room.write_page(folder, found, list(FIGURES)))
+    chromium.open(page.write_page(folder, found, list(FIGURES)))
     return chromium
 
 

@@ -5,8 +5,7 @@ displays nothing, and needs neither TensorFlow nor a screen.
 """
 
 from enhsim_tf.reproduce.figure import Figure, _shape
-from enhsim_tf.reproduce.paper import diagrams
-from enhsim_tf.reproduce.paper import plots as curves
+from enhsim_tf.reproduce.paper import diagrams, plots
 
 FIGURES: dict[str, Figure] = {
     "fig01_pipeline": Figure(
@@ -22,7 +21,7 @@ FIGURES: dict[str, Figure] = {
         2,
         "Training source and target time series",
         "Training windows in two rows: above the coarse simulation, a sum of square waves; below the telemetry of the same times.",
-        curves.source_target,
+        plots.source_target,
     ),
     "fig03_enhancer": Figure(
         3,
@@ -35,34 +34,34 @@ FIGURES: dict[str, Figure] = {
         "Enhanced simulation",
         "One held-out window: the stepped coarse simulation, the enhanced signal and the signal it should follow; below, the difference of the "
         "last two. The title and the line under it give the errors.",
-        curves.enhanced_simulation,
+        plots.enhanced_simulation,
     ),
     "fig05_real_or_generated": Figure(
         5,
         "Real or generated: windows of telemetry (counterpart of a borrowed picture)",
         "Real and generated windows of telemetry in random order, lettered, to be told apart; the answer stands upside down at the foot.",
-        curves.real_or_generated,
+        plots.real_or_generated,
     ),
     "fig06_real_or_generated_noise": Figure(
         6,
         "Real or generated: windows of noise (counterpart of a borrowed picture)",
         "Real and generated windows of noise in random order, lettered, to be told apart; the answer stands upside down at the foot. The line "
         "under the title gives the effective rank of generated and of real noise.",
-        curves.real_or_generated_noise,
+        plots.real_or_generated_noise,
     ),
     "fig07_real_or_generated_series": Figure(
         7,
         "Real or generated: long stretches of telemetry (counterpart of a borrowed picture)",
         "Long stretches of telemetry, held-out real and generated ones in random order, lettered, to be told apart; the answer stands upside "
         "down at the foot.",
-        curves.real_or_generated_series,
+        plots.real_or_generated_series,
     ),
     "fig08_source_noise": Figure(
         8,
         "Extracted source noise",
         "Above, a window of telemetry with its centred moving average; below, the difference of the two, which is the noise, with lines at one "
         "standard deviation. The title gives the standard deviation.",
-        curves.source_noise,
+        plots.source_noise,
     ),
     "fig09_generator": Figure(
         9,
@@ -91,19 +90,19 @@ FIGURES: dict[str, Figure] = {
         "Accuracy and loss for real and fake classifications",
         "Two panels over the iterations of training: the discriminator's accuracy and its loss, each for real and for generated noise, with a "
         "line at chance. The title gives the last accuracies.",
-        curves.accuracy_loss,
+        plots.accuracy_loss,
     ),
     "fig13_combined": Figure(
         13,
         "Simulator output, enhanced, with noise added",
         "One held-out window in three panels: the coarse simulation with the enhanced signal; the enhanced signal with generated noise added; "
         "real telemetry of the same times. The line under the title gives the standard deviation of the first differences of each.",
-        curves.combined,
+        plots.combined,
     ),
     "fig14_telemetry_store": Figure(
         14,
         "Example telemetry signals in the store",
         "The beginning of the stored telemetry series over its timestamps.",
-        curves.telemetry_store,
+        plots.telemetry_store,
     ),
 }

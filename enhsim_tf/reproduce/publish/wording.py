@@ -95,7 +95,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     from enhsim_tf.detection import anomalies as injections
     from enhsim_tf.detection import evaluation as robustness
     from enhsim_tf.detection.registry import DETECTORS
-    from enhsim_tf.reproduce import statistics as inference
+    from enhsim_tf.reproduce import statistics
     from enhsim_tf.reproduce.robustness import degraded_modes
     from enhsim_tf.reproduce.robustness import replicate as replicates
     from enhsim_tf.reproduce.robustness import targets as bars
@@ -140,7 +140,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         "largest_ratio": number(bars.LARGEST_RATIO, 0),
         "best_control": max(about["recall_at_real_rate"] for about in controls if "recall_at_real_rate" in about),
         "modes_found": modes_found(found),
-        "least_p": inference.wilcoxon_signed_rank([1.0] * len(found["seeds"])),  # the p-value if all signs agree
+        "least_p": statistics.wilcoxon_signed_rank([1.0] * len(found["seeds"])),  # the p-value if all signs agree
         "quieter": scaled[max(scale for scale in scaled if scale < 1)],
         "louder": scaled[min(scale for scale in scaled if scale > 1)],
     }

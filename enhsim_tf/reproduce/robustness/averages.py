@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enhsim_tf.detection import metrics as detection
-from enhsim_tf.reproduce import statistics as inference
+from enhsim_tf.reproduce import statistics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +53,7 @@ def interval(values: "pd.Series", environment: str | None = None) -> dict[str, f
     """
     chosen = values if environment is None else values.loc[[environment]]
     factors: Sequence[str] = REPLICATE if environment is None else REPLICATE[1:]
-    found = inference.crossed_interval(chosen.rename("value").reset_index(), "value", factors)
+    found = statistics.crossed_interval(chosen.rename("value").reset_index(), "value", factors)
     return {"mean": found.estimate, "low": found.low, "high": found.high}
 
 

@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
 from enhsim_tf.detection import metrics as detection
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.realism import measures as fidelity
-from enhsim_tf.reproduce import statistics as inference
+from enhsim_tf.reproduce import statistics
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class DegradedModes:
         tenths, correlations = [], []
         for method, parts in per_window.items():
             windows = pd.concat(parts)
-            found = inference.rank_correlation(windows["score"], windows["error"], windows["cell"], num_resamples=200)
+            found = statistics.rank_correlation(windows["score"], windows["error"], windows["cell"], num_resamples=200)
             trusted = windows["score"] <= limits[SCORED[method]]
             correlations.append(
                 {

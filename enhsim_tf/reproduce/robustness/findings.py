@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.reproduce import statistics as inference
+from enhsim_tf.reproduce import statistics
 from enhsim_tf.reproduce.robustness import realism_findings
 from enhsim_tf.reproduce.robustness import targets as bars
 from enhsim_tf.reproduce.robustness.averages import REPLICATE, by_block, by_replicate, gap_closed, interval, rates, trained
@@ -216,7 +216,7 @@ def _contrasts(alarms: "pd.DataFrame") -> dict[str, list[dict[str, Any]]]:
     for name, (pairs, environments) in families.items():
         chosen = counts[counts["environment"].isin(environments)]
         if len(chosen):
-            found[name] = [dataclasses.asdict(contrast) for contrast in inference.declared_contrasts(chosen, pairs)]
+            found[name] = [dataclasses.asdict(contrast) for contrast in statistics.declared_contrasts(chosen, pairs)]
     return found
 
 

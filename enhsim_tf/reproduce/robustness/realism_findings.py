@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.reproduce import statistics as inference
+from enhsim_tf.reproduce import statistics
 from enhsim_tf.reproduce.noise_processes import NOISES
 from enhsim_tf.reproduce.robustness.averages import REPLICATE, gap_closed
 from enhsim_tf.reproduce.robustness.targets import LARGEST_RATIO
@@ -40,9 +40,9 @@ def measures(mean_rate: "pd.DataFrame", realism: "pd.DataFrame") -> dict[str, An
     joined = realism.merge(value, on=["noise", *REPLICATE])
     found = {}
     for measure, rows in joined.groupby("measure", sort=False):
-        correlation = inference.rank_correlation(rows["departure"], rows["closed"], rows["seed"], num_resamples=500)
+        correlation = statistics.rank_correlation(rows["departure"], rows["closed"], rows["seed"], num_resamples=500)
         inside = [
-            inference.rank_correlation(each["departure"], each["closed"], num_resamples=1).estimate
+            statistics.rank_correlation(each["departure"], each["closed"], num_resamples=1).estimate
             for _, each in rows.groupby("environment")
         ]
         found[measure] = {

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.reproduce import statistics as inference
+from enhsim_tf.reproduce import statistics
 from enhsim_tf.reproduce.spacecraft.study import ARMS, DEGRADED_ARM, GENERATED_ARM, TABLES
 from enhsim_tf.reproduce.tables import KeptTables
 
@@ -126,7 +126,7 @@ def _control(tables: "Mapping[str, pd.DataFrame]", name: str) -> dict[str, Any]:
 
 def _interval(table: "pd.DataFrame", value: str, levels: list[str]) -> dict[str, float]:
     """Mean with its bootstrap interval over channels, or over sequences within channels; detectors stay together."""
-    found = inference.hierarchical_interval(table, value, levels)
+    found = statistics.hierarchical_interval(table, value, levels)
     return {"mean": found.estimate, "low": found.low, "high": found.high}
 
 
