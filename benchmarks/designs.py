@@ -122,7 +122,7 @@ class Bench:
             A row: the number of training iterations, the mean false-alarm rate and recall of the fast detectors after training
             on telemetry with this noise, and the departure of each realism measure in units of its mean floor.
         """
-        from enhsim_tf.detection import evaluation as robustness
+        from enhsim_tf.detection import evaluation
         from enhsim_tf.detection.registry import DETECTORS
         from enhsim_tf.reproduce.robustness.replicate import QUICK_DETECTORS
 
@@ -135,7 +135,7 @@ class Bench:
             arms = [waves + gan.generate(len(waves), draws) for waves in self.waves]
         ratios = {row.measure: row.ratio for row in self.floor.evaluate(generated).rows}
         quick = {name: DETECTORS[name] for name in QUICK_DETECTORS}
-        judged = robustness.evaluate_arm(*arms, self.trial, quick, self.settings.seed)
+        judged = evaluation.evaluate_arm(*arms, self.trial, quick, self.settings.seed)
         alarms, windows = (sum(row[name] for row in judged["alarms"]) for name in ("alarms", "windows"))
         recall = float(np.mean([row["recall"] for row in judged["recall"]]))
         return {"iterations": number, "false_alarms": alarms / windows, "recall": recall, **ratios}

@@ -61,7 +61,7 @@ def plan_for(options: argparse.Namespace) -> "Plan":
 def measure_row(options: argparse.Namespace) -> dict:
     """Generates one data set, and returns the time and the memory that this took."""
     from enhsim_tf.common.parallel import engines
-    from enhsim_tf.datasets import generate as fleet
+    from enhsim_tf.datasets import generate
 
     engine, workers = ROWS[options.one]
     plan, run, finished, actor_bytes = plan_for(options), engines.run, [], []
@@ -75,10 +75,10 @@ def measure_row(options: argparse.Namespace) -> dict:
     engines.run = timed
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        fleet.generate_fleet(Path(folder) / "set", plan, workers, engine, tell=lambda line: None)
+        generate.generate_fleet(Path(folder) / "set", plan, workers, engine, tell=lambda line: None)
         seconds = time.perf_counter() - began
         num_bytes = sum(file.stat().st_size for file in (Path(folder) / "set").glob("shard-*.parquet"))
-        checksums = fleet.read_manifest(Path(folder) / "set")["shards"]
+        checksums = generate.read_manifest(Path(folder) / "set")["shards"]
     later = sum(rows for _, rows in finished[workers:])
     children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
     return {
@@ -112,10 +112,10 @@ def _largest_actor() -> int:
 
 def measure_parts(options: argparse.Namespace) -> dict:
     """Generates shards in this process, with one thread like a worker, and returns the time for each part of the work."""
-    from enhsim_tf.common.parallel import local as local_engine
-    from enhsim_tf.datasets import shard as shards
+    from enhsim_tf.common.parallel import local
+    from enhsim_tf.datasets import shard
 
-    local_engine.start_worker(pickle.dumps(None), threads=1)
+    local.start_worker(pickle.dumps(None), threads=1)
 
     plan = plan_for(options)
     num_shards = min(plan.num_shards - 1, 6)
@@ -132,13 +132,13 @@ def measure_parts(options: argparse.Namespace) -> dict:
         return wrapped
 
     with tempfile.TemporaryDirectory() as folder:
-        maker = shards.ShardMaker(plan, folder)
+        maker = shard.ShardMaker(plan, folder)
         maker(num_shards)  # builds the networks
         (simulator,) = maker.simulators
         object.__setattr__(simulator.coarse, "simulate", timed("coarse simulator", simulator.coarse.simulate))
         simulator.enhance = timed("enhancer", simulator.enhance)
         simulator.noise.generate = timed("noise", simulator.noise.generate)
-        shards.make_windows = timed("windows", shards.make_windows)
+        shard.make_windows = timed("windows", shard.make_windows)
         began = time.perf_counter()
         for number in range(num_shards):
             maker(number)

@@ -13,7 +13,7 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, GENERATED, QUIET, REAL
-from enhsim_tf.realism import measures as fidelity
+from enhsim_tf.realism import measures
 from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment()
@@ -43,7 +43,7 @@ edges, frequency = np.linspace(-0.4, 0.4, 81), np.arange(1, 251) / 500
 with drawing(alt, 2, 2.3) as (left, right):
     for name, rows in noises.items():
         left.hist(rows.ravel(), edges, density=True, histtype="step", color=colors[name], label=name)
-        right.plot(frequency, fidelity.power_spectrum(rows), color=colors[name])
+        right.plot(frequency, measures.power_spectrum(rows), color=colors[name])
     left.set(xlabel="value", ylabel="density")
     right.set(xlabel="frequency (cycles a sample)", ylabel="power (value² a bin)", yscale="log")
     left.legend(frameon=False)
@@ -53,7 +53,7 @@ with drawing(alt, 2, 2.3) as (left, right):
 # one has the spike on the far left: a trace of the satellite's 2-minute rotation, which the moving average let through (notebook 08).
 
 # %%
-spectrum = {name: fidelity.power_spectrum(rows) for name, rows in noises.items()}
+spectrum = {name: measures.power_spectrum(rows) for name, rows in noises.items()}
 spike = np.argmin(np.abs(frequency - 1 / 120))
 height = {name: float(power[spike] / np.median(power)) for name, power in spectrum.items()}
 bumps = {name: float(np.std(np.log(power[10:]))) for name, power in spectrum.items()}
@@ -65,10 +65,10 @@ assert height["real"] > 1.5 > height["Gaussian"]
 assert not is_full or (height["GAN"] < 1.5 and bumps["GAN"] > 2 * bumps["real"])
 
 # %%
-lag_one = {name: fidelity.autocorrelation(rows, 1)[1] for name, rows in noises.items()}
+lag_one = {name: measures.autocorrelation(rows, 1)[1] for name, rows in noises.items()}
 for name in ("GAN", "Gaussian"):
-    size = fidelity.scale_difference(noises[name], real)
-    values = fidelity.marginal_distance(noises[name], real)
+    size = measures.scale_difference(noises[name], real)
+    values = measures.marginal_distance(noises[name], real)
     lag = abs(lag_one[name] - lag_one["real"])
     print(f"{name:8} sd off by {np.expm1(size):.1%}, values by {values:.3f} sd, lag-1 by {lag:.3f}")
     if is_full or name == "Gaussian":
@@ -98,7 +98,7 @@ fixed = {name: float(np.mean(rows.mean(axis=0) ** 2) / np.mean(rows**2)) for nam
 for name, share in fixed.items():
     print(f"{name:8} share of the power that is the same in every window: {share:.1%}")
 assert fixed["GAN"] > 5 * fixed["real"]
-pattern = fidelity.power_spectrum(noises["GAN"].mean(axis=0)[None])
+pattern = measures.power_spectrum(noises["GAN"].mean(axis=0)[None])
 alike = np.corrcoef(pattern, spectrum["GAN"])[0, 1]
 print(f"correlation of the pattern's spectrum with that of the windows: {alike:.2f}")
 assert alike > 0.5
@@ -124,7 +124,7 @@ with drawing(alt, height=2.2) as panel:
 # a round ball. Every point of the sheet could be a point of the ball. That is why no window by itself looks wrong.
 
 # %%
-rank = {name: fidelity.effective_rank(rows) for name, rows in noises.items()}
+rank = {name: measures.effective_rank(rows) for name, rows in noises.items()}
 print("effective rank:", {name: round(value, 1) for name, value in rank.items()})
 assert rank["GAN"] < {True: 0.2, False: 0.6}[is_full] * rank["real"]  # few windows have little rank to lose
 assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
@@ -208,7 +208,7 @@ assert records[0]["verdict"] != "reproduced"
 # %%
 many = experiment.data.noise_windows("train", 800, "exercise")
 for number in (50, 100, 200, 400, 800):
-    print(f"{number:4} windows: effective rank {fidelity.effective_rank(many[:number]):.0f}")
+    print(f"{number:4} windows: effective rank {measures.effective_rank(many[:number]):.0f}")
 
 # %%
 for share in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):

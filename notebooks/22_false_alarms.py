@@ -13,7 +13,7 @@ sys.path.insert(0, "..")  # the clone that this notebook lies in
 import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, GENERATED, QUIET, REAL
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import metrics
 from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, open_findings, show_finding
 
 experiment = open_experiment()
@@ -42,9 +42,9 @@ scores, rate = {}, {}
 for name, windows in arms.items():
     training, held_out = np.split(windows, 2)
     detector = PCAResidual(chosen.num_components).fit(training)
-    limit = detection.threshold(detector.score(held_out), allowed)
+    limit = metrics.threshold(detector.score(held_out), allowed)
     scores[name] = detector.score(healthy) / limit
-    rate[name] = detection.recall(scores[name], 1.0)
+    rate[name] = metrics.recall(scores[name], 1.0)
     print(f"trained on {name:6} false alarms on healthy real windows: {rate[name]:.1%}")
 
 # %%

@@ -59,14 +59,14 @@ if experiment.settings.budget == "full":
 # the training windows leave of it, and how far it is from the nearest of them.
 
 # %%
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 
 learnt = experiment.data.windows("train", experiment.settings.telemetry.num_windows, "training windows")[
     "coarse"
 ]
 score = OutOfRange().fit(learnt)
-limit = detection.threshold(score.score(experiment.data.windows("calibration", None)["coarse"]), 0.01)
+limit = metrics.threshold(score.score(experiment.data.windows("calibration", None)["coarse"]), 0.01)
 scores = {name: score.score(windows) for name, windows in coarse.items()}
 print({name: f"{np.mean(each > limit):.0%} out of range" for name, each in scores.items()})
 

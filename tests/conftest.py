@@ -79,11 +79,11 @@ def narrow_enhancer():
     These tests check the path from telemetry to a simulator. The wide network takes far longer, and after each training
     TensorFlow keeps 130 MB of its weights and moments until the process ends.
     """
-    from enhsim_tf.enhancer import network as enhancer
+    from enhsim_tf.enhancer import network
 
-    plain = enhancer.build_enhancer
+    plain = network.build_enhancer
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(enhancer, "build_enhancer", functools.partial(plain, hidden_units=256))
+        patch.setattr(network, "build_enhancer", functools.partial(plain, hidden_units=256))
         yield
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject, inject_into_trace
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.telemetry.windows import cut_windows
@@ -123,7 +123,7 @@ def evaluate_arm(
     tables: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
     for done, (name, make) in enumerate(detectors.items(), 1):
         detector = make(seed).fit(training)
-        threshold = detection.threshold(detector.score(held_out), trial.rate)
+        threshold = metrics.threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
         for block, scores in enumerate(np.array_split(nominal, num_blocks)):
             tables["alarms"].append({"detector": name, "block": block, "alarms": int(np.sum(scores > threshold)), "windows": len(scores)})
@@ -135,15 +135,15 @@ def evaluate_arm(
                     "detector": name,
                     "kind": kind,
                     "severity": severity,
-                    "recall": detection.recall(scores, threshold),
-                    "recall_at_real_rate": detection.recall_at_real_rate(reference, scores, trial.rate),
-                    "auc_roc": detection.auc_roc(nominal, scores),
-                    "auc_pr": detection.auc_pr_at_prevalence(nominal, scores, PREVALENCE),
+                    "recall": metrics.recall(scores, threshold),
+                    "recall_at_real_rate": metrics.recall_at_real_rate(reference, scores, trial.rate),
+                    "auc_roc": metrics.auc_roc(nominal, scores),
+                    "auc_pr": metrics.auc_pr_at_prevalence(nominal, scores, PREVALENCE),
                 }
             )
         if trial.trace is not None:
             scores = score_trace(detector, trial.trace, training.shape[1], trial.stride)
-            tables["traces"].append({"detector": name, "vus_pr": detection.vus_pr(trial.labels, scores, trial.max_buffer)})
+            tables["traces"].append({"detector": name, "vus_pr": metrics.vus_pr(trial.labels, scores, trial.max_buffer)})
         if on_detector is not None:
             on_detector(done)
     return tables

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.detection import evaluation as robustness
+from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.training_pairs import cut_pairs, evenly_spaced_starts, ridge, window_errors
-from enhsim_tf.realism import real_floor as realism
+from enhsim_tf.realism import real_floor
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import disjoint_offsets
 
@@ -54,14 +54,14 @@ def report_on(
     places = evenly_spaced_starts(learnt, window, 2 * _NUM_WINDOWS)
     training = cut_pairs(learnt, simulator.coarse, places, window, follow=True)
     real = training.target
-    trial = robustness.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
+    trial = evaluation.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
     trial = dataclasses.replace(trial, anomalous={key: value for key, value in trial.anomalous.items() if key[1] == SEVERITY})
     quick = {name: DETECTORS[name] for name in QUICK}
     cut = len(real) * 3 // 5  # later real windows set the threshold, with a gap in time, because neighbouring windows overlap
     gap = window * len(real) // max(1, sum(map(len, learnt)))
     judged = {
-        "generated": robustness.evaluate_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
-        "real": robustness.evaluate_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
+        "generated": evaluation.evaluate_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
+        "real": evaluation.evaluate_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
     }
     recall = {name: {row["kind"]: row["recall"] for row in judged["generated"]["recall"] if row["detector"] == name} for name in QUICK}
     return ChannelReport(
@@ -78,7 +78,7 @@ def report_on(
         },
         rows,
         noise_window,
-        {name: robustness.false_alarm_rates(tables["alarms"]) for name, tables in judged.items()},
+        {name: evaluation.false_alarm_rates(tables["alarms"]) for name, tables in judged.items()},
         recall,
         noise_sd,
         {
@@ -140,7 +140,7 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
         return short, []
     residual = residual[:, : short * pieces].reshape(-1, short)
     half = len(residual) // 2
-    floor = realism.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
+    floor = real_floor.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
     generated = simulator.noise.generate(-(-half // pieces), seed)[:, : short * pieces].reshape(-1, short)[:half]
     rows = [dataclasses.asdict(row) for row in floor.evaluate(generated).rows]
     return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is not valid JSON

@@ -14,7 +14,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
-from enhsim_tf.enhancer import network as enhancer_network
+from enhsim_tf.enhancer import network
 from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs, random_window_starts
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.gan import NoiseGAN, num_overlapping
@@ -249,7 +249,7 @@ class EnhancedSimulator:
         """
         if np.ndim(coarse) != 2 or np.shape(coarse)[1] != self.window:
             raise InputError(f"Expected coarse windows of shape (windows, {self.window}). Received: shape {np.shape(coarse)}.")
-        enhanced = enhancer_network.enhance(self.enhancer, (np.asarray(coarse) - self.offset) / self.scale)
+        enhanced = network.enhance(self.enhancer, (np.asarray(coarse) - self.offset) / self.scale)
         enhanced *= np.float32(self.scale)
         enhanced += np.float32(self.offset)
         return enhanced

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class TrustedRange:
         self.simulator = simulator
         learnt, held_out = (self._coarse(None, _NUM_NOMINAL, seed) for seed in range(2))
         self._range = OutOfRange().fit(learnt)
-        self._limit = max(detection.threshold(self._range.score(held_out), rate), _LEAST_LIMIT)
+        self._limit = max(metrics.threshold(self._range.score(held_out), rate), _LEAST_LIMIT)
 
     def score(self, coarse: np.ndarray) -> np.ndarray:
         """Scores how far coarse windows are outside the training range. A share `rate` of nominal windows scores above 1.

@@ -18,7 +18,7 @@ from enhsim_tf.cli.arguments import DETECTORS, parse
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
-from enhsim_tf.enhanced_simulator import report_measure as channel_report
+from enhsim_tf.enhanced_simulator import report_measure
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.noise.discriminator import build_discriminator
@@ -251,7 +251,7 @@ def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     )
     table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(channel_report, "_NUM_WINDOWS", 60)
+    monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 60)
     made = {}
     exec(snippet, made)
     assert made["windows"].shape == (20, 64) and made["day"].shape == (8_640, 3) and made["scores"].shape == (1_500, 3)
@@ -379,12 +379,12 @@ def test_an_output_that_is_a_folder_is_refused(told, tmp_path):
 
 
 def test_a_full_disk_gives_one_line(told, monkeypatch):
-    from enhsim_tf.datasets import labelled_windows as training_sets
+    from enhsim_tf.datasets import labelled_windows
 
     def fail(*arguments):
         raise OSError(28, "No space left on device", "x.parquet")
 
-    monkeypatch.setattr(training_sets, "write_windows_labelled", fail)
+    monkeypatch.setattr(labelled_windows, "write_windows_labelled", fail)
     code, _, errors = told("generate", "WORLD/single", "--windows", 5, "--out", "x.parquet")
     assert code == 2 and len(errors) == 1 and "No space left on device" in errors[0]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from enhsim_tf.common import atomic_files as files
+from enhsim_tf.common import atomic_files
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,7 +22,7 @@ each_way = pytest.mark.parametrize("can_exchange", [True, False], ids=["exchange
 def can_exchange(request, monkeypatch):
     """Runs a test with the exchange in one step and with the two renames."""
     if not request.param:
-        monkeypatch.setattr(files, "_exchange", lambda first, second: False)
+        monkeypatch.setattr(atomic_files, "_exchange", lambda first, second: False)
     return request.param
 
 
@@ -31,24 +31,24 @@ def content_of(folder):
 
 
 def test_make_folder_creates_parents_and_leaves_the_folder_empty(tmp_path):
-    folder = files.make_folder(tmp_path / "a" / "b")
+    folder = atomic_files.make_folder(tmp_path / "a" / "b")
     assert folder == tmp_path / "a" / "b" and folder.is_dir() and not list(folder.iterdir())
-    assert files.make_folder(folder) == folder  # calling it again is not an error
+    assert atomic_files.make_folder(folder) == folder  # calling it again is not an error
 
 
 def test_make_folder_refuses_an_existing_file(tmp_path, refused):
     (tmp_path / "taken").write_text("x")
     with refused("taken"):
-        files.make_folder(tmp_path / "taken")
+        atomic_files.make_folder(tmp_path / "taken")
     with refused("taken"):
-        files.make_folder(tmp_path / "taken" / "below")
+        atomic_files.make_folder(tmp_path / "taken" / "below")
     assert content_of(tmp_path) == {"taken": "x"}
 
 
 def test_replace_file_renames_only_at_the_end(tmp_path):
     path = tmp_path / "values.json"
     path.write_text("old")
-    with files.replace_file(path) as temporary:
+    with atomic_files.replace_file(path) as temporary:
         temporary.write_text("new")
         assert path.read_text() == "old"
         assert temporary.parent == path.parent and temporary.suffix == ".json"
@@ -59,7 +59,7 @@ def test_replace_file_renames_only_at_the_end(tmp_path):
 def test_interrupted_replace_file_keeps_the_old_content(tmp_path, before):
     for name, text in before.items():
         (tmp_path / name).write_text(text)
-    with pytest.raises(KeyboardInterrupt), files.replace_file(tmp_path / "values.json") as temporary:
+    with pytest.raises(KeyboardInterrupt), atomic_files.replace_file(tmp_path / "values.json") as temporary:
         temporary.write_text("half")
         raise KeyboardInterrupt
     assert content_of(tmp_path) == before
@@ -69,7 +69,7 @@ def test_interrupted_replace_file_keeps_the_old_content(tmp_path, before):
 def test_replace_folder_replaces_the_whole_old_folder(can_exchange, tmp_path):
     path = tmp_path / "above" / "model"
     for number in (1, 2):
-        with files.replace_folder(path) as temporary:
+        with atomic_files.replace_folder(path) as temporary:
             (temporary / f"only_{number}").write_text(str(number))
     assert content_of(tmp_path) == {"above/model/only_2": "2"}
 
@@ -78,7 +78,7 @@ def test_replace_folder_replaces_the_whole_old_folder(can_exchange, tmp_path):
 def test_replace_folder_replaces_a_file_and_leaves_no_temporary(can_exchange, tmp_path):
     path = tmp_path / "model"
     path.write_text("a file")
-    with files.replace_folder(path) as temporary:
+    with atomic_files.replace_folder(path) as temporary:
         (temporary / "inside").write_text("new")
     assert content_of(tmp_path) == {"model/inside": "new"}
 
@@ -88,7 +88,7 @@ def test_interrupted_replace_folder_keeps_the_old_content(tmp_path, before):
     for name, text in before.items():
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).write_text(text)
-    with pytest.raises(KeyboardInterrupt), files.replace_folder(tmp_path / "model") as temporary:
+    with pytest.raises(KeyboardInterrupt), atomic_files.replace_folder(tmp_path / "model") as temporary:
         (temporary / "inside").write_text("half")
         raise KeyboardInterrupt
     assert content_of(tmp_path) == before
@@ -109,7 +109,7 @@ def test_replace_folder_keeps_the_old_content_when_the_rename_fails(can_exchange
         rename(source, destination)
 
     monkeypatch.setattr(os, "replace", fails_for_the_new)
-    with pytest.raises(OSError, match="no space left"), files.replace_folder(path) as temporary:
+    with pytest.raises(OSError, match="no space left"), atomic_files.replace_folder(path) as temporary:
         (temporary / "inside").write_text("new")
     assert content_of(tmp_path) == {"model/inside": "old"}
 
@@ -143,7 +143,7 @@ def test_old_content_is_restored_after_a_kill_between_the_two_renames(tmp_path, 
     inside.write_text("old")
     script = """
 import os, signal, sys
-from enhsim_tf.common import atomic_files as files
+from enhsim_tf.common import atomic_files
 files._exchange = lambda first, second: False
 rename = os.replace
 def killed(source, destination):
@@ -157,9 +157,9 @@ with files.replace_folder(sys.argv[1]) as temporary:
     assert subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT).returncode == -9
     assert not path.exists() and len(list(tmp_path.iterdir())) == 2
     if then == "remove_leftovers":
-        files.remove_leftovers(tmp_path)
+        atomic_files.remove_leftovers(tmp_path)
     else:
-        with pytest.raises(RuntimeError), files.replace_folder(path):
+        with pytest.raises(RuntimeError), atomic_files.replace_folder(path):
             raise RuntimeError
     assert inside.read_text() == "old" and [each.name for each in tmp_path.iterdir()] == ["model.v2"]
 
@@ -167,7 +167,7 @@ with files.replace_folder(sys.argv[1]) as temporary:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere a folder takes two renames")
 def test_a_reader_always_finds_the_old_or_the_new_content(tmp_path):
     path = tmp_path / "model"
-    with files.replace_folder(path) as temporary:
+    with atomic_files.replace_folder(path) as temporary:
         (temporary / "number").write_text("0")
     script = """
 import sys
@@ -193,7 +193,7 @@ def test_replace_folder_keeps_the_old_content_if_keep_says_so(can_exchange, tmp_
         return asked[-1] == "whole"
 
     for text, expected in (("broken", "broken"), ("whole", "whole"), ("other", "whole")):
-        with files.replace_folder(path, keep) as temporary:
+        with atomic_files.replace_folder(path, keep) as temporary:
             (temporary / "inside").write_text(text)
         assert content_of(tmp_path) == {"stage/inside": expected}
     assert asked == ["broken", "whole"] and [each.name for each in tmp_path.iterdir()] == ["stage"]
@@ -213,7 +213,7 @@ def test_replace_folder_replaces_a_folder_written_by_another_process_in_the_mean
 
     asked = []
     monkeypatch.setattr(os, "replace", meanwhile)
-    with files.replace_folder(path) as temporary:
+    with atomic_files.replace_folder(path) as temporary:
         (temporary / "inside").write_text("new")
     assert content_of(tmp_path) == {"model/inside": "new"} and [each.name for each in tmp_path.iterdir()] == ["model"]
 
@@ -222,7 +222,7 @@ def test_replace_folder_replaces_a_folder_written_by_another_process_in_the_mean
 def test_replace_folder_replaces_a_link_and_not_its_target(can_exchange, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "model").symlink_to("elsewhere")
-    with files.replace_folder(tmp_path / "model") as temporary:
+    with atomic_files.replace_folder(tmp_path / "model") as temporary:
         (temporary / "inside").write_text("new")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["elsewhere", "model"] and content_of(tmp_path) == {"model/inside": "new"}
 
@@ -235,9 +235,9 @@ def test_files_that_a_killed_process_left_are_removed(tmp_path):
     for name in ("results.json", "without"):
         subprocess.run([sys.executable, "-c", script, str(tmp_path / name)], cwd=ROOT)
     assert len(list(tmp_path.iterdir())) == 2
-    files.remove_leftovers(tmp_path, "without")
+    atomic_files.remove_leftovers(tmp_path, "without")
     assert [each.name.startswith(".results.json.") for each in tmp_path.iterdir()] == [True]
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -248,16 +248,16 @@ def test_a_wrong_clock_does_not_remove_files_of_a_running_process(tmp_path, monk
     grow_old(alive, days)  # as if the clock had been changed
     now = time.time()
     monkeypatch.setattr(time, "time", lambda: now + days * 86_400)  # the local clock is wrong, the file system's clock is right
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert alive.is_dir() and other.is_dir()
 
 
 def test_write_json_round_trip_and_refusal_of_nan_and_infinity(tmp_path):
     path = tmp_path / "results.json"
-    files.write_json(path, {"a": [1, 2.5, None, "é"]})
+    atomic_files.write_json(path, {"a": [1, 2.5, None, "é"]})
     assert json.loads(path.read_text(encoding="utf-8")) == {"a": [1, 2.5, None, "é"]}
     with pytest.raises(ValueError, match="not JSON compliant"):
-        files.write_json(path, {"a": float("nan")})
+        atomic_files.write_json(path, {"a": float("nan")})
     assert json.loads(path.read_text(encoding="utf-8"))["a"][1] == 2.5
     assert [entry.name for entry in tmp_path.iterdir()] == ["results.json"]
 
@@ -265,15 +265,15 @@ def test_write_json_round_trip_and_refusal_of_nan_and_infinity(tmp_path):
 def test_sha256_of_the_standard_s_examples(tmp_path):
     path = tmp_path / "message"
     path.write_bytes(b"abc")  # FIPS 180-2, appendix B.1
-    assert files.sha256(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert atomic_files.sha256(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     path.write_bytes(b"a" * 1_000_000)  # appendix B.3
-    assert files.sha256(path) == "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"
-    assert files.sha256(path) == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert atomic_files.sha256(path) == "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"
+    assert atomic_files.sha256(path) == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def left_by(process, folder, host=None):
     """Creates what a killed process leaves: a temporary folder with a file in it."""
-    left = folder / f".stage-0123.{host or files._host()}.{process}.0123abcd.tmp"
+    left = folder / f".stage-0123.{host or atomic_files._host()}.{process}.0123abcd.tmp"
     (left / "below").mkdir(parents=True)
     (left / "below" / "half").write_text("half")
     return left
@@ -297,7 +297,7 @@ def test_leftovers_of_a_killed_process_are_removed(tmp_path):
     script += "    (temporary / 'half').write_text('half')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
     subprocess.run([sys.executable, "-c", script, str(tmp_path / "stage-0123")], cwd=ROOT)
     assert [path.name for path in tmp_path.glob(".stage-0123.*/*")] == ["half"]
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -306,12 +306,12 @@ def test_leftovers_of_unknown_processes_stay_for_a_day(tmp_path):
     for days in (0, 0.9):
         for left in others:
             grow_old(left, days)
-        files.remove_leftovers(tmp_path)
+        atomic_files.remove_leftovers(tmp_path)
         assert all(left.is_dir() for left in others)
     for left in others:
         grow_old(left, 0.2)
     (others[0] / "below" / "new").write_text("at work")
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert [left.is_dir() for left in others] == [True, False]
 
 
@@ -322,14 +322,14 @@ def test_files_that_only_look_like_leftovers_stay(tmp_path):
         (tmp_path / name / "kept").write_text("mine")
         grow_old(tmp_path / name, 400)
     (tmp_path / "model").mkdir()
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert sorted(path.parent.name for path in tmp_path.glob("*/kept")) == sorted(mine)
 
 
 def test_leftovers_of_exchanged_files_and_links_are_removed(tmp_path):
     script = """
 import os, signal, sys
-from enhsim_tf.common import atomic_files as files
+from enhsim_tf.common import atomic_files
 files._remove = lambda path: os.kill(os.getpid(), signal.SIGKILL)
 with files.replace_folder(sys.argv[1]) as temporary:
     (temporary / "inside").write_text("new")
@@ -338,7 +338,7 @@ with files.replace_folder(sys.argv[1]) as temporary:
     (tmp_path / "link").symlink_to("nowhere")
     for name in ("file", "link"):
         assert subprocess.run([sys.executable, "-c", script, str(tmp_path / name)], cwd=ROOT).returncode == -9
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
     assert [(tmp_path / name / "inside").read_text() for name in ("file", "link")] == ["new", "new"]
 
@@ -355,7 +355,7 @@ def test_interrupted_between_the_two_renames_the_old_content_stays(can_exchange,
             raise KeyboardInterrupt
 
     monkeypatch.setattr(os, "replace", interrupted)
-    with pytest.raises(KeyboardInterrupt), files.replace_folder(path) as temporary:
+    with pytest.raises(KeyboardInterrupt), atomic_files.replace_folder(path) as temporary:
         (temporary / "inside").write_text("new")
     assert content_of(tmp_path) == {"model/inside": "old"} and [each.name for each in tmp_path.iterdir()] == ["model"]
 
@@ -363,17 +363,17 @@ def test_interrupted_between_the_two_renames_the_old_content_stays(can_exchange,
 def test_machines_with_similar_names_are_distinguished(monkeypatch):
     seen = []
     for name in ("gke-prod-cluster-default-pool-aaaa", "gke-prod-cluster-default-pool-bbbb", "x", ""):
-        monkeypatch.setattr(files.socket, "gethostname", lambda name=name: name)
-        seen.append(files._host.__wrapped__())
+        monkeypatch.setattr(atomic_files.socket, "gethostname", lambda name=name: name)
+        seen.append(atomic_files._host.__wrapped__())
     assert len(set(seen)) == 4 and max(map(len, seen)) <= 17 and not any("." in each for each in seen)
 
 
 def test_the_longest_name_still_allows_two_temporary_suffixes(tmp_path):
-    path = tmp_path / files.encode_name("a" * 160)
+    path = tmp_path / atomic_files.encode_name("a" * 160)
     with (
-        files.replace_folder(path) as outer,
-        files.replace_folder(outer) as inner,
-        files.replace_file(inner / "settings.json") as temporary,
+        atomic_files.replace_folder(path) as outer,
+        atomic_files.replace_folder(outer) as inner,
+        atomic_files.replace_file(inner / "settings.json") as temporary,
     ):
         temporary.write_text("{}")
     assert (path / "settings.json").read_text() == "{}"
@@ -388,5 +388,5 @@ def test_no_other_name_counts_as_a_leftover(tmp_path):
         if not path.is_symlink():
             grow_old(path, 2)
     before = sorted(tmp_path.rglob("*"))
-    files.remove_leftovers(tmp_path)
+    atomic_files.remove_leftovers(tmp_path)
     assert sorted(tmp_path.rglob("*")) == before

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.common import console as terminal
+from enhsim_tf.common import console
 from enhsim_tf.common.console import SILENT, Progress, time_left
 from enhsim_tf.reproduce.paper import measurements
 from enhsim_tf.reproduce.paper.pipeline import Experiment
@@ -41,7 +41,7 @@ def clock():
 @pytest.fixture
 def at_once(monkeypatch):
     """Prints a line at every step."""
-    monkeypatch.setattr(terminal, "INTERVAL_S", 0.0)
+    monkeypatch.setattr(console, "INTERVAL_S", 0.0)
 
 
 # -- lines of a loop whose pace is known -----------------------------------------------------------------------------------
@@ -152,11 +152,11 @@ def test_the_adversarial_loop_reports_finished_iterations():
 @pytest.mark.parametrize("follow", [False, True])
 def test_a_fit_counts_the_epochs_of_all_training_rounds(at_once, follow, monkeypatch, capsys):
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-    from enhsim_tf.enhancer import network as enhancer
+    from enhsim_tf.enhancer import network
     from enhsim_tf.telemetry.series import Telemetry
 
-    build = enhancer.build_enhancer
-    monkeypatch.setattr(enhancer, "build_enhancer", lambda window, seed: build(window, 8, seed=seed))
+    build = network.build_enhancer
+    monkeypatch.setattr(network, "build_enhancer", lambda window, seed: build(window, 8, seed=seed))
     rng, told = np.random.default_rng(0), []
     telemetry = Telemetry((np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32))
     given = {"window": 60, "num_windows": 30, "epochs": 3, "num_iterations": 3, "noise": "paper", "follow": follow, "verbose": 0}
@@ -255,7 +255,7 @@ def test_consecutive_replicates_report_the_remaining_time(clock):
 def environment(tmp_path):
     """Environment in which a process and its children print a line at every step."""
     (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text("from enhsim_tf.common import console as terminal\nterminal.INTERVAL_S = 0.0\n")
+    (tmp_path / "site" / "sitecustomize.py").write_text("from enhsim_tf.common import console\nconsole.INTERVAL_S = 0.0\n")
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), str(ROOT)]), "TF_CPP_MIN_LOG_LEVEL": "3"}
 
 

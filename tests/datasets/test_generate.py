@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 from enhsim_tf.__main__ import main
-from enhsim_tf.cli import generate_many as fleet_command
+from enhsim_tf.cli import generate_many
 from enhsim_tf.common.atomic_files import sha256
-from enhsim_tf.datasets import generate as fleet
+from enhsim_tf.datasets import generate
 from enhsim_tf.datasets.folder import locked
 from enhsim_tf.datasets.generate import generate_fleet, verify
 from enhsim_tf.datasets.plan import plan_of
@@ -47,8 +47,8 @@ def here(monkeypatch):
             made.append(shard)
             return super().__call__(shard)
 
-    monkeypatch.setattr(fleet, "ShardMaker", Maker)
-    monkeypatch.setattr(fleet.engines, "run", serial)
+    monkeypatch.setattr(generate, "ShardMaker", Maker)
+    monkeypatch.setattr(generate.engines, "run", serial)
     return made
 
 
@@ -56,10 +56,10 @@ def here(monkeypatch):
 def undisturbed(tmp_path_factory):
     """The data set of 1,000 windows of `small_data_set.py`, generated without interruption."""
     folder = tmp_path_factory.mktemp("undisturbed") / "set"
-    before = fleet.ShardMaker, fleet.engines.run
-    fleet.ShardMaker, fleet.engines.run = PlainMaker, serial
+    before = generate.ShardMaker, generate.engines.run
+    generate.ShardMaker, generate.engines.run = PlainMaker, serial
     generate_fleet(folder, plan(), tell=lambda line: None)
-    fleet.ShardMaker, fleet.engines.run = before
+    generate.ShardMaker, generate.engines.run = before
     return folder
 
 
@@ -164,10 +164,10 @@ def test_a_run_resumes_after_the_finished_shards(tail, undisturbed, tmp_path, he
 
 def test_a_journal_continues_after_an_incomplete_line(undisturbed, tmp_path, monkeypatch, here):
     folder = begun(tmp_path / "set", undisturbed, tail=b'[3, 50, "01')
-    monkeypatch.setattr(fleet.engines, "run", lambda engine, work, numbers, workers: serial(engine, work, itertools.islice(numbers, 3)))
+    monkeypatch.setattr(generate.engines, "run", lambda engine, work, numbers, workers: serial(engine, work, itertools.islice(numbers, 3)))
     with pytest.raises(KeyError):  # this engine stops after three shards
         told(generate_fleet, folder, plan())
-    monkeypatch.setattr(fleet.engines, "run", serial)
+    monkeypatch.setattr(generate.engines, "run", serial)
     assert told(generate_fleet, folder, plan())[0].startswith("7 of 20 shards")
     assert content_of(folder) == content_of(undisturbed)
 
@@ -224,18 +224,18 @@ def test_a_shard_that_does_not_match_its_record_is_an_error(undisturbed, tmp_pat
 
 
 def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, here, monkeypatch, refused):
-    class Elsewhere(fleet.ShardMaker):
+    class Elsewhere(generate.ShardMaker):
         def __call__(self, shard):
             record = super().__call__(shard)
             if shard == 3:
                 (self.folder / file_of(shard)).unlink()
             return record
 
-    maker = fleet.ShardMaker
-    monkeypatch.setattr(fleet, "ShardMaker", Elsewhere)
+    maker = generate.ShardMaker
+    monkeypatch.setattr(generate, "ShardMaker", Elsewhere)
     with refused(file_of(3), "all machines share"):
         generate_fleet(tmp_path / "set", plan())
-    monkeypatch.setattr(fleet, "ShardMaker", maker)
+    monkeypatch.setattr(generate, "ShardMaker", maker)
     assert told(generate_fleet, tmp_path / "set", plan())[0].startswith("3 of 20 shards")
 
 
@@ -516,15 +516,15 @@ def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monk
     mix.write_text(mix.read_text() + "models: [{folder: amps, share: 0.4}, {folder: volts, share: 0.6}]\n")
     assert main(["generate", str(models), "--scenarios", str(mix), "--workers", "2", "--out", str(tmp_path / "set")]) == 0
     assert capsys.readouterr().out.startswith("150 windows of 60 samples in 3 shards")
-    monkeypatch.setattr(fleet.engines, "run", serial)
-    generate_fleet(tmp_path / "serial", plan_of(fleet_command.read_mix(mix), models, 5, 150), tell=lambda line: None)
+    monkeypatch.setattr(generate.engines, "run", serial)
+    generate_fleet(tmp_path / "serial", plan_of(generate_many.read_mix(mix), models, 5, 150), tell=lambda line: None)
     assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
     assert main(["verify", str(tmp_path / "set")]) == 0
 
 
 def test_each_channel_has_a_data_set_of_its_own(models, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(fleet, "ShardMaker", PlainMaker)
-    monkeypatch.setattr(fleet.engines, "run", serial)
+    monkeypatch.setattr(generate, "ShardMaker", PlainMaker)
+    monkeypatch.setattr(generate.engines, "run", serial)
     options = ["generate", str(models), "--windows", "1_000", "--workers", "auto", "--scenario", "stuck:0.5", "--seed", "4"]
     assert main([*options, "--out", str(tmp_path / "both")]) == 0
     assert main([*options, "--channel", "volts", "--out", str(tmp_path / "one")]) == 0

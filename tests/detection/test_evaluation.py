@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.detection import evaluation as robustness
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
 from enhsim_tf.detection.detectors import LargestStep, PCAResidual
 from enhsim_tf.detection.evaluation import (
@@ -82,7 +81,7 @@ def test_rates_worked_by_hand():
     (row,) = [row for row in found["recall"] if (row["kind"], row["severity"]) == ("level_shift", 4.0)]
     scores = made.anomalous["level_shift", 4.0].max(axis=1)
     assert row["recall"] == np.mean(scores > threshold)
-    assert row["recall_at_real_rate"] == np.mean(scores > detection.threshold(made.reference.max(axis=1), 0.1))
+    assert row["recall_at_real_rate"] == np.mean(scores > metrics.threshold(made.reference.max(axis=1), 0.1))
     assert len(found["recall"]) == len(INJECTIONS) * len(SEVERITIES) and len(found["traces"]) == 1
 
 
@@ -91,7 +90,7 @@ def test_exchangeable_arms_alarm_at_the_rate_they_were_set_for():
     rates = []
     for seed in range(40):
         nominal = noise(500, [seed, 1])
-        real = robustness.Trial(nominal, nominal, {("ramp", 1.0): nominal[:5]}, rate=0.05)
+        real = evaluation.Trial(nominal, nominal, {("ramp", 1.0): nominal[:5]}, rate=0.05)
         found = evaluate_arm(noise(5, [seed, 2]), noise(500, [seed, 3]), real, {"step": lambda seed: LargestStep()}, seed=0)
         rates.append(false_alarm_rates(found["alarms"])["step"])
     assert abs(np.mean(rates) - 0.05) < 0.008

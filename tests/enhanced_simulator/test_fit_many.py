@@ -15,10 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.enhanced_simulator import fit_many as channels
-from enhsim_tf.enhanced_simulator import fitting
-from enhsim_tf.enhanced_simulator import report_figure as channel_figure
-from enhsim_tf.enhanced_simulator import report_measure as channel_report
+from enhsim_tf.enhanced_simulator import fit_many, fitting, report_figure, report_measure
 from enhsim_tf.enhanced_simulator.fit_many import MANIFEST, fit_channels, fit_job
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of, refuse_foreign
@@ -55,8 +52,8 @@ def quick(monkeypatch):
 
     monkeypatch.setattr(fitting, "report_on", report_on)
     monkeypatch.setattr(enhancer, "build_enhancer", lambda window, seed: build_enhancer(window, 16, seed=seed))
-    monkeypatch.setattr(channel_report, "_NUM_WINDOWS", 60)
-    monkeypatch.setattr(channel_report, "_compare_noise", lambda *arguments: (16, []))
+    monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 60)
+    monkeypatch.setattr(report_measure, "_compare_noise", lambda *arguments: (16, []))
 
 
 def fit(out, given, workers=0, engine="local", **changed):
@@ -252,21 +249,21 @@ def test_a_failure_leaves_no_partial_output(tmp_path, quick, monkeypatch, refuse
     def fail(report):
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(channel_figure, "channel_figure", fail)
+    monkeypatch.setattr(report_figure, "channel_figure", fail)
     with refused("no space"):
         fit(tmp_path, {"volts": series()}, seed=5)
     assert files(tmp_path) == before and [path.name for path in tmp_path.iterdir()] == ["volts"] * there_before
 
 
 def test_temporary_folders_of_killed_processes_are_removed(tmp_path, quick):
-    left = tmp_path / f".volts.{channels.remove_leftovers.__globals__['_host']()}.4194305.0123abcd.tmp"  # no process has this number
+    left = tmp_path / f".volts.{fit_many.remove_leftovers.__globals__['_host']()}.4194305.0123abcd.tmp"  # no process has this number
     left.mkdir()
     fit(tmp_path, {"volts": series()})
     assert [path.name for path in tmp_path.iterdir()] == ["volts"]
 
 
 def test_other_content_written_during_the_fit_is_left_unchanged(tmp_path, quick, refused, monkeypatch):
-    job = channels.Job("volts", series(), tmp_path / "volts", FitOptions(**TINY), Cleaning())
+    job = fit_many.Job("volts", series(), tmp_path / "volts", FitOptions(**TINY), Cleaning())
     (tmp_path / "volts").mkdir()
     (tmp_path / "volts" / "notes.txt").write_text("mine")
     with refused("something else"):

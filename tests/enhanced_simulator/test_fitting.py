@@ -9,8 +9,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.enhanced_simulator import fitting
-from enhsim_tf.enhanced_simulator import report_measure as channel_report
+from enhsim_tf.enhanced_simulator import fitting, report_measure
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.fitting import fit_channel, window_of
 from enhsim_tf.enhanced_simulator.report import ChannelReport
@@ -34,7 +33,7 @@ def fitted():
     """A simulator fitted with a tiny budget, and its report, evaluated on the end of two parts."""
     whole = channel(start="2024-01-01T00:00:00+00:00", interval_s=10.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(channel_report, "_NUM_WINDOWS", 100)
+        patch.setattr(report_measure, "_NUM_WINDOWS", 100)
         return fit_channel([whole.part(0, 900), whole.part(1_000, 2_000)], TINY, verbose=0)
 
 
@@ -82,7 +81,7 @@ def test_the_report_is_plain_json(fitted):
 
 
 def test_same_seed_same_simulator_and_report(fitted, monkeypatch):
-    monkeypatch.setattr(channel_report, "_NUM_WINDOWS", 100)
+    monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 100)
     whole = channel(start="2024-01-01T00:00:00+00:00", interval_s=10.0)
     simulator, report = fit_channel([whole.part(0, 900), whole.part(1_000, 2_000)], TINY, verbose=0)
     np.testing.assert_array_equal(simulator.generate(20, seed=1), fitted[0].generate(20, seed=1))

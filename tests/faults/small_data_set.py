@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
-from enhsim_tf.datasets import generate as fleet  # noqa: E402
+from enhsim_tf.datasets import generate  # noqa: E402
 from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
 from enhsim_tf.datasets.scenario_file import Mix, ScenarioShare  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
@@ -111,10 +111,10 @@ def main():
         import resource
 
         resource.setrlimit(resource.RLIMIT_FSIZE, (options.limit, options.limit))
-    fleet.ShardMaker = SlowMaker
+    generate.ShardMaker = SlowMaker
 
     def run():
-        fleet.generate_fleet(options.out, plan(options.windows), options.workers)
+        generate.generate_fleet(options.out, plan(options.windows), options.workers)
         return 0
 
     return run_command(run, "interrupted; what was finished is kept")

@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.datasets.labelled_windows import num_samples_of, parse_scenario, start_of
 from enhsim_tf.datasets.scenario_file import read_mix
 from enhsim_tf.enhanced_simulator.model_folder import folder_of
-from enhsim_tf.telemetry import influx_client as influx_server
+from enhsim_tf.telemetry import influx_client
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
 from enhsim_tf.telemetry.series import Telemetry
@@ -118,7 +118,7 @@ class _Answer:
 
 def _server_answer(data: bytes, folder: Path) -> None:
     with _named_server():
-        server = influx_server.InfluxServer("bucket", max_retry_s=0)
+        server = influx_client.InfluxServer("bucket", max_retry_s=0)
         server._repeat = lambda request: _Answer(data)
         for times, values in server.stream("|> last()", 0, 2**62):
             assert len(times) == len(values) and times.dtype == np.int64
@@ -165,13 +165,13 @@ def _written(location: str, name: str) -> None:
 
 @contextlib.contextmanager
 def _named_server():
-    before, time = os.environ.copy(), influx_server.time
+    before, time = os.environ.copy(), influx_client.time
     os.environ |= _SERVER
-    influx_server.time = SimpleNamespace(sleep=lambda seconds: None, monotonic=time.monotonic)
+    influx_client.time = SimpleNamespace(sleep=lambda seconds: None, monotonic=time.monotonic)
     try:
         yield
     finally:
-        influx_server.time = time
+        influx_client.time = time
         os.environ.clear()
         os.environ.update(before)
 

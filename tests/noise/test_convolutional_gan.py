@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from enhsim_tf.noise.convolutional_gan import build_convolutional_generator, build_statistics_discriminator, convolutional_noise_gan
 from enhsim_tf.noise.gan import NoiseGAN
-from enhsim_tf.realism import measures as fidelity
+from enhsim_tf.realism import measures
 
 NOISE = np.random.default_rng(9).normal(0, 0.3, (50, 120)).astype(np.float32)
 
@@ -37,8 +37,8 @@ def test_same_seed_same_noise(gan):
 def test_every_sample_has_its_own_random_input(gan):
     # 600 windows from a 16-element latent vector fill at most 16 dimensions before a non-linearity; these fill most of 120
     windows = gan.generate(600, seed=3)
-    assert fidelity.effective_rank(windows) > 60
-    far = fidelity.autocorrelation(windows - windows.mean(axis=0), 60)[45:]  # beyond the 41 samples that two convolutions see
+    assert measures.effective_rank(windows) > 60
+    far = measures.autocorrelation(windows - windows.mean(axis=0), 60)[45:]  # beyond the 41 samples that two convolutions see
     assert np.abs(far).max() < 0.2
 
 
@@ -122,10 +122,10 @@ def test_learns_the_scale_and_the_correlation_of_coloured_noise():
     before = gan.generate(300, seed=5)
     gan.fit(real, num_iterations=250, verbose=False)
     after = gan.generate(300, seed=5)
-    off = [abs(fidelity.autocorrelation(windows, 1)[1] - coefficient) for windows in (before, after)]
+    off = [abs(measures.autocorrelation(windows, 1)[1] - coefficient) for windows in (before, after)]
     assert off[1] < 0.1 < off[0]
-    assert fidelity.scale_difference(after, real) < 0.15
-    assert fidelity.effective_rank(after) > 0.6 * fidelity.effective_rank(real[:300])
+    assert measures.scale_difference(after, real) < 0.15
+    assert measures.effective_rank(after) > 0.6 * measures.effective_rank(real[:300])
 
 
 def test_the_weight_average_replaces_the_last_weights():

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from enhsim_tf.common.atomic_files import write_json
-from enhsim_tf.reproduce.publish import results as report
+from enhsim_tf.reproduce.publish import results
 from enhsim_tf.reproduce.settings import deviations, make_settings
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ MARKERS = ("claims", "channels", "deviations", "timings")
 def found():
     stages = SimpleNamespace(seconds={"telemetry": 1.234, "enhancer": 60.5}, cached={"telemetry": True, "enhancer": False})
     experiment = SimpleNamespace(stages=stages, settings=make_settings("smoke", 7), is_paper=True)
-    return report.results(experiment, RECORDS, drawn_s=3.004, total_s=99.999)
+    return results.results(experiment, RECORDS, drawn_s=3.004, total_s=99.999)
 
 
 def test_results_hold_what_was_found(found):
@@ -98,18 +98,18 @@ def test_results_name_a_real_channel():
     stages = SimpleNamespace(seconds={}, cached={})
     source = SimpleNamespace(path=Path("somewhere") / "T-1.npy")
     experiment = SimpleNamespace(stages=stages, settings=make_settings(), is_paper=False, source=source)
-    assert report.results(experiment, RECORDS, 0, 0)["source"] == "T-1.npy", "its name, not where it lies on this machine"
+    assert results.results(experiment, RECORDS, 0, 0)["source"] == "T-1.npy", "its name, not where it lies on this machine"
 
 
 def test_numbers_in_short():
     expected = {0.12345: "0.123", -2.0: "-2", 999.4: "999", 999.6: "1,000", 1234567.8: "1,234,568", None: "–", float("inf"): "–"}
-    assert {number: report.short(number) for number in expected} == expected
+    assert {number: results.short(number) for number in expected} == expected
 
 
 @pytest.mark.parametrize("columns", [10, 80, 500])
 def test_the_table_says_it_for_a_terminal(monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", str(columns))
-    text = report.table(RECORDS)
+    text = results.table(RECORDS)
     for record, value in zip(RECORDS, ("0.123", "1,234,568", "–"), strict=True):
         (line,) = (line for line in text.splitlines() if line.startswith(record["id"]))
         assert record["verdict"] in line and f"{record['statistic']}: {value} ({record['tolerance']})" in line
@@ -127,7 +127,7 @@ def filled(tmp_path, found):
         write_json(tmp_path / "results.json", found)
         if spread is not None:
             write_json(tmp_path / "spread.json", spread)
-        report.fill_readme(tmp_path / "README.md", tmp_path)
+        results.fill_readme(tmp_path / "README.md", tmp_path)
         return (tmp_path / "README.md").read_text(encoding="utf-8")
 
     return fill
@@ -230,12 +230,12 @@ def test_missing_markers_are_refused_and_the_file_stays(tmp_path, filled, refuse
 
 
 def test_without_a_readme_nothing_is_done(tmp_path):
-    report.fill_readme(tmp_path / "README.md", tmp_path)
+    results.fill_readme(tmp_path / "README.md", tmp_path)
     assert not list(tmp_path.iterdir())
 
 
 def test_deviations_table_has_a_row_a_setting():
-    head, rule, *rows = report.deviations_table().splitlines()
+    head, rule, *rows = results.deviations_table().splitlines()
     assert len(rows) == len(deviations()) > 40
     for row, about in zip(rows, deviations(), strict=True):
         cells = [cell.strip() for cell in row.strip("|").split("|")]
@@ -247,6 +247,6 @@ def test_the_repositorys_readme_is_up_to_date(tmp_path):
     if not (ROOT / "figures" / "results.json").is_file():
         pytest.skip("figures/results.json is not there yet: run the full budget")
     shutil.copy(ROOT / "README.md", tmp_path)
-    report.fill_readme(tmp_path / "README.md", ROOT / "figures")
+    results.fill_readme(tmp_path / "README.md", ROOT / "figures")
     assert (tmp_path / "README.md").read_text(encoding="utf-8") == (ROOT / "README.md").read_text(encoding="utf-8")
     assert json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))["budget"] == "full"

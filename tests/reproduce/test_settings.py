@@ -121,7 +121,7 @@ def test_an_unknown_budget_is_refused():
 
 
 def test_the_library_knows_the_same_defaults():
-    from enhsim_tf.coarse_simulator import square_waves as simulator
+    from enhsim_tf.coarse_simulator import square_waves
     from enhsim_tf.detection import detectors
     from enhsim_tf.detection.autoencoders import DenseAutoencoder
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -169,9 +169,9 @@ def test_the_library_knows_the_same_defaults():
         detectors.PCAResidual: {"num_components": "detectors.num_components"},
         detectors.IsolationForestOnFeatures: {"num_trees": "detectors.num_trees"},
         DenseAutoencoder: {"epochs": "detectors.autoencoder_epochs"},
-        simulator.Degraded: {"severity": "detectors.severity"},
-        simulator.SquareWave: {"num_levels": "enhancer.num_levels"},
-        simulator.SquareWaveSimulator.fit: {"num_levels": "enhancer.num_levels"},
+        square_waves.Degraded: {"severity": "detectors.severity"},
+        square_waves.SquareWave: {"num_levels": "enhancer.num_levels"},
+        square_waves.SquareWaveSimulator.fit: {"num_levels": "enhancer.num_levels"},
     }
     for function, names in same.items():
         parameters = inspect.signature(function).parameters

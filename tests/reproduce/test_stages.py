@@ -13,7 +13,7 @@ import enhsim_tf
 from enhsim_tf.common.atomic_files import replace_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce import stages
-from enhsim_tf.reproduce.paper import pipeline as experiments
+from enhsim_tf.reproduce.paper import pipeline
 from enhsim_tf.reproduce.stages import Stages, default_cache, imports_of, load_arrays, save_arrays
 
 PACKAGE = Path(enhsim_tf.__file__).parent
@@ -314,7 +314,7 @@ def test_imports_of_reads_every_form():
 
 
 def test_the_modules_of_every_stage_import_in_a_form_that_its_hash_follows():
-    waiting, seen = {module for modules in vars(experiments).values() if isinstance(modules, tuple) for module in modules}, set()
+    waiting, seen = {module for modules in vars(pipeline).values() if isinstance(modules, tuple) for module in modules}, set()
     while waiting - seen:
         seen.add(module := (waiting - seen).pop())
         source = stages._file_of(module).read_text(encoding="utf-8")  # each name is a module's
@@ -346,7 +346,7 @@ def test_how_the_networks_are_put_together_is_part_of_the_measured_stages(tmp_pa
     monkeypatch.setattr(stages, "_PACKAGE", tmp_path / "enhsim_tf")
 
     def key():
-        return Stages(tmp_path / "cache", tell=lambda line: None).run("work", lambda folder: None, experiments._MEASURED, ()).name
+        return Stages(tmp_path / "cache", tell=lambda line: None).run("work", lambda folder: None, pipeline._MEASURED, ()).name
 
     before = key()
     (module,) = (file for file in (tmp_path / "enhsim_tf" / "reproduce").rglob("*.py") if "return EnhancedSimulator(" in file.read_text())

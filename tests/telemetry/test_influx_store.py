@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry import influx_client as influx_server
+from enhsim_tf.telemetry import influx_client
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.influx_client import VARIABLES, quote
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
@@ -191,19 +191,19 @@ ANSWER = b"#datatype,string,long,dateTime:RFC3339,long\r\n,result,table,_time,_v
 def test_an_answer_is_the_same_in_blocks_of_any_size(monkeypatch):
     rows = b"".join(b",_result,0,1970-01-01T00:00:00.%09dZ,%d\r\n" % (7 * number, number - 50) for number in range(100))
     for size in (len(ANSWER), len(ANSWER) + 1, 131, 1_000, 10**6):
-        monkeypatch.setattr(influx_server, "_BLOCK", size)
-        times, values = _all(influx_server._blocks(io.BytesIO(ANSWER + rows + b"\r\n")))
+        monkeypatch.setattr(influx_client, "_BLOCK", size)
+        times, values = _all(influx_client._blocks(io.BytesIO(ANSWER + rows + b"\r\n")))
         assert np.array_equal(times, 7 * np.arange(100)) and np.array_equal(values, np.arange(100) - 50)
-    assert list(influx_server._blocks(io.BytesIO(b"\r\n"))) == []
+    assert list(influx_client._blocks(io.BytesIO(b"\r\n"))) == []
 
 
 def test_an_answer_that_ends_within_a_line_counts_as_incomplete(refused):
     row = b",_result,0,1970-01-01T00:00:01Z,1234\r\n"
     for cut in (1, 2, 4, 30):
-        blocks = influx_server._blocks(io.BytesIO(ANSWER + row + row[:-cut]))
+        blocks = influx_client._blocks(io.BytesIO(ANSWER + row + row[:-cut]))
         with pytest.raises(ConnectionError):
             list(blocks)
-    blocks = influx_server._blocks(io.BytesIO(ANSWER + row + b"\r\n#datatype,string,string\r\n,error,reference\r\n,out of memory,\r\n"))
+    blocks = influx_client._blocks(io.BytesIO(ANSWER + row + b"\r\n#datatype,string,string\r\n,error,reference\r\n,out of memory,\r\n"))
     with refused("out of memory"):
         list(blocks)
 

@@ -142,7 +142,7 @@ class Experiment:
 
     def _make_noise(self, folder: Path) -> None:
         from enhsim_tf.noise.gan import NoiseGAN
-        from enhsim_tf.realism import measures as fidelity
+        from enhsim_tf.realism import measures
 
         training, seed = self.settings.adversarial, self.settings.seed
         gan = NoiseGAN(
@@ -163,8 +163,8 @@ class Experiment:
             followed.append(
                 (
                     np.std(noise, dtype=np.float64) / np.std(real, dtype=np.float64),
-                    fidelity.autocorrelation(noise, 1)[1],
-                    fidelity.effective_rank(noise),
+                    measures.autocorrelation(noise, 1)[1],
+                    measures.effective_rank(noise),
                 )
             )
 
@@ -172,7 +172,7 @@ class Experiment:
         history = gan.fit(real, training.num_iterations, training.record_every, follow, bool(self.verbose), told)
         for name in ("generator", "discriminator"):
             getattr(gan, name).save(folder / f"{name}.keras", include_optimizer=False)
-        of_real = {"real_lag_one": fidelity.autocorrelation(real, 1)[1], "real_rank": fidelity.effective_rank(real[:200])}
+        of_real = {"real_lag_one": measures.autocorrelation(real, 1)[1], "real_rank": measures.effective_rank(real[:200])}
         save_arrays(folder, history | dict(zip(("sd_ratio", "lag_one", "rank"), np.transpose(followed), strict=True)) | of_real)
 
     @functools.cached_property

@@ -22,10 +22,10 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.paper.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed, title_verdict
 from enhsim_tf.reproduce.paper.figures import FIGURES
-from enhsim_tf.reproduce.publish import wording as report_words
+from enhsim_tf.reproduce.publish import wording
 from enhsim_tf.reproduce.publish.results import PAPER, disagreement, read_spread, short
 from enhsim_tf.reproduce.robustness import figures as robustness_figures
-from enhsim_tf.reproduce.robustness import run as robustness_run
+from enhsim_tf.reproduce.robustness import run
 from enhsim_tf.reproduce.settings import deviations
 
 NAME = "report.html"
@@ -98,8 +98,8 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
     )
     environment.filters |= {
         "short": short,
-        "interval": report_words.interval,
-        "per_cent": report_words.per_cent,
+        "interval": wording.interval,
+        "per_cent": wording.per_cent,
         "kind": lambda verdict: _KINDS.get(verdict, "none"),
     }
     rows, spread = deviations(), read_spread(folder, found)
@@ -130,7 +130,7 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
 
 def _experiment(folder: Path) -> dict[str, Any] | None:
     """The findings of the experiment on robustness, if they are in a subfolder of the figures' folder; otherwise None."""
-    path = folder / robustness_run.FOLDER / "findings.json"
+    path = folder / run.FOLDER / "findings.json"
     if not path.is_file():
         return None
     found = json.loads(path.read_text(encoding="utf-8"))
@@ -139,8 +139,8 @@ def _experiment(folder: Path) -> dict[str, Any] | None:
     return {
         "found": found,
         "pictures": pictures,
-        "verdict": report_words.verdict_c8(found),
-        "share": report_words.share_c8(found),
+        "verdict": wording.verdict_c8(found),
+        "share": wording.share_c8(found),
     }
 
 

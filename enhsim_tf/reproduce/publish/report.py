@@ -129,14 +129,14 @@ def report(found: Findings, root: Path) -> None:
         root: Folder of the project.
     """
     from enhsim_tf.reproduce.publish.results import fill_parts
-    from enhsim_tf.reproduce.spacecraft import run as labelled_run
+    from enhsim_tf.reproduce.spacecraft import run
 
     labelled = findings_of(root, "labelled")
     make_folder(root / PATH.parent)
     with replace_file(root / PATH) as temporary:
         text = render(found, labelled, *(designs_of(root / path) for path in TABLES), timing_of(root))
         temporary.write_text(text, encoding="utf-8")
-    parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": labelled_run.table(labelled)})
+    parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": run.table(labelled)})
     readme = root / "README.md"
     if readme.is_file():
         text = readme.read_text(encoding="utf-8")

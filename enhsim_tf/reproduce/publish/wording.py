@@ -92,23 +92,20 @@ def first_trial(found: Findings) -> str:
 
 def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     """Values for the template that are not in the findings: names, settings, and sentences that depend on comparisons."""
-    from enhsim_tf.detection import anomalies as injections
-    from enhsim_tf.detection import evaluation as robustness
+    from enhsim_tf.detection import anomalies, evaluation
     from enhsim_tf.detection.registry import DETECTORS
     from enhsim_tf.reproduce import statistics
-    from enhsim_tf.reproduce.robustness import degraded_modes
-    from enhsim_tf.reproduce.robustness import replicate as replicates
-    from enhsim_tf.reproduce.robustness import targets as bars
+    from enhsim_tf.reproduce.robustness import degraded_modes, replicate, targets
 
-    gaussian = [name for name in bars.KINDS_OF_NOISE["Gaussian"] if name in found["bars"]]
+    gaussian = [name for name in targets.KINDS_OF_NOISE["Gaussian"] if name in found["bars"]]
     asked, controls = [found["bars"][name] for name in gaussian], found["controls"].values()
-    trial = inspect.signature(robustness.make_trial).parameters
+    trial = inspect.signature(evaluation.make_trial).parameters
     scaled = by_scale(found)
     confirmed = [name for name, about in found["alarms_on_everything"].items() if about["replicates"] == about["of"]]
     return {
-        "arms": replicates.ARMS,
+        "arms": replicate.ARMS,
         "methods": degraded_modes.METHODS,
-        "noises": ["real", *(noise for pipeline in ("residual", "enhanced") for noise in _noises(pipeline, replicates.ARMS))],
+        "noises": ["real", *(noise for pipeline in ("residual", "enhanced") for noise in _noises(pipeline, replicate.ARMS))],
         "estimated": (
             "real",
             "residual: extracted",
@@ -125,19 +122,19 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         "gaussian_names": gaussian,
         "other_names": [name for name in found["bars"] if name not in gaussian],
         "detectors": list(DETECTORS),
-        "quick": replicates.QUICK_DETECTORS,
-        "kinds": [kind.replace("_", " ") for kind in injections.INJECTIONS],
-        "is_ar_as_good": all(bar["over_autoregression"]["mean"] >= -bars.MARGIN for bar in asked),
+        "quick": replicate.QUICK_DETECTORS,
+        "kinds": [kind.replace("_", " ") for kind in anomalies.INJECTIONS],
+        "is_ar_as_good": all(bar["over_autoregression"]["mean"] >= -targets.MARGIN for bar in asked),
         "opposite": opposite_signs(found),
         "development": DEVELOPMENT_SEEDS,
-        "severities": [f"{severity:g}" for severity in injections.SEVERITIES],
-        "durations": injections.DURATIONS,
-        "prevalence": robustness.PREVALENCE,
+        "severities": [f"{severity:g}" for severity in anomalies.SEVERITIES],
+        "durations": anomalies.DURATIONS,
+        "prevalence": evaluation.PREVALENCE,
         "trace_severity": trial["trace_severity"].default,
         "max_buffer": round(min(settings.telemetry.orbit_period_s, settings.telemetry.rotation_period_s) / settings.telemetry.interval_s),
-        "recall_points": number(100 * bars.LARGEST_RECALL_DIFFERENCE, 0),
-        "margin": bars.MARGIN,
-        "largest_ratio": number(bars.LARGEST_RATIO, 0),
+        "recall_points": number(100 * targets.LARGEST_RECALL_DIFFERENCE, 0),
+        "margin": targets.MARGIN,
+        "largest_ratio": number(targets.LARGEST_RATIO, 0),
         "best_control": max(about["recall_at_real_rate"] for about in controls if "recall_at_real_rate" in about),
         "modes_found": modes_found(found),
         "least_p": statistics.wilcoxon_signed_rank([1.0] * len(found["seeds"])),  # the p-value if all signs agree

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import metrics
 from enhsim_tf.reproduce import statistics
 
 if TYPE_CHECKING:
@@ -67,4 +67,4 @@ def gap_closed(mean_rate: "pd.DataFrame", arm: str) -> "pd.Series":
     import pandas as pd
 
     ends = zip(mean_rate[arm], mean_rate["coarse"], mean_rate["real"], strict=True)
-    return pd.Series([detection.gap_closed(*rates) for rates in ends], mean_rate.index)
+    return pd.Series([metrics.gap_closed(*rates) for rates in ends], mean_rate.index)

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.realism import measures as fidelity
+from enhsim_tf.realism import measures
 from enhsim_tf.reproduce import statistics
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 
@@ -76,7 +76,7 @@ class DegradedModes:
         limits = {}
         for name, score in scores.items():
             held_out = self._pairs(None, 1_000, f"limit {name}")[0]
-            limits[name] = detection.threshold(score.score(held_out), self.settings.robustness.false_alarm_rate)
+            limits[name] = metrics.threshold(score.score(held_out), self.settings.robustness.false_alarm_rate)
 
         cells, per_window = [], {name: [] for name in SCORED}
         tried = [("nominal", 0.0), *((mode, severity) for mode in MODES for severity in SEVERITIES)]
@@ -159,7 +159,7 @@ class DegradedModes:
         def smooth(width: int) -> Callable[[np.ndarray], np.ndarray]:
             return functools.partial(uniform_filter1d, size=width, axis=1, mode="nearest")
 
-        width = min(WIDTHS, key=lambda each: fidelity.nrmse(smooth(each)(nominal[0][:1_000]), nominal[1][:1_000]))
+        width = min(WIDTHS, key=lambda each: measures.nrmse(smooth(each)(nominal[0][:1_000]), nominal[1][:1_000]))
         network = self._train(*randomised)
         estimates = (
             lambda coarse: coarse,

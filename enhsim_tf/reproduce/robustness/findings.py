@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.reproduce import statistics
-from enhsim_tf.reproduce.robustness import realism_findings
-from enhsim_tf.reproduce.robustness import targets as bars
+from enhsim_tf.reproduce.robustness import realism_findings, targets
 from enhsim_tf.reproduce.robustness.averages import REPLICATE, by_block, by_replicate, gap_closed, interval, rates, trained
 from enhsim_tf.reproduce.robustness.replicate import ARMS, MIXED
 from enhsim_tf.reproduce.tables import KeptTables
@@ -61,7 +60,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         Plain JSON types: what was run, and one entry for each question.
     """
     rate, realism = rates(trained(tables["alarms"])), tables["realism"]
-    environments = [name for name in bars.BARS if name in set(rate["environment"])]
+    environments = [name for name in targets.BARS if name in set(rate["environment"])]
     return {
         "environments": environments,
         "seeds": sorted(int(seed) for seed in rate["seed"].unique()),
@@ -73,8 +72,8 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         "recall_by_severity": _recall_by_severity(tables["recall"]),
         "controls": _controls(tables),
         "contrasts": _contrasts(tables["alarms"]),
-        "bars": bars.bars(tables["alarms"], tables["recall"], realism_findings.floor_ratios(realism), environments),
-        "not_inferior": bars.not_inferior(tables["alarms"]),
+        "bars": targets.bars(tables["alarms"], tables["recall"], realism_findings.floor_ratios(realism), environments),
+        "not_inferior": targets.not_inferior(tables["alarms"]),
         "measures": realism_findings.measures(by_replicate(rate, "rate"), realism),
         "beside_floors": realism_findings.beside_floors(realism, "residual + convolutional GAN", environments),
         "parameters": realism_findings.parameters(tables["parameters"], environments),
@@ -208,9 +207,9 @@ def _controls(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
 def _contrasts(alarms: "pd.DataFrame") -> dict[str, list[dict[str, Any]]]:
     counts = trained(alarms).rename(columns={"windows": "trials"})
     families = {
-        "paper": (CONTRASTS, tuple(bars.BARS)),
-        "second": (SECOND_CONTRASTS, tuple(bars.BARS)),
-        **{f"second, {name}": (SECOND_CONTRASTS[:1], environments) for name, environments in bars.KINDS_OF_NOISE.items()},
+        "paper": (CONTRASTS, tuple(targets.BARS)),
+        "second": (SECOND_CONTRASTS, tuple(targets.BARS)),
+        **{f"second, {name}": (SECOND_CONTRASTS[:1], environments) for name, environments in targets.KINDS_OF_NOISE.items()},
     }
     found = {}
     for name, (pairs, environments) in families.items():

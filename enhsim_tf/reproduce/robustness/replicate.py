@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.detection import evaluation as robustness
+from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
-from enhsim_tf.realism import real_floor as realism
+from enhsim_tf.realism import real_floor
 from enhsim_tf.reproduce.noise_processes import NOISES
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import Settings
@@ -144,12 +144,12 @@ class Replicate:
         for number, arm in enumerate(ARMS):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
             on_detector = told.within(number, len(detectors))
-            judged = robustness.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
+            judged = evaluation.evaluate_arm(training[arm], held_out[arm], trial, detectors, seed, on_detector=on_detector)
             for name, found in judged.items():
                 rows[name] += [{"arm": arm, **row} for row in found]
-            rates = robustness.false_alarm_rates(judged["alarms"]).values()
+            rates = evaluation.false_alarm_rates(judged["alarms"]).values()
             self.stages.tell(f"  {arm:28} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
-        oracle = robustness.detection.vus_pr(trial.labels, trial.labels.astype(float), trial.max_buffer)
+        oracle = evaluation.metrics.vus_pr(trial.labels, trial.labels.astype(float), trial.max_buffer)
         rows["traces"].append({"arm": "real", "detector": "oracle", "vus_pr": oracle})
         self._save(folder, rows)
 
@@ -163,10 +163,10 @@ class Replicate:
         for number, (arm, scale, share, both) in enumerate(VARIATIONS):
             draws = self.experiment.data.draw(f"mixed windows, {_DRAW_NAMES.get(arm, arm)}, {scale}, {share}")
             training, held_out = (
-                robustness.mix_real_and_simulated(_scaled(arms, arm, scale), arms["real"], part, draws)
+                evaluation.mix_real_and_simulated(_scaled(arms, arm, scale), arms["real"], part, draws)
                 for arms, part in ((learnt, share), (limiting, share if both else 0.0))
             )
-            judged = robustness.evaluate_arm(training, held_out, trial, quick, seed, on_detector=told.within(number, len(quick)))
+            judged = evaluation.evaluate_arm(training, held_out, trial, quick, seed, on_detector=told.within(number, len(quick)))
             recall, alarms = ({name: [] for name in quick} for _ in range(2))
             for row in judged["recall"]:
                 recall[row["detector"]].append(row["recall"])
@@ -207,7 +207,7 @@ class Replicate:
             table = pd.DataFrame(rows).assign(environment=self.settings.telemetry.noise, seed=self.settings.seed)
             table.to_parquet(folder / f"{name}.parquet")
 
-    def trial(self, num_anomalous: int | None = None) -> robustness.Trial:
+    def trial(self, num_anomalous: int | None = None) -> evaluation.Trial:
         """The test data: held-out nominal windows, the same windows with anomalies, and a continuous trace.
 
         Args:
@@ -216,7 +216,7 @@ class Replicate:
         chosen, data = self.settings.robustness, self.experiment.data
         channel = data.channels[0]
         nominal, reference = (data.windows(part, None)["target"] for part in ("test", "calibration"))
-        return robustness.make_trial(
+        return evaluation.make_trial(
             nominal,
             reference,
             channel.test.values[: chosen.num_trace_samples],
@@ -227,11 +227,11 @@ class Replicate:
             max_buffer=round(min(channel.periods_s) / channel.telemetry.interval_s),
         )
 
-    def floor(self) -> tuple[realism.RealFloor, np.ndarray]:
+    def floor(self) -> tuple[real_floor.RealFloor, np.ndarray]:
         """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample."""
         real, again, held_out = (self.true_noise(part) for part in ("test", "train", "calibration"))
         number = min(self.settings.robustness.num_windows, len(real), len(again), len(held_out))
-        floor = realism.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
+        floor = real_floor.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
         return floor, held_out[:number]
 
     def true_noise(self, part: str, num_windows: int | None = None, purpose: str = "") -> np.ndarray:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.detection import evaluation as robustness
-from enhsim_tf.detection import metrics as detection
+from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_windows_from_parts, evenly_spaced_starts, ridge, window_errors
 from enhsim_tf.noise.extraction import noise_unit
@@ -121,7 +120,7 @@ class ChannelStudy:
 
     @staticmethod
     def _said(rows: Mapping[str, list[dict]], arm: str) -> str:
-        found = robustness.false_alarm_rates([row for row in rows["alarms"] if row["arm"] == arm])
+        found = evaluation.false_alarm_rates([row for row in rows["alarms"] if row["arm"] == arm])
         return ", ".join(f"{rate:.0%}" for rate in found.values())
 
     # -- training windows of the detectors -------------------------------------------------------------------------------------
@@ -214,7 +213,7 @@ class ChannelStudy:
             rows["sequences"].append(
                 about | {"sequence": number, "class": kind, "length": stop - start, "found": bool(len(first)), "delay": delay}
             )
-        rows["ranking"].append(self._ranking(arm, name, labels, robustness.mean_over_windows(scores, begins, window, len(labels))))
+        rows["ranking"].append(self._ranking(arm, name, labels, evaluation.mean_over_windows(scores, begins, window, len(labels))))
 
     def _ranking(self, arm: str, name: str, labels: np.ndarray, scores: np.ndarray) -> dict[str, Any]:
         from sklearn.metrics import average_precision_score
@@ -223,7 +222,7 @@ class ChannelStudy:
         return {
             "arm": arm,
             "detector": name,
-            "vus_pr": detection.vus_pr(labels, scores, buffer),
+            "vus_pr": metrics.vus_pr(labels, scores, buffer),
             "auc_pr": float(average_precision_score(labels, scores)),
         }
 

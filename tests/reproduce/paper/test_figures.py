@@ -13,7 +13,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from enhsim_tf.common import plot_style as sheet
+from enhsim_tf.common import plot_style
 from enhsim_tf.reproduce.figure import WATERMARK, save
 from enhsim_tf.reproduce.paper import figure_data
 from enhsim_tf.reproduce.paper.data import Source
@@ -211,7 +211,7 @@ def test_labels_have_the_colour_of_their_curves():
     axes = draw("fig04_enhanced_simulation").axes[0]
     colors = {text.get_text(): text.get_color() for text in axes.texts}
     for line, label in zip(axes.lines, ("coarse", "enhanced", "true signal"), strict=True):
-        assert colors[label] == sheet.IN_PRINT.get(line.get_color(), line.get_color())
+        assert colors[label] == plot_style.IN_PRINT.get(line.get_color(), line.get_color())
 
 
 def test_panels_stand_in_the_order_of_the_rows():
@@ -311,9 +311,14 @@ def contrast(one, other):
 
 
 def test_words_have_contrast_and_curves_of_one_panel_survive_grey():
-    for ink in (sheet.REAL, sheet.QUIET, sheet.ENHANCED, *sheet.IN_PRINT.values()):
-        assert contrast(ink, "#ffffff") > 4.5 and contrast(ink, sheet.GREY_TINT) > 4.5
-    pairs = [(sheet.COARSE, sheet.ENHANCED), (sheet.ENHANCED, sheet.REAL), (sheet.REAL, sheet.GENERATED), (sheet.REAL, sheet.AVERAGE)]
+    for ink in (plot_style.REAL, plot_style.QUIET, plot_style.ENHANCED, *plot_style.IN_PRINT.values()):
+        assert contrast(ink, "#ffffff") > 4.5 and contrast(ink, plot_style.GREY_TINT) > 4.5
+    pairs = [
+        (plot_style.COARSE, plot_style.ENHANCED),
+        (plot_style.ENHANCED, plot_style.REAL),
+        (plot_style.REAL, plot_style.GENERATED),
+        (plot_style.REAL, plot_style.AVERAGE),
+    ]
     assert min(contrast(*pair) for pair in pairs) > 1.5
 
 

@@ -18,11 +18,8 @@ from enhsim_tf.realism.real_floor import MEASURES
 from enhsim_tf.reproduce import figure
 from enhsim_tf.reproduce.caption import caption_of_findings
 from enhsim_tf.reproduce.noise_processes import NOISES
-from enhsim_tf.reproduce.publish import report as robustness_report
-from enhsim_tf.reproduce.publish import wording as report_words
-from enhsim_tf.reproduce.robustness import figures as robustness_figures
-from enhsim_tf.reproduce.robustness import findings
-from enhsim_tf.reproduce.robustness import targets as bars
+from enhsim_tf.reproduce.publish import report, wording
+from enhsim_tf.reproduce.robustness import figures, findings, targets
 from enhsim_tf.reproduce.robustness.degraded_modes import METHODS, SCORED
 from enhsim_tf.reproduce.robustness.negative_controls import NEGATIVE_CONTROLS
 from enhsim_tf.reproduce.robustness.replicate import ARMS, ENVIRONMENTS, MIXED, QUICK_DETECTORS, VARIATIONS
@@ -168,8 +165,8 @@ def test_targets_on_recall_and_the_autoregression(found):
     same = tables()
     chosen = same["alarms"]["arm"] == "residual + AR"
     same["alarms"].loc[chosen, "alarms"] = ALARMS["residual + convolutional GAN"]
-    bars = findings.summarise(same)["bars"]
-    assert bars["white"]["autoregression_reached"] and not bars["shot"]["autoregression_reached"]  # equal is not better
+    targets = findings.summarise(same)["bars"]
+    assert targets["white"]["autoregression_reached"] and not targets["shot"]["autoregression_reached"]  # equal is not better
     same["alarms"].loc[chosen & (same["alarms"]["block"] == 0), "alarms"] = ALARMS["residual + convolutional GAN"] - 2  # a point on average
     assert not findings.summarise(same)["bars"]["white"]["autoregression_reached"]
     for change, is_reached in ((-0.03, False), (0.03, False), (0.01, True)):  # within two points, on either side
@@ -210,7 +207,7 @@ def test_parameters_are_compared_with_those_of_real_noise(found):
 def test_controls_of_the_measures_are_shown(found):
     assert found["negative_controls"]["num_windows"] == 1_000
     assert set(found["negative_controls"]["ratios"]) == {"real", *NEGATIVE_CONTROLS}
-    assert "| twenty windows memorised | 1.2 |" in robustness_report.render({**found, "budget": "full"})
+    assert "| twenty windows memorised | 1.2 |" in report.render({**found, "budget": "full"})
 
 
 def test_a_measure_that_follows_the_alarms_predicts_them(found):
@@ -247,9 +244,9 @@ def test_tries_show_the_count_and_the_largest_departure(found):
         "recall": "",
         **ratios,
     }
-    text = robustness_report.render({**found, "budget": "full"}, tries=[row])
+    text = report.render({**found, "budget": "full"}, tries=[row])
     assert "| white | 110 | as it is | 1000 | 13 of 15 | tail ratio | 7.0 | 1.2 % |  |" in text
-    assert "Changes that were tried where" not in robustness_report.render({**found, "budget": "full"})
+    assert "Changes that were tried where" not in report.render({**found, "budget": "full"})
 
 
 def test_summary_of_tries():
@@ -266,17 +263,17 @@ def test_summary_of_tries():
     ]
     head = "Number of measures, of 15, within twice their baseline: on white noise 6.5 for the unchanged design, "
     said = head + "9 for the best change (longer); on shot noise 5 for the unchanged design. "
-    assert report_words.tries_found(rows) == said + "None of the 5 trainings has all measures within."
-    assert report_words.tries_found([*rows, {**rows[3], "within": 15}]).endswith(
+    assert wording.tries_found(rows) == said + "None of the 5 trainings has all measures within."
+    assert wording.tries_found([*rows, {**rows[3], "within": 15}]).endswith(
         "11.5 for the best change (louder); on shot noise 5 for the unchanged design. 1 of the 6 trainings has all measures within."
     )
-    assert report_words.tries_found([]) == report_words.tries_found(rows[:1]) == ""
+    assert wording.tries_found([]) == wording.tries_found(rows[:1]) == ""
 
 
 @pytest.mark.parametrize("value, text", [(-0.0004, "0.0 %"), (0.0004, "0.0 %"), (-0.0006, "-0.1 %"), (0.123, "12.3 %"), (1.0, "100.0 %")])
 def test_numbers_that_round_to_zero_have_no_sign(value, text):
-    assert report_words.per_cent(value) == text
-    assert report_words.interval({"mean": value, "low": value, "high": value}).startswith(text + " (")
+    assert wording.per_cent(value) == text
+    assert wording.interval({"mean": value, "low": value, "high": value}).startswith(text + " (")
 
 
 def test_variations_are_means_of_their_own_table(found):
@@ -293,16 +290,16 @@ def test_errors_in_degraded_modes(found):
 
 
 def test_c8_by_its_criterion(found):
-    assert report_words.verdict_c8(found) == "does not hold" and report_words.share_c8(found) == (0, 28)
+    assert wording.verdict_c8(found) == "does not hold" and wording.share_c8(found) == (0, 28)
     quiet = tables()
     quiet["alarms"].loc[quiet["alarms"]["arm"] == "enhanced + GAN", "alarms"] = 4  # below twice two, plus one
-    assert report_words.verdict_c8(findings.summarise(quiet)) == "holds"
-    assert report_words.share_c8(findings.summarise(quiet), "residual + convolutional GAN") == (28, 28)
+    assert wording.verdict_c8(findings.summarise(quiet)) == "holds"
+    assert wording.share_c8(findings.summarise(quiet), "residual + convolutional GAN") == (28, 28)
     recall = quiet["recall"]
     blind = (recall["arm"] == "enhanced + GAN") & (recall["environment"] == "shot") & (recall["detector"] == next(iter(DETECTORS)))
     recall.loc[blind, "recall"] -= 0.06  # quiet, since it finds less: more than five points below the real-trained arm
-    assert report_words.share_c8(findings.summarise(quiet)) == (27, 28)
-    assert report_words.verdict_c8(findings.summarise(quiet)) == "does not hold"  # the rule asks it of every detector
+    assert wording.share_c8(findings.summarise(quiet)) == (27, 28)
+    assert wording.verdict_c8(findings.summarise(quiet)) == "does not hold"  # the rule asks it of every detector
 
 
 def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
@@ -313,7 +310,7 @@ def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
     once = (alarms["arm"] == "residual + convolutional GAN") & (alarms["detector"] == first) & (alarms["environment"] == "white")
     alarms.loc[once & (alarms["seed"] == SEEDS[0]), "alarms"] = 6  # 6 % in one seed, 4 % on average: at most 5 %
     some = findings.summarise(loud)
-    assert report_words.kept_c8(some) == f"{first} on shot and white noise"
+    assert wording.kept_c8(some) == f"{first} on shot and white noise"
     assert len(some["arms"]["residual + convolutional GAN"]["c8"]["kept"]) == 28
     assert (
         some["arms"]["residual + convolutional GAN"]["c8"]["replicates"],
@@ -323,11 +320,11 @@ def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
 
 
 def test_sentences_agree_with_the_comparisons(found):
-    assert report_words.opposite_signs(found) == ""
+    assert wording.opposite_signs(found) == ""
     mixed = tables()
     alarms = mixed["alarms"]
     alarms.loc[(alarms["arm"] == "enhanced + GAN") & (alarms["environment"] == "shot"), "alarms"] = 40
-    said = report_words.opposite_signs(findings.summarise(mixed))
+    said = wording.opposite_signs(findings.summarise(mixed))
     assert said == "; ".join(
         f"*enhanced + GAN* has more false alarms than *{arm}* on white, autoregressive and heteroscedastic noise, and fewer on shot noise"
         for arm in ("enhanced + AR", "enhanced + bootstrap")
@@ -335,12 +332,12 @@ def test_sentences_agree_with_the_comparisons(found):
     nearly = tables()
     alarms = nearly["alarms"]
     alarms.loc[(alarms["arm"] == "enhanced + GAN") & (alarms["environment"] == "shot"), "alarms"] = 49  # of 50: no sign
-    assert report_words.opposite_signs(findings.summarise(nearly)) == ""
-    assert "in 0 the coarse signal has" in report_words.modes_found(found)
+    assert wording.opposite_signs(findings.summarise(nearly)) == ""
+    assert "in 0 the coarse signal has" in wording.modes_found(found)
     near = tables()
     degraded = near["degraded"]
     degraded.loc[(degraded["method"] == "identity") & (degraded["severity"] == 1.0), "nrmse"] = 0.7
-    words = report_words.modes_found(findings.summarise(near))
+    words = wording.modes_found(findings.summarise(near))
     assert (
         f"In 0 of {2 * len(MODES)} pairs" in words
         and f"in {len(MODES)} the coarse signal has" in words
@@ -349,13 +346,13 @@ def test_sentences_agree_with_the_comparisons(found):
 
 
 def test_first_trial_by_environment(found):
-    assert report_words.first_trial(found).startswith("**Refuted** on white (0 of 3 replicates; 60.0 %), autoregressive (0 of 3")
+    assert wording.first_trial(found).startswith("**Refuted** on white (0 of 3 replicates; 60.0 %), autoregressive (0 of 3")
     most = tables()
     alarms = most["alarms"]
     chosen = (alarms["arm"] == "enhanced + GAN") & (alarms["detector"] == "PCA residual")
     alarms.loc[chosen & (alarms["environment"] == "white"), "alarms"] = 99
     alarms.loc[chosen & (alarms["environment"] == "shot") & (alarms["seed"] == SEEDS[0]), "alarms"] = 100
-    assert report_words.first_trial(findings.summarise(most)) == (
+    assert wording.first_trial(findings.summarise(most)) == (
         "**Confirmed** on white (3 of 3 replicates; 99.0 %); **In part** on shot (1 of 3 replicates; 60.0 % to 100.0 %); "
         "**Refuted** on autoregressive (0 of 3 replicates; 60.0 %), heteroscedastic (0 of 3 replicates; 60.0 %). "
         "Everything: at least 99 % of the windows."
@@ -364,14 +361,14 @@ def test_first_trial_by_environment(found):
 
 def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):
     from enhsim_tf.reproduce.publish import page
-    from enhsim_tf.reproduce.robustness import run as robustness_run
+    from enhsim_tf.reproduce.robustness import run
 
     whole = {**found, "budget": "full"}
     assert page._experiment(tmp_path) is None
-    folder = tmp_path / robustness_run.FOLDER
+    folder = tmp_path / run.FOLDER
     folder.mkdir()
     (folder / "findings.json").write_text(json.dumps(whole), encoding="utf-8")
-    assert len(figure.save_all(robustness_figures.FIGURES, whole, folder, findings.KEPT.command)) == 2 * len(robustness_figures.FIGURES)
+    assert len(figure.save_all(figures.FIGURES, whole, folder, findings.KEPT.command)) == 2 * len(figures.FIGURES)
     shown = page._experiment(tmp_path)
     assert shown["share"] == (0, 28) and [picture.name for picture in shown["pictures"]] == ["false_alarms", "recall", "degraded_modes"]
     kept = json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))
@@ -383,9 +380,9 @@ def test_the_page_shows_the_experiment_where_it_was_run(found, tmp_path):
 @pytest.mark.parametrize(("seeds", "words", "ran"), [([7], "one seed", "seed 7"), ([7, 8, 9], "3 seeds", "seeds 7 to 9")])
 def test_one_seed_is_written_in_singular(found, seeds, words, ran):
     some = {**found, "seeds": seeds, "modes": {**found["modes"], "seeds": seeds}, "budget": "full"}
-    text = " ".join(robustness_report.render(some).split())
+    text = " ".join(report.render(some).split())
     assert f"severities and {words};" in text and f"replicates: {words} ({seeds[0]} to {seeds[-1]}) in" in text
-    assert f"interval over {words} (" in robustness_report.table(some)
+    assert f"interval over {words} (" in report.table(some)
     assert caption_of_findings(some, "python -m this") == f"{ran} · full budget · python -m this"
 
 
@@ -409,13 +406,13 @@ def test_report_matches_the_tables(near):
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
     again = findings.summarise(findings.KEPT.read(KEPT))
     assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
-    assert robustness_report.render(
+    assert report.render(
         kept,
-        robustness_report.findings_of(ROOT, "labelled"),
-        *(robustness_report.designs_of(ROOT / path) for path in robustness_report.TABLES),
-        robustness_report.timing_of(ROOT),
-    ) == (ROOT / robustness_report.PATH).read_text(encoding="utf-8")
-    assert robustness_report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
+        report.findings_of(ROOT, "labelled"),
+        *(report.designs_of(ROOT / path) for path in report.TABLES),
+        report.timing_of(ROOT),
+    ) == (ROOT / report.PATH).read_text(encoding="utf-8")
+    assert report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
     assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000
     assert min(kept["seeds"]) == make_settings().robustness.first_seed
 
@@ -423,12 +420,12 @@ def test_report_matches_the_tables(near):
 def test_tries_cover_every_environment_that_misses_a_target():
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
-    rows = robustness_report.designs_of(ROOT / robustness_report.TABLES[1])
+    rows = report.designs_of(ROOT / report.TABLES[1])
     tried = {name: {row["noise"] for row in rows if row["environment"] == name} for name in ENVIRONMENTS}
     for name, bar in json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))["bars"].items():
-        is_real_enough = bar["measures_within"] == bar["num_measures"] or name in bars.KINDS_OF_NOISE["not Gaussian"]
+        is_real_enough = bar["measures_within"] == bar["num_measures"] or name in targets.KINDS_OF_NOISE["not Gaussian"]
         if not (bar["excess_reached"] and bar["recall_reached"] and bar["autoregression_reached"] and is_real_enough):
-            assert tried[name] == {report_words.REAL_NOISE, *designs.DESIGNS}, name
+            assert tried[name] == {wording.REAL_NOISE, *designs.DESIGNS}, name
 
 
 def test_readme_statements_agree_with_the_findings():
@@ -438,7 +435,7 @@ def test_readme_statements_agree_with_the_findings():
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     counts = [in_words(len(each)) for each in (DETECTORS, ARMS, kept["environments"])]
     assert "{} detectors are trained on {} kinds of windows".format(*counts) in readme and f"with {counts[2]} kinds of noise" in readme
-    words = report_words.words(kept, make_settings(kept["budget"]))
+    words = wording.words(kept, make_settings(kept["budget"]))
     assert words["is_ar_as_good"] == ("Where noise is Gaussian, a fitted autoregression does as well." in readme)
 
 
@@ -466,7 +463,7 @@ def test_controls_have_the_values_that_others_measured():
 
 
 def test_no_design_was_chosen_on_a_reporting_seed():
-    chosen, trained = make_settings().robustness, report_words.DEVELOPMENT_SEEDS
+    chosen, trained = make_settings().robustness, wording.DEVELOPMENT_SEEDS
     assert not set(trained) & set(range(chosen.first_seed, chosen.first_seed + chosen.num_seeds))
-    for path, column in zip(robustness_report.TABLES, ("development_seed", "seed"), strict=True):
-        assert all(int(row[column]) in trained for row in robustness_report.designs_of(ROOT / path))
+    for path, column in zip(report.TABLES, ("development_seed", "seed"), strict=True):
+        assert all(int(row[column]) in trained for row in report.designs_of(ROOT / path))
