@@ -26,13 +26,13 @@ _PLACES = {
     "clean": "telemetry.cleaning.clean",
     "extract_noise": "noise.extraction",
     "fit_channel": "enhanced_simulator.fitting",
-    "from_series": "telemetry.sources",
+    "from_series": "telemetry.pandas_series",
     "load_labelled": "telemetry.telemanom",
     "read_source": "telemetry.sources",
-    "read_telemetry": "telemetry.single_file",
+    "read_telemetry": "telemetry.sources",
     "score_channel": "enhanced_simulator.scoring",
     "series_labelled": "datasets.labelled_windows",
-    "to_series": "telemetry.sources",
+    "to_series": "telemetry.pandas_series",
 }
 __all__ = list(_PLACES)
 

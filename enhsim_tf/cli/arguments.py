@@ -7,6 +7,7 @@ from enhsim_tf.common.console import Parser
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.registry import option_name
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
+from enhsim_tf.telemetry.registry import SOURCES
 
 EXAMPLES = """\
 from telemetry to scores:
@@ -17,7 +18,6 @@ from telemetry to scores:
 python -m enhsim_tf fit --help shows the options of fit; generate, verify and score have help texts too. The reproduction of the
 paper is a separate command: python -m enhsim_tf.reproduce.
 """
-SOURCE = "a .csv, .parquet or .npy file, the folder of a store, folder#channel, or influxdb://bucket/measurement/field?tag=value"
 DETECTORS = tuple(map(option_name, registry.DETECTORS))
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 
@@ -142,7 +142,7 @@ def _add_seed(parser: argparse.ArgumentParser, default: int | None = 0) -> None:
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("source", metavar="SOURCE", help=SOURCE)
+    parser.add_argument("source", metavar="SOURCE", help=SOURCES)
     parser.add_argument(
         "--column", action="append", metavar="NAME", help="only this column; may be repeated (default: all numeric columns)"
     )

@@ -16,8 +16,8 @@ from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.sources import to_series
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -232,7 +232,7 @@ def check(options: argparse.Namespace) -> None:
     if options.telemetry is not None:
         from enhsim_tf.reproduce.paper.data import least_part
         from enhsim_tf.reproduce.settings import Settings
-        from enhsim_tf.telemetry.single_file import read_telemetry
+        from enhsim_tf.telemetry.sources import read_telemetry
 
         read_telemetry(options.telemetry, options.column, options.time, 2 * least_part(Settings()))
 

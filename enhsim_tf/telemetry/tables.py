@@ -13,8 +13,10 @@ import pyarrow as pa
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import MAX_COLUMNS, READ_ERRORS, check_parquet, short_reason
+from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.cleaning.numbers import is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import Finding
+from enhsim_tf.telemetry.cleaning.times import parse_times
 
 NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIME_NAMES = ("time", "times", "timestamp", "datetime", "date", "date_time", "utc", "_time", "t", "epoch", "time_s", "time_ms")
@@ -163,3 +165,39 @@ def numeric_columns(table: pd.DataFrame) -> tuple[list[str], list[str]]:
             is_number = pd.api.types.is_numeric_dtype(values.dtype) and not pd.api.types.is_bool_dtype(values.dtype)
         (numeric if is_number else others).append(name)
     return numeric, others
+
+
+def read_table_channels(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
+    """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
+    table, findings = read_table(path)
+    repeated = set(table.columns[table.columns.duplicated()])
+    for name in [*(columns or ()), *([time] if time not in (None, NO_TIME) else [])]:
+        if name in repeated:
+            raise InputError(f"Expected columns of different names. Received: {name!r} more than once in {path.name}. Rename them.")
+        if name not in table.columns:
+            known = ", ".join(table.columns[:8])
+            raise InputError(f"Expected a column of {path.name}: {known}. Received: {name!r}. Name one of these.")
+    if columns is None and repeated:
+        raise InputError(f"Expected columns of different names. Received: {min(repeated)!r} more than once in {path.name}. Rename them.")
+    found = time_column(table, path.name) if time is None else time
+    if time is None and found is not None:
+        findings.append(Finding("time column", 1, f"the time column is {found!r}"))
+    index = pd.RangeIndex(len(table))
+    if found not in (None, NO_TIME):
+        what = f"the times {found!r} of {path.name}"
+        stamps, bad, noted = parse_times(table[found], what, options.on_bad_times == "drop", options.time_unit, options.time_format)
+        if bad.any():
+            rows = tuple(f"row {row}" for row in np.flatnonzero(bad)[:3])
+            noted = [*noted, Finding("bad times", int(bad.sum()), f"times that cannot be read, taken as missing: {int(bad.sum()):,}", rows)]
+        index, findings = stamps.rename(str(found)), [*findings, *noted]
+    if columns is None:
+        columns, others = numeric_columns(table.drop(columns=[found] if found in table.columns else []))
+        if others:
+            findings.append(Finding("columns left out", len(others), f"columns without numbers: {', '.join(others[:8])}"))
+        if not columns:
+            raise InputError(f"Expected a column of numbers. Received: none in {path.name} beside the times. Give another table.")
+    channels = {}
+    for column in columns:
+        channels[column] = pd.Series(table[column].array, index=index, name=column, copy=False)
+        channels[column].attrs["findings"] = [finding.to_dict() for finding in findings]
+    return channels

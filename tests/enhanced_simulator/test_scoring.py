@@ -11,8 +11,8 @@ from enhsim_tf.enhanced_simulator import scoring
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.sources import to_series
 
 WINDOW = 60
 COARSE = SquareWaveSimulator([SquareWave(48, low=-0.5, high=0.5)])

@@ -13,8 +13,7 @@ from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.single_file import read_telemetry
-from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
 from enhsim_tf.telemetry.telemanom import load_labelled
 from tests.fuzzing.target import Target, UnusedError, all_of, json_of, text_of
 

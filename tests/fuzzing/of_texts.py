@@ -20,8 +20,7 @@ from enhsim_tf.telemetry import influx_client
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.single_file import read_telemetry
-from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
 from tests.fuzzing.target import Target, all_of, json_of, text_of
 
 _SCENARIOS = """\

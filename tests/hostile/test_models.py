@@ -19,8 +19,7 @@ from enhsim_tf.datasets.scenario_file import Mix
 from enhsim_tf.enhanced_simulator.safe_loading import check_network, read_description
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.telemetry.single_file import read_telemetry
-from enhsim_tf.telemetry.sources import read_source
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
 from tests.fuzzing.of_folders import archive_of, member_of, saved_model, write_model
 
 

@@ -20,8 +20,9 @@ from enhsim_tf.telemetry import influx_client
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.influx_client import VARIABLES, quote
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.sources import read_source, to_series
+from enhsim_tf.telemetry.sources import read_source
 from tests.telemetry import influxd
 from tests.telemetry.round_trips import BEYOND, ROUND_TRIPS, same, series
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, check_values
-from enhsim_tf.telemetry.single_file import read_telemetry
+from enhsim_tf.telemetry.sources import read_telemetry
 from enhsim_tf.telemetry.windows import cut_windows, disjoint_offsets, even_offsets, random_offsets, split_by_time
 
 RAMP = np.arange(12.0)
@@ -34,34 +34,31 @@ def with_one(bad, values=RAMP):
     return values
 
 
-BAD_VALUES = {
-    "empty": (np.array([]), "none"),
-    "text": (np.array(["a", "b", "c"]), "numbers"),
-    "complex": (np.array([1j, 2j, 3j]), "numbers"),
-    "constant": (np.full(12, 3.5), "constant 3.5"),
-    "constant once it is float32": (1e9 + RAMP, "constant"),
-    "NaN": (with_one(np.nan), "(NaN) at sample 4"),
-    "infinite": (with_one(np.inf), "(infinite) at sample 4"),
-    "minus infinite": (with_one(-np.inf), "(infinite) at sample 4"),
-    "beyond float32": (with_one(-1e300), "(-1e+300) at sample 4"),
-    "beyond float32, and a gap": (np.where(RAMP == 2, 1e300, with_one(np.nan)), "1 NaN or infinite"),
-    "true and false": (RAMP % 3 == 0, "dtype bool"),
-    "too short": (RAMP[:9], "at least 10 samples"),
+BAD_VALUES = {  # name: values, words of the message about the values alone, words of the message about a file with them
+    "empty": (np.array([]), "none", "none"),
+    "text": (np.array(["a", "b", "c"]), "numbers", "numbers"),
+    "complex": (np.array([1j, 2j, 3j]), "numbers", "complex"),
+    "constant": (np.full(12, 3.5), "constant 3.5", "constant 3.5"),
+    "constant once it is float32": (1e9 + RAMP, "constant", "constant"),
+    "NaN": (with_one(np.nan), "(NaN) at sample 4", "1 (first: row 4)"),
+    "infinite": (with_one(np.inf), "(infinite) at sample 4", "1 (first: row 4)"),
+    "minus infinite": (with_one(-np.inf), "(infinite) at sample 4", "1 (first: row 4)"),
+    "beyond float32": (with_one(-1e300), "(-1e+300) at sample 4", "-1e+300 at row 4"),
+    "beyond float32, and a gap": (np.where(RAMP == 2, 1e300, with_one(np.nan)), "1 NaN or infinite", "1e+300 at row 2"),
+    "true and false": (RAMP % 3 == 0, "dtype bool", "numbers"),
+    "too short": (RAMP[:9], "at least 10 samples", "at least 10 samples"),
 }
 
 
 @pytest.mark.parametrize("name", BAD_VALUES)
 def test_bad_values_are_refused(tmp_path, refused, name):
-    values, words = BAD_VALUES[name]
+    values, words, words_of_file = BAD_VALUES[name]
     with refused(words, "here"):
         check_values(values, "here", min_samples=10)
-    with refused(words, "series.npy"):
-        read_telemetry(write(tmp_path / "series.npy", values), min_samples=10)
-    if values.dtype.kind != "c":
-        with refused(words if name not in ("empty", "text") else ""):  # an empty table column has no dtype
-            read_telemetry(write(tmp_path / "series.csv", pd.DataFrame({"value": values})), min_samples=10)
-        with refused(words if name not in ("empty", "text") else ""):
-            read_telemetry(write(tmp_path / "series.parquet", pd.DataFrame({"value": values})), min_samples=10)
+    for suffix in (".npy", ".csv", ".parquet") if values.dtype.kind != "c" else (".npy",):
+        content = values if suffix == ".npy" else pd.DataFrame({"value": values})
+        with refused(words_of_file, f"series{suffix}"):
+            read_telemetry(write(tmp_path / f"series{suffix}", content), min_samples=10)
 
 
 @pytest.mark.parametrize("shape", [(), (3, 4), (2, 3, 2)])
@@ -117,13 +114,18 @@ def test_bad_files_are_refused(tmp_path, refused, name):
 
 
 BAD_TIMES = {
-    "a word": (["2020-03-01T00:00:00", "2020-03-01T00:00:01", "soon", "2020-03-01T00:00:03"], "'soon' at sample 2 "),
-    "a word after a gap": (["2020-03-01T00:00:00", None, "2020-03-01T00:00:02", "late"], "'late' at sample 3 "),
-    "too far away": ([0.0, 1.0, 2.0, 1e15], "'1000000000000000.0' at sample 3 "),
-    "a gap": ([0.0, 1.0, np.nan, 3.0], "none at sample 2 "),
-    "one sample late": ([0.0, 1.0, 2.0, 3.5], "from 1 s to 1.5 s in a.csv, the first bad one before sample 3."),
-    "twice": ([0.0, 1.0, 1.0, 2.0], "from 0 s to 1 s in a.csv, the first bad one before sample 2."),
-    "falling": ([3.0, 2.0, 1.0, 0.0], "from -1 s to -1 s in a.csv, the first bad one before sample 1."),
+    "a word": (["2020-03-01T00:00:00", "2020-03-01T00:00:01", "soon", "2020-03-01T00:00:03"], "'soon' at row 2 "),
+    "a word after a gap": (["2020-03-01T00:00:00", None, "2020-03-01T00:00:02", "late"], "'late' at row 3 "),
+    "too far away": ([0.0, 1.0, 2.0, 1e15], "1000000000000000.0 at row 3 "),
+    "a gap": ([0.0, 1.0, np.nan, 3.0], "without a time: 1 (first: row 2)"),
+    "one sample late": (
+        [0.0, 1.0, 2.0, 3.5],
+        "the longest 1.5 s, at which the series is split: 1 (first: row 2, 1970-01-01T00:00:02+00:00)",
+    ),
+    "twice": ([0.0, 1.0, 1.0, 2.0], "the first at row 2, 1970-01-01T00:00:01+00:00"),
+    "falling": ([3.0, 2.0, 1.0, 0.0], "descending order of time, reversed: 4"),
+    "out of order": ([0.0, 2.0, 1.0, 3.0], "out of chronological order, sorted: 1 (first: row 2"),
+    "off the grid": ([0.0, 1.0, 2.2, 3.0], "off the regular grid, by up to 0.1"),
 }
 
 
@@ -132,6 +134,13 @@ def test_the_time_that_cannot_be_used_is_named(tmp_path, refused, name):
     times, words = BAD_TIMES[name]
     with refused(words):
         read_telemetry(write(tmp_path / "a.csv", pd.DataFrame({"v": RAMP[:4], "t": times})), time="t")
+
+
+@pytest.mark.parametrize("interval_s", [1 / 3, 1 / 30, 0.7])
+def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
+    times = (np.arange(400) * interval_s).round(3 if interval_s > 0.1 else 4)
+    read = read_telemetry(write(tmp_path / "a.csv", pd.DataFrame({"v": np.arange(400) % 7, "t": times})), "v", "t")
+    assert np.abs(read.time_s - times).max() < 0.05 * interval_s and read.values.tolist() == (np.arange(400) % 7).tolist()
 
 
 def test_a_repeated_column_name_is_refused_if_it_is_needed(tmp_path, refused):

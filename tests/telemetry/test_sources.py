@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.pandas_series import from_series, to_series
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.sources import from_series, read_source, to_series
+from enhsim_tf.telemetry.sources import read_source
 
 N = 50
 TIMES = pd.date_range("2020-03-01T06:00:00Z", periods=N, freq="250ms")

@@ -21,7 +21,7 @@ from enhsim_tf.reproduce.paper.signals import sines
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry, check_values
-from enhsim_tf.telemetry.single_file import read_telemetry
+from enhsim_tf.telemetry.sources import read_telemetry
 from enhsim_tf.telemetry.windows import cut_windows, even_offsets, random_offsets, split_by_time
 
 _MIN_DISJOINT = 20  # disjoint windows below which a part is read through overlapping ones
