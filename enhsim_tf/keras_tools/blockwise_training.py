@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from enhsim_tf.keras_tools.backend import keras, tf
-from enhsim_tf.keras_tools.fused_adam import apply_adam
+from enhsim_tf.keras_tools.fused_adam import AdamStep, adam_step, apply_adam
 
 BLOCK_BYTES = 5_200_000
 """Maximum size of a block. A few blocks of this size, with their moments, fit into a processor's cache."""
@@ -62,7 +62,7 @@ class _BlockedDense:
         return tf.nn.relu(outputs) if self.is_relu else outputs
 
     def update(
-        self, inputs: tf.Tensor, outputs: tf.Tensor, upstream: tf.Tensor, adam: keras.optimizers.Adam, is_first: bool
+        self, inputs: tf.Tensor, outputs: tf.Tensor, upstream: tf.Tensor, adam: keras.optimizers.Adam, step: AdamStep, is_first: bool
     ) -> tf.Tensor | None:
         """Updates the weights and returns the gradient of the inputs, or None for the first layer, where it is not needed."""
         if self.is_relu:
@@ -74,8 +74,8 @@ class _BlockedDense:
                 gradient = tf.matmul(part, upstream, transpose_a=True)
                 belows += [] if is_first else [tf.matmul(upstream, block.value, transpose_b=True)]
             with tf.control_dependencies(belows[-1:]):  # the gradient of the inputs needs the weights before the update
-                before = [apply_adam(adam, *block, gradient)]
-        apply_adam(adam, *self.bias, tf.reduce_sum(upstream, axis=0))
+                before = [apply_adam(adam, *block, gradient, step)]
+        apply_adam(adam, *self.bias, tf.reduce_sum(upstream, axis=0), step)
         return None if is_first else tf.concat(belows, axis=1)
 
     def write_back(self) -> None:
@@ -149,6 +149,7 @@ class _Stack:
 
     def update(self, activations: list[tf.Tensor], upstream: tf.Tensor, adam: keras.optimizers.Adam) -> None:
         """Updates all weights by one step of Adam, from the last layer to the first."""
+        step = adam_step(adam)
         for number in reversed(range(len(self.layers))):
-            upstream = self.layers[number].update(*activations[number : number + 2], upstream, adam, number == 0)
+            upstream = self.layers[number].update(*activations[number : number + 2], upstream, adam, step, number == 0)
         adam.iterations.assign_add(1)

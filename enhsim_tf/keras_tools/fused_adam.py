@@ -12,6 +12,8 @@ There is one difference. The fused operation computes 1 - beta_2 from beta_2 in 
 Adam in Keras.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from enhsim_tf.keras_tools.backend import keras, tf
@@ -35,10 +37,37 @@ def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSch
         index = adam._get_variable_index(variable)
         # the fused operation needs the handles of the TensorFlow variables, which Keras wraps
         held = (getattr(each, "_value", each) for each in (variable, adam._momentums[index], adam._velocities[index]))
-        apply_adam(adam, *held, gradient, learning_rate)
+        apply_adam(adam, *held, gradient, adam_step(adam, learning_rate))
 
     adam.update_step = update_step
     return adam
+
+
+class AdamStep(NamedTuple):
+    """Scalars of one step of Adam, which are the same for all weights."""
+
+    learning_rate: tf.Tensor
+    beta1_power: tf.Tensor
+    beta2_power: tf.Tensor
+    epsilon: float
+
+
+def adam_step(adam: keras.optimizers.Adam, learning_rate: tf.Tensor | None = None) -> AdamStep:
+    """Computes the scalars of the optimiser's next step.
+
+    Args:
+        adam: The optimiser, whose settings and iteration counter are used.
+        learning_rate: The learning rate. None uses the optimiser's learning rate at the current iteration.
+
+    Returns:
+        The scalars for `apply_adam`.
+    """
+    # corrects for the rounding of beta_2 to float32, see the docstring of this module
+    rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
+    step = tf.cast(adam.iterations + 1, tf.float32)
+    rate = adam.learning_rate if learning_rate is None else learning_rate
+    powers = tf.pow(adam.beta_1, step), tf.pow(adam.beta_2, step)
+    return AdamStep(tf.cast(rate, tf.float32) * rounding, *powers, adam.epsilon * rounding)
 
 
 def apply_adam(
@@ -47,34 +76,30 @@ def apply_adam(
     momentum: tf.Variable,
     velocity: tf.Variable,
     gradient: tf.Tensor,
-    learning_rate: tf.Tensor | None = None,
+    step: AdamStep,
 ) -> tf.Operation:
     """Updates a variable and its two moments by one fused operation. It does not advance the optimiser's iteration counter.
 
     Args:
-        adam: The optimiser, whose settings and iteration counter are used.
+        adam: The optimiser, whose settings are used.
         weight: The variable.
         momentum: First moment of the gradient.
         velocity: Second moment of the gradient.
         gradient: The gradient.
-        learning_rate: The learning rate. None uses the optimiser's learning rate at the current iteration.
+        step: The scalars of this step, from `adam_step`.
 
     Returns:
         The operation.
     """
-    # corrects for the rounding of beta_2 to float32, see the docstring of this module
-    rounding = float(np.sqrt((1 - np.float32(adam.beta_2)) / (1 - adam.beta_2)))
-    step = tf.cast(adam.iterations + 1, tf.float32)
-    rate = adam.learning_rate if learning_rate is None else learning_rate
     return tf.raw_ops.ResourceApplyAdam(
         var=weight.handle,
         m=momentum.handle,
         v=velocity.handle,
-        beta1_power=tf.pow(adam.beta_1, step),
-        beta2_power=tf.pow(adam.beta_2, step),
-        lr=tf.cast(rate, tf.float32) * rounding,
+        beta1_power=step.beta1_power,
+        beta2_power=step.beta2_power,
+        lr=step.learning_rate,
         beta1=adam.beta_1,
         beta2=adam.beta_2,
-        epsilon=adam.epsilon * rounding,
+        epsilon=step.epsilon,
         grad=gradient,
     )
