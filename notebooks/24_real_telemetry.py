@@ -46,10 +46,10 @@ for name in ("fixed", "follows"):
     simulators[name] = EnhancedSimulator.fit(first, seed=1, follow=name == "follows", **settings)
 
 # %%
-places = np.arange(0, len(second) - 194, 97)
+starts = np.arange(0, len(second) - 194, 97)
 error = {}
 for name, simulator in simulators.items():
-    pairs = simulator.pairs(second, places)
+    pairs = simulator.pairs(second, starts)
     enhanced = simulator.follow(pairs)
     error[name] = np.sqrt(np.mean((enhanced - pairs.target) ** 2, axis=1)) / pairs.target.std(axis=1)
     print(f"{name:8} median NRMSE on the second half: {np.median(error[name]):.2f}")
@@ -58,7 +58,7 @@ for name, simulator in simulators.items():
 alt = "Error of each window of the second half over time, for the simulator that is fixed and the one that follows"
 with drawing(alt, height=2.2) as panel:
     for name, color in (("fixed", GENERATED), ("follows", ENHANCED)):
-        panel.plot(3_000 + places, error[name], color=color, label=name)
+        panel.plot(3_000 + starts, error[name], color=color, label=name)
     panel.set(xlabel="first sample of the window", ylabel="NRMSE", yscale="log")
     panel.legend(frameon=False)
 

@@ -13,7 +13,7 @@ class FitOptions:
 
     Args:
         window: Length of a window in samples. None uses two periods, limited to 64 to 500 samples.
-        num_windows: Number of training windows, cut at random offsets.
+        num_windows: Number of training windows, cut at random starts.
         epochs: Passes of the enhancer over the training windows, with a learning rate that falls to zero.
         num_iterations: Adversarial iterations of the noise networks.
         noise: Noise networks: `convolutional`, or those of the `paper`.

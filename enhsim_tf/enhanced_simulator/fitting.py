@@ -14,8 +14,9 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.report_measure import ChannelReport, report_on
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-from enhsim_tf.enhancer.training_pairs import num_window_starts, split_end
+from enhsim_tf.enhancer.training_pairs import split_end
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import num_window_starts
 
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
 _LEAST_EXPLAINED = 0.05  # minimum share of the variance that one square wave explains; for white noise, the best fit explains about 0.01

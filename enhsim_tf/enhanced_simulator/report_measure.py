@@ -12,10 +12,10 @@ import numpy as np
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
-from enhsim_tf.enhancer.training_pairs import cut_pairs, evenly_spaced_starts, ridge, window_errors
+from enhsim_tf.enhancer.training_pairs import cut_pairs, ridge, window_errors
 from enhsim_tf.realism import real_floor
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import disjoint_offsets
+from enhsim_tf.telemetry.windows import disjoint_starts, evenly_spaced_starts
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -43,16 +43,16 @@ def report_on(
         The report.
     """
     window = simulator.window
-    places = evenly_spaced_starts(held_out, window, _NUM_COMPARED)
-    pairs = cut_pairs(held_out, simulator.coarse, places, window, follow=True)  # aligned without the enhancer
-    enhanced = simulator.follow(simulator.pairs(held_out, places))
+    starts = evenly_spaced_starts(held_out, window, _NUM_COMPARED)
+    pairs = cut_pairs(held_out, simulator.coarse, starts, window, follow=True)  # aligned without the enhancer
+    enhanced = simulator.follow(simulator.pairs(held_out, starts))
     typical = _typical(enhanced, pairs.target)
     generated = simulator.generate(2 * _NUM_WINDOWS, seed=seed + 1)
     extracted = simulator.residual_windows(learnt, _NUM_WINDOWS, np.random.default_rng([seed, 2]))
     noise_sd = float(np.std(extracted, dtype=np.float64))
     noise_window, rows = _compare_noise(simulator, [*learnt, *held_out] if is_held_out else list(learnt), seed)
-    places = evenly_spaced_starts(learnt, window, 2 * _NUM_WINDOWS)
-    training = cut_pairs(learnt, simulator.coarse, places, window, follow=True)
+    starts = evenly_spaced_starts(learnt, window, 2 * _NUM_WINDOWS)
+    training = cut_pairs(learnt, simulator.coarse, starts, window, follow=True)
     real = training.target
     trial = evaluation.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
     trial = dataclasses.replace(trial, anomalous={key: value for key, value in trial.anomalous.items() if key[1] == SEVERITY})
@@ -128,11 +128,11 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     """Compares generated with extracted noise in all measures, in windows short enough that there are many disjoint ones."""
     window = simulator.window
     whole = [part for part in parts if len(part) >= window]
-    places, before = [], 0
+    starts, before = [], 0
     for part in whole:
-        places += list(before + disjoint_offsets(len(part), window))
+        starts += list(before + disjoint_starts(len(part), window))
         before += len(part) - window + 1
-    pairs = simulator.pairs(whole, np.array(places))
+    pairs = simulator.pairs(whole, np.array(starts))
     residual = pairs.target - simulator.follow(pairs)
     pieces = max(1, -(-_NUM_NOISE_WINDOWS // len(residual)))
     short = window // pieces

@@ -15,12 +15,12 @@ from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
-from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs, random_window_starts
+from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.gan import NoiseGAN, num_overlapping
 from enhsim_tf.telemetry.parquet_store import write_windows
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
 
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the enhanced waveform
 _CHUNK = 4_096  # number of windows generated at a time
@@ -107,7 +107,7 @@ class EnhancedSimulator:
                 windows, or two windows with `extraction="moving average"`.
             coarse: The coarse simulator. None fits square waves to the longest part of the telemetry.
             seed: Random seed of the training.
-            num_windows: Number of training windows, cut at random offsets.
+            num_windows: Number of training windows, cut at random starts.
             epochs: Passes of the enhancer over the training windows.
             num_iterations: Adversarial iterations of the noise networks; 0 leaves them untrained.
             moving_average: Width in samples of the moving average that separates the noise from the signal.
@@ -159,8 +159,8 @@ class EnhancedSimulator:
         Args:
             telemetry: Telemetry on the clock of the coarse simulator, or the parts between its gaps. A simulator with
                 `levels` is aligned with each window first.
-            num_windows: Number of windows, cut at random offsets.
-            rng: Random generator that draws the offsets.
+            num_windows: Number of windows, cut at random starts.
+            rng: Random generator that draws the starts.
 
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
@@ -170,19 +170,19 @@ class EnhancedSimulator:
         pairs = self.pairs(parts, random_window_starts(parts, self.window, num_windows, rng))
         return pairs.target - self.follow(pairs)
 
-    def pairs(self, telemetry: Telemetry | Sequence[Telemetry], places: np.ndarray) -> Pairs:
+    def pairs(self, telemetry: Telemetry | Sequence[Telemetry], starts: np.ndarray) -> Pairs:
         """Cuts windows of telemetry together with the coarse windows of the same times.
 
         A simulator with `levels` is aligned with each window in time, offset and gain.
 
         Args:
             telemetry: Telemetry, or the parts between its gaps.
-            places: Start of each window, counted over all parts in the way of `training_pairs.num_places`.
+            starts: Start of each window, counted over all parts as in `telemetry.windows`.
 
         Returns:
             The pairs of windows.
         """
-        pairs = cut_pairs(check_parts(telemetry), self.coarse, places, self.window, self.levels is not None)
+        pairs = cut_pairs(check_parts(telemetry), self.coarse, starts, self.window, self.levels is not None)
         return pairs if self.levels is None else self.align_to_enhanced(pairs)
 
     def align_to_enhanced(self, pairs: Pairs) -> Pairs:
@@ -225,8 +225,8 @@ class EnhancedSimulator:
         """
         check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
-        begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
-        coarse = self.coarse.simulate(self.interval_s * (begins[:, None] + np.arange(self.window)), scenario, rng)
+        starts, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
+        coarse = self.coarse.simulate(self.interval_s * (starts[:, None] + np.arange(self.window)), scenario, rng)
         return coarse if levels is None else apply_shift_and_gain(coarse, *levels.T)
 
     def _draw_levels(self, num_windows: int, seed: int) -> np.ndarray | None:
@@ -308,9 +308,9 @@ class EnhancedSimulator:
     def _clean_chunks(self, num_windows: int, scenario: Degraded | None, seed: int) -> Iterator[np.ndarray]:
         check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
-        begins, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
+        starts, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         for first in range(0, num_windows, _CHUNK):
-            times = self.interval_s * (begins[first : first + _CHUNK, None] + np.arange(self.window))
+            times = self.interval_s * (starts[first : first + _CHUNK, None] + np.arange(self.window))
             windows = self.enhance(self.coarse.simulate(times, scenario, rng))
             yield windows if levels is None else apply_shift_and_gain(windows, *levels[first : first + _CHUNK].T)
 
@@ -350,14 +350,14 @@ class EnhancedSimulator:
         coarse = self.coarse.simulate(times, rng=rng)[0]
         if scenario is not None:  # the scenario covers only the series, and the last window may extend beyond it
             coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
-        begins = hop * np.arange(num_windows)
-        enhanced = self.enhance(cut_windows(coarse, begins, window))
+        starts = hop * np.arange(num_windows)
+        enhanced = self.enhance(cut_windows(coarse, starts, window))
         if self.levels is not None:
             enhanced = apply_shift_and_gain(enhanced, *self._follow_levels(num_windows, seed).T)
 
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
         signal, total = np.zeros((2, length))
-        for begin, clean in zip(begins, enhanced, strict=True):
+        for begin, clean in zip(starts, enhanced, strict=True):
             signal[begin : begin + window] += fade * clean
             total[begin : begin + window] += fade
         return (signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed))

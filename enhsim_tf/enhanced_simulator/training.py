@@ -16,14 +16,7 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhancer import network as enhancer_network
-from enhsim_tf.enhancer.training_pairs import (
-    Pairs,
-    cut_pairs,
-    cut_windows_from_parts,
-    evenly_spaced_starts,
-    random_window_starts,
-    split_end,
-)
+from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
@@ -32,6 +25,7 @@ from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.telemetry.series import Telemetry, check_values
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -48,7 +42,7 @@ class TrainingSettings:
 
     Args:
         seed: Random seed of the training.
-        num_windows: Number of training windows, cut at random offsets.
+        num_windows: Number of training windows, cut at random starts.
         epochs: Passes of the enhancer over the training windows.
         num_iterations: Adversarial iterations of the noise networks; 0 leaves them untrained.
         moving_average: Width in samples of the moving average that separates the noise from the signal.
@@ -154,8 +148,8 @@ def _train_enhancer(
     simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: TrainingSettings, verbose: int | str, progress: Progress
 ) -> None:
     """Trains the enhancer in one round, or with `follow` in several rounds with the windows aligned again in between."""
-    places = random_window_starts(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
-    pairs = cut_pairs(parts, simulator.coarse, places, settings.window, settings.follow)
+    starts = random_window_starts(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
+    pairs = cut_pairs(parts, simulator.coarse, starts, settings.window, settings.follow)
     show_bars = int(sys.stdout.isatty()) if verbose == "auto" else verbose  # Keras' own "auto" writes its bars into files too
     rounds = min(_ROUNDS, settings.epochs) if settings.follow else 1
     ends = np.linspace(0, settings.epochs, rounds + 1).astype(int).tolist()

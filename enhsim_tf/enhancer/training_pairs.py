@@ -13,7 +13,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.telemetry.windows import cut_windows, cut_windows_from_parts
 
 MIN_GAIN = 0.1  # in units of the simulator's amplitude; windows with a smaller fitted gain are too flat to train on
 
@@ -105,92 +105,18 @@ def split_end(parts: Sequence[Telemetry], share: float) -> tuple[list[Telemetry]
     return first, rest
 
 
-def num_window_starts(parts: Sequence[Telemetry], window: int) -> int:
-    """Returns the number of samples at which a complete window can start.
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-    """
-    return sum(max(0, len(part) - window + 1) for part in parts)
-
-
-def random_window_starts(parts: Sequence[Telemetry], window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
-    """Draws window starts uniformly from all samples at which a complete window can start, with replacement.
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-        num_windows: Number of windows.
-        rng: Random number generator.
-
-    Returns:
-        Integers below `num_window_starts`, shape `(num_windows,)`.
-
-    Raises:
-        InputError: If every part is shorter than a window.
-    """
-    places = num_window_starts(parts, window)
-    if not places:
-        longest = max((len(part) for part in parts), default=0)
-        raise InputError(
-            f"Expected a contiguous part of at least {window} samples. Received: {longest}. Use a longer series or a shorter window."
-        )
-    return rng.integers(0, places, num_windows)
-
-
-def evenly_spaced_starts(parts: Sequence[Telemetry], window: int, num_windows: int) -> np.ndarray:
-    """Returns window starts that are evenly spaced over the series, in the order of time.
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-        num_windows: Maximum number of starts. A series with fewer possible starts returns each of them once.
-    """
-    places = num_window_starts(parts, window)
-    return np.unique(np.linspace(0, places - 1, min(num_windows, places)).astype(np.int64))
-
-
-def cut_windows_from_parts(parts: Sequence[Telemetry], places: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cuts windows out of a series that consists of several contiguous parts.
-
-    Args:
-        parts: Contiguous parts of one series, on one clock.
-        places: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
-        window: Number of samples in a window.
-
-    Returns:
-        The windows, float32 of shape `(windows, samples)`, and their start times in seconds, shape `(windows,)`.
-
-    Raises:
-        InputError: If an index is out of range.
-    """
-    places, usable = np.asarray(places), [part for part in parts if len(part) >= window]
-    firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
-    if len(places) and not 0 <= places.min() <= places.max() < firsts[-1]:
-        raise InputError(f"Expected window starts from 0 to before {firsts[-1]}. Received: from {places.min()} to {places.max()}.")
-    which = np.searchsorted(firsts, places, "right") - 1
-    windows, time_s = np.empty((len(places), window), np.float32), np.empty(len(places))
-    for number, part in enumerate(usable):
-        here = which == number
-        offsets = places[here] - firsts[number]
-        windows[here] = cut_windows(part.values, offsets, window)
-        time_s[here] = part.offset_s + part.interval_s * offsets
-    return windows, time_s
-
-
-def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, places: np.ndarray, window: int, follow: bool = False) -> Pairs:
+def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, starts: np.ndarray, window: int, follow: bool = False) -> Pairs:
     """Cuts telemetry windows out of a series, and simulates the coarse windows of the same times.
 
     Args:
         parts: Contiguous parts of one series, on one clock.
         coarse: The coarse simulator.
-        places: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
+        starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
         window: Number of samples in a window.
         follow: Whether to fit the simulator to each telemetry window: its clock by cross-correlation, its level and
             amplitude by least squares. If False, the simulator runs as configured.
     """
-    target, time_s = cut_windows_from_parts(parts, places, window)
+    target, time_s = cut_windows_from_parts(parts, starts, window)
     times = time_s[:, None] + parts[0].interval_s * np.arange(window)
     if not follow:
         return Pairs(coarse.simulate(times), target, np.zeros(len(target)), np.ones(len(target)), time_s)
@@ -264,17 +190,17 @@ def _least_squares(coarse: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, 
     return target_mean - gain * coarse_mean, gain
 
 
-def paired_windows(telemetry: Telemetry, coarse: SquareWaveSimulator, offsets: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+def paired_windows(telemetry: Telemetry, coarse: SquareWaveSimulator, starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
     """Returns the coarse windows and the telemetry windows of the same times (steps 3 and 4 of the paper's pipeline).
 
     Args:
         telemetry: The telemetry.
         coarse: The coarse simulator.
-        offsets: First sample of each window, shape `(windows,)`.
+        starts: First sample of each window, shape `(windows,)`.
         window: Number of samples in a window.
 
     Returns:
         `(coarse, target)`, two float32 arrays of shape `(windows, window)`.
     """
-    times = telemetry.offset_s + telemetry.interval_s * (np.asarray(offsets)[:, None] + np.arange(window))
-    return coarse.simulate(times), cut_windows(telemetry.values, offsets, window)
+    times = telemetry.offset_s + telemetry.interval_s * (np.asarray(starts)[:, None] + np.arange(window))
+    return coarse.simulate(times), cut_windows(telemetry.values, starts, window)

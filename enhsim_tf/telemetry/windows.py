@@ -1,6 +1,10 @@
-"""Windows of a series: splitting by time, window offsets, and cutting windows."""
+"""Windows of a series: splitting by time, the starts of windows, and cutting windows.
 
-from collections.abc import Sequence
+The start of a window is the index of its first sample. In a series of several parts, starts are counted over the samples at which a
+complete window can start, part after part, so that they are the sample numbers if there is one part.
+"""
+
+from collections.abc import Sequence, Sized
 
 import numpy as np
 
@@ -34,28 +38,56 @@ def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) ->
     return [telemetry.part(start, start + length) for start, length in zip(starts.tolist(), lengths, strict=True)]
 
 
-def random_offsets(num_samples: int, window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
-    """Draws random window offsets: windows "whose beginning and end are offset by a random amount" (paper, section 2.2).
+def num_window_starts(parts: Sequence[Sized], window: int) -> int:
+    """Returns the number of samples at which a complete window can start.
 
     Args:
-        num_samples: Length of the series.
-        window: Window length in samples.
+        parts: Contiguous parts of one series.
+        window: Number of samples in a window.
+    """
+    return sum(max(0, len(part) - window + 1) for part in parts)
+
+
+def random_window_starts(parts: Sequence[Sized], window: int, num_windows: int, rng: np.random.Generator) -> np.ndarray:
+    """Draws window starts uniformly from all samples at which a complete window can start, with replacement.
+
+    In the paper, the "beginning and end" of windows "are offset by a random amount" (section 2.2).
+
+    Args:
+        parts: Contiguous parts of one series.
+        window: Number of samples in a window.
         num_windows: Number of windows.
         rng: Random number generator.
 
     Returns:
-        Integer array of shape `(num_windows,)`.
+        Integers below `num_window_starts`, shape `(num_windows,)`.
 
     Raises:
-        InputError: If the series is shorter than a window.
+        InputError: If every part is shorter than a window.
     """
-    if num_samples < window:
-        raise InputError(f"Expected at least one window of {window} samples. Received: {num_samples} samples. Give a longer series.")
-    return rng.integers(0, num_samples - window + 1, num_windows)
+    num_starts = num_window_starts(parts, window)
+    if not num_starts:
+        longest = max((len(part) for part in parts), default=0)
+        raise InputError(
+            f"Expected a contiguous part of at least {window} samples. Received: {longest}. Use a longer series or a shorter window."
+        )
+    return rng.integers(0, num_starts, num_windows)
 
 
-def disjoint_offsets(num_samples: int, window: int) -> np.ndarray:
-    """Offsets of consecutive windows that do not overlap, which are used as the independent units of statistical tests.
+def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) -> np.ndarray:
+    """Returns window starts that are evenly spaced over the series, in the order of time.
+
+    Args:
+        parts: Contiguous parts of one series.
+        window: Number of samples in a window.
+        num_windows: Maximum number of starts. A series with fewer possible starts returns each of them once.
+    """
+    num_starts = num_window_starts(parts, window)
+    return np.unique(np.linspace(0, num_starts - 1, min(num_windows, num_starts)).astype(np.int64))
+
+
+def disjoint_starts(num_samples: int, window: int) -> np.ndarray:
+    """Starts of consecutive windows of one series that do not overlap, which are used as the independent units of statistical tests.
 
     Args:
         num_samples: Length of the series.
@@ -67,29 +99,43 @@ def disjoint_offsets(num_samples: int, window: int) -> np.ndarray:
     return np.arange(num_samples // window) * window
 
 
-def even_offsets(num_samples: int, window: int, num_windows: int) -> np.ndarray:
-    """Offsets of windows that are spread evenly over a series, in chronological order.
-
-    Args:
-        num_samples: Length of the series.
-        window: Window length in samples.
-        num_windows: Number of windows.
-
-    Returns:
-        Integer array of shape `(num_windows,)`.
-    """
-    return np.linspace(0, num_samples - window, num_windows).astype(np.int64)
-
-
-def cut_windows(values: np.ndarray, offsets: np.ndarray, window: int) -> np.ndarray:
+def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
     """Cuts windows out of a series.
 
     Args:
         values: Series of shape `(samples,)`.
-        offsets: First sample of each window, shape `(windows,)`.
+        starts: First sample of each window, shape `(windows,)`.
         window: Window length in samples.
 
     Returns:
         Array of shape `(windows, window)` with the dtype of `values`.
     """
-    return np.lib.stride_tricks.sliding_window_view(values, window)[offsets]
+    return np.lib.stride_tricks.sliding_window_view(values, window)[starts]
+
+
+def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cuts windows out of a series that consists of several contiguous parts.
+
+    Args:
+        parts: Contiguous parts of one series, on one clock.
+        starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
+        window: Number of samples in a window.
+
+    Returns:
+        The windows, float32 of shape `(windows, samples)`, and their start times in seconds, shape `(windows,)`.
+
+    Raises:
+        InputError: If an index is out of range.
+    """
+    starts, usable = np.asarray(starts), [part for part in parts if len(part) >= window]
+    firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
+    if len(starts) and not 0 <= starts.min() <= starts.max() < firsts[-1]:
+        raise InputError(f"Expected window starts from 0 to before {firsts[-1]}. Received: from {starts.min()} to {starts.max()}.")
+    which = np.searchsorted(firsts, starts, "right") - 1
+    windows, time_s = np.empty((len(starts), window), np.float32), np.empty(len(starts))
+    for number, part in enumerate(usable):
+        here = which == number
+        own = starts[here] - firsts[number]
+        windows[here] = cut_windows(part.values, own, window)
+        time_s[here] = part.offset_s + part.interval_s * own
+    return windows, time_s

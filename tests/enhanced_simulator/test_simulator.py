@@ -17,7 +17,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.simulator import PAPER, EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.enhancer.training_pairs import cut_pairs, evenly_spaced_starts
+from enhsim_tf.enhancer.training_pairs import cut_pairs
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN
@@ -25,6 +25,7 @@ from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])

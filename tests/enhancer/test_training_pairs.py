@@ -9,16 +9,13 @@ from enhsim_tf.enhancer.training_pairs import (
     Pairs,
     apply_shift_and_gain,
     cut_pairs,
-    cut_windows_from_parts,
-    evenly_spaced_starts,
-    num_window_starts,
     paired_windows,
-    random_window_starts,
     ridge,
     split_end,
     window_errors,
 )
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, num_window_starts, random_window_starts
 
 COARSE = SquareWaveSimulator([SquareWave(period_s=100, phase=0.005, duty=0.3, low=-1.0, high=1.0)])  # edges between samples
 
@@ -51,10 +48,10 @@ def test_times_are_in_seconds_on_the_clock_of_the_series():
     np.testing.assert_array_equal(time_s, [0.5, 21.0])
 
 
-@pytest.mark.parametrize("places", [[-1], [10], [0, 99]])
-def test_window_starts_out_of_range_are_refused(refused, places):
+@pytest.mark.parametrize("starts", [[-1], [10], [0, 99]])
+def test_window_starts_out_of_range_are_refused(refused, starts):
     with refused("before 10"):
-        cut_windows_from_parts(PARTS, np.array(places), 4)
+        cut_windows_from_parts(PARTS, np.array(starts), 4)
 
 
 def test_parts_shorter_than_a_window_have_no_window_starts(refused):
@@ -70,18 +67,18 @@ def test_parts_shorter_than_a_window_have_no_window_starts(refused):
 
 
 def test_random_window_starts_are_uniform():
-    places = random_window_starts(PARTS, 4, 20_000, np.random.default_rng(3))
-    counts = np.bincount(places, minlength=10)
+    starts = random_window_starts(PARTS, 4, 20_000, np.random.default_rng(3))
+    counts = np.bincount(starts, minlength=10)
     assert len(counts) == 10 and np.abs(counts - 2_000).max() < 5 * np.sqrt(20_000 * 0.1 * 0.9)
-    np.testing.assert_array_equal(places, random_window_starts(PARTS, 4, 20_000, np.random.default_rng(3)))
+    np.testing.assert_array_equal(starts, random_window_starts(PARTS, 4, 20_000, np.random.default_rng(3)))
 
 
 @pytest.mark.parametrize("number", [1, 2, 4, 9, 10, 50])
 def test_evenly_spaced_starts_are_sorted_and_distinct(number):
-    places = evenly_spaced_starts(PARTS, 4, number)
-    assert len(places) == min(number, 10) and (np.diff(places) > 0).all() and places[0] == 0
-    assert number == 1 or places[-1] == 9
-    assert np.ptp(np.diff(places), axis=0) <= 1 if number > 2 else True
+    starts = evenly_spaced_starts(PARTS, 4, number)
+    assert len(starts) == min(number, 10) and (np.diff(starts) > 0).all() and starts[0] == 0
+    assert number == 1 or starts[-1] == 9
+    assert np.ptp(np.diff(starts), axis=0) <= 1 if number > 2 else True
 
 
 @pytest.mark.parametrize(
@@ -103,9 +100,9 @@ def test_the_end_is_split_off(share, first, rest):
 def test_without_following_they_are_the_paired_windows_to_the_bit():
     rng = np.random.default_rng(1)
     series = Telemetry(rng.standard_normal(700).astype(np.float32), 2.0, offset_s=33.0)
-    places = random_window_starts([series], 120, 40, rng)
-    pairs = cut_pairs([series], COARSE, places, 120)
-    coarse, target = paired_windows(series, COARSE, places, 120)
+    starts = random_window_starts([series], 120, 40, rng)
+    pairs = cut_pairs([series], COARSE, starts, 120)
+    coarse, target = paired_windows(series, COARSE, starts, 120)
     assert pairs.coarse.tobytes() == coarse.tobytes() and pairs.target.tobytes() == target.tobytes()
     assert (pairs.shift == 0).all() and (pairs.gain == 1).all() and len(pairs) == 40
     np.testing.assert_array_equal(pairs.coarse_rescaled, coarse)

@@ -6,7 +6,7 @@ import pytest
 
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, check_values
 from enhsim_tf.telemetry.sources import read_telemetry
-from enhsim_tf.telemetry.windows import cut_windows, disjoint_offsets, even_offsets, random_offsets, split_by_time
+from enhsim_tf.telemetry.windows import cut_windows, disjoint_starts, evenly_spaced_starts, random_window_starts, split_by_time
 
 RAMP = np.arange(12.0)
 
@@ -256,29 +256,29 @@ def test_split_refusals(refused):
         split_by_time(series, (0.5, 0.5), 100)
 
 
-def test_random_offsets_reach_every_window_and_no_more(refused):
-    offsets = random_offsets(30, 20, 5_000, np.random.default_rng(0))
-    counts = np.bincount(offsets, minlength=11)
+def test_random_starts_reach_every_window_and_no_more(refused):
+    starts = random_window_starts([range(30)], 20, 5_000, np.random.default_rng(0))
+    counts = np.bincount(starts, minlength=11)
     assert len(counts) == 11  # 0 to 10: the last window ends with the series
     assert counts == pytest.approx(np.full(11, 5_000 / 11), abs=5 * np.sqrt(5_000 / 11))
-    assert random_offsets(20, 20, 3, np.random.default_rng(0)).tolist() == [0, 0, 0]
-    assert (offsets == random_offsets(30, 20, 5_000, np.random.default_rng(0))).all()
-    assert (offsets != random_offsets(30, 20, 5_000, np.random.default_rng(1))).any()
-    with refused("19 samples"):
-        random_offsets(19, 20, 3, np.random.default_rng(0))
+    assert random_window_starts([range(20)], 20, 3, np.random.default_rng(0)).tolist() == [0, 0, 0]
+    assert (starts == random_window_starts([range(30)], 20, 5_000, np.random.default_rng(0))).all()
+    assert (starts != random_window_starts([range(30)], 20, 5_000, np.random.default_rng(1))).any()
+    with refused("at least 20 samples", "Received: 19"):
+        random_window_starts([range(19)], 20, 3, np.random.default_rng(0))
 
 
-def test_disjoint_offsets_share_no_sample():
-    assert disjoint_offsets(1_499, 500).tolist() == [0, 500]
-    assert disjoint_offsets(1_500, 500).tolist() == [0, 500, 1_000]
-    assert disjoint_offsets(499, 500).tolist() == []
+def test_disjoint_starts_share_no_sample():
+    assert disjoint_starts(1_499, 500).tolist() == [0, 500]
+    assert disjoint_starts(1_500, 500).tolist() == [0, 500, 1_000]
+    assert disjoint_starts(499, 500).tolist() == []
 
 
-def test_even_offsets_reach_from_end_to_end():
-    assert even_offsets(110, 10, 5).tolist() == [0, 25, 50, 75, 100]
-    offsets = even_offsets(1_000, 60, 37)
-    assert (offsets[0], offsets[-1]) == (0, 940) and set(np.diff(offsets)) == {26, 27}  # 940 / 36 = 26.1
-    assert even_offsets(60, 60, 3).tolist() == [0, 0, 0]
+def test_evenly_spaced_starts_reach_from_end_to_end():
+    assert evenly_spaced_starts([range(110)], 10, 5).tolist() == [0, 25, 50, 75, 100]
+    starts = evenly_spaced_starts([range(1_000)], 60, 37)
+    assert (starts[0], starts[-1]) == (0, 940) and set(np.diff(starts)) == {26, 27}  # 940 / 36 = 26.1
+    assert evenly_spaced_starts([range(60)], 60, 3).tolist() == [0]
 
 
 def test_cut_windows_by_hand():

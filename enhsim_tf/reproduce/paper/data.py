@@ -6,7 +6,7 @@ This module contains what all stages of the pipeline share and nothing that is t
 import dataclasses
 import functools
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.sources import read_telemetry
-from enhsim_tf.telemetry.windows import cut_windows, even_offsets, random_offsets, split_by_time
+from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, random_window_starts, split_by_time
 
 _MIN_DISJOINT = 20  # disjoint windows below which a part is read through overlapping ones
 
@@ -189,8 +189,8 @@ class Data:
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: Number of windows at random offsets; None for all disjoint windows in order of time.
-            purpose: Name of the random draw of the offsets.
+            num_windows: Number of windows at random starts; None for all disjoint windows in order of time.
+            purpose: Name of the random draw of the starts.
             synchronised: Whether the phase of the coarse simulator is aligned to each window instead of continuing from training.
 
         Returns:
@@ -200,9 +200,9 @@ class Data:
         rng, found = self.draw(purpose), []
         for channel in self.channels:
             series = getattr(channel, part)
-            offsets = self._offsets(len(series), num_windows, rng)
-            coarse, target = paired_windows(series, channel.coarse, offsets, self.window)
-            times = series.time_s[offsets[:, None] + np.arange(self.window)]
+            starts = self._starts(series, num_windows, rng)
+            coarse, target = paired_windows(series, channel.coarse, starts, self.window)
+            times = series.time_s[starts[:, None] + np.arange(self.window)]
             if synchronised:
                 coarse = channel.coarse.simulate(channel.coarse.synchronise(times, target))
             truth = target if channel.truth is None else channel.truth(times).astype(np.float32)
@@ -214,22 +214,22 @@ class Data:
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: Number of windows at random offsets; None for all disjoint windows in order of time.
-            purpose: Name of the random draw of the offsets.
+            num_windows: Number of windows at random starts; None for all disjoint windows in order of time.
+            purpose: Name of the random draw of the starts.
 
         Returns:
             float32 array of shape `(windows, samples)`.
         """
         rng = self.draw(purpose)
         noises = [extract_noise(getattr(channel, part).values, self.settings.noise.moving_average)[0] for channel in self.channels]
-        return np.concatenate([cut_windows(noise, self._offsets(len(noise), num_windows, rng), self.window) for noise in noises])
+        return np.concatenate([cut_windows(noise, self._starts(noise, num_windows, rng), self.window) for noise in noises])
 
-    def _offsets(self, num_samples: int, num_windows: int | None, rng: np.random.Generator) -> np.ndarray:
+    def _starts(self, series: Sized, num_windows: int | None, rng: np.random.Generator) -> np.ndarray:
         if num_windows is not None:
-            return random_offsets(num_samples, self.window, num_windows // len(self.channels), rng)
-        disjoint = num_samples // self.window
+            return random_window_starts([series], self.window, num_windows // len(self.channels), rng)
+        disjoint = len(series) // self.window
         few = disjoint < _MIN_DISJOINT  # a short real channel: windows must overlap, and nothing may be counted by them
-        return even_offsets(num_samples, self.window, min(200, num_samples - self.window + 1) if few else disjoint)
+        return evenly_spaced_starts([series], self.window, 200 if few else disjoint)
 
     def degraded_times(self) -> np.ndarray:
         """Times of the windows on which degraded modes are measured, shape `(windows, samples)`."""

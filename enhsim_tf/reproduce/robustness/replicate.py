@@ -239,8 +239,8 @@ class Replicate:
 
         Args:
             part: `train`, `calibration` or `test`.
-            num_windows: Number of windows at random offsets; None for all disjoint windows in order of time.
-            purpose: Name of the random draw of the offsets.
+            num_windows: Number of windows at random starts; None for all disjoint windows in order of time.
+            purpose: Name of the random draw of the starts.
         """
         windows = self.experiment.data.windows(part, num_windows, purpose)
         return windows["target"] - windows["truth"]

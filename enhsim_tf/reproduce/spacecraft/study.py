@@ -15,13 +15,13 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_windows_from_parts, evenly_spaced_starts, ridge, window_errors
+from enhsim_tf.enhancer.training_pairs import cut_pairs, ridge, window_errors
 from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.telemetry.telemanom import LabelledChannel
-from enhsim_tf.telemetry.windows import disjoint_offsets
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, disjoint_starts, evenly_spaced_starts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -234,14 +234,14 @@ class ChannelStudy:
     def enhancement(self) -> list[dict]:
         """Error over nominal test windows that share no sample, of the coarse signal, ridge regression and the enhancer: quartiles."""
         window, simulator, train, test = self.simulator.window, self.simulator, self.channel.train, self.channel.test
-        begins, places = disjoint_offsets(len(test), window), evenly_spaced_starts([train], window, len(train))
+        begins, learnt = disjoint_starts(len(test), window), evenly_spaced_starts([train], window, len(train))
         begins = begins[self._is_nominal(begins)]
         by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
         by_shape = simulator.pairs(test, begins)  # aligned in phase and offset with the enhanced waveform
         windows = {
             "coarse": by_edges.coarse_rescaled,
-            "ridge": ridge(cut_pairs([train], simulator.coarse, places, window, follow=True), by_edges),
-            "ridge, same clock": ridge(simulator.pairs(train, places), by_shape),  # the same alignment, without the network
+            "ridge": ridge(cut_pairs([train], simulator.coarse, learnt, window, follow=True), by_edges),
+            "ridge, same clock": ridge(simulator.pairs(train, learnt), by_shape),  # the same alignment, without the network
             "enhanced": simulator.follow(by_shape),
         }
         found = []
