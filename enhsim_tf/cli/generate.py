@@ -27,14 +27,15 @@ def run_generate(options: argparse.Namespace) -> int:
         return run_fleet(options, tell)
     options.seed = options.seed or 0
     from enhsim_tf.datasets.labelled_windows import (
+        divide_windows,
         num_samples_of,
         parse_length,
         parse_scenario,
-        shares_of,
         start_of,
         write_series_labelled,
         write_windows_labelled,
     )
+    from enhsim_tf.datasets.scenario_file import mix_of
 
     scenarios = [parse_scenario(text) for text in options.scenario]
     if options.windows is None and options.continuous is None:
@@ -44,7 +45,7 @@ def run_generate(options: argparse.Namespace) -> int:
     if options.continuous is not None and len(scenarios) > 1:
         raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write one series for each.")
     nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
-    shares = shares_of(scenarios, options.windows or 0, nominal_share, options.seed) if options.windows else []
+    shares = divide_windows(mix_of(scenarios, nominal_share), options.windows, options.seed) if options.windows else []
     start = None if options.start is None else start_of(options.start)
     if options.continuous is not None:
         parse_length(options.continuous)

@@ -16,6 +16,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.datasets.scenario_file import Mix
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -124,35 +125,31 @@ def start_of(start: "str | pd.Timestamp") -> "pd.Timestamp":
     return time
 
 
-def shares_of(scenarios: Sequence[Degraded], num_windows: int, nominal_share: float, seed: int) -> list[Share]:
+def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder.
 
     Args:
-        scenarios: Degraded modes. If there is none, all windows are nominal.
+        mix: Scenarios with equal shares and fixed severities, as from `mix_of`.
         num_windows: Total number of windows.
-        nominal_share: Share of nominal windows, if there are scenarios.
         seed: Random seed of the whole set.
 
     Returns:
         The parts that have at least one window, each with a seed of its own.
 
     Raises:
-        InputError: If the share is not between 0 and 1, or if a scenario would get no window.
+        InputError: If a scenario would get no window.
     """
-    if not 0 <= nominal_share <= 1:
-        raise InputError(f"Expected a nominal share from 0 to 1. Received: {nominal_share}.")
-    num_nominal = round(nominal_share * num_windows) if scenarios else num_windows
-    counts = [num_nominal] + [
-        (num_windows - num_nominal) // len(scenarios) + (number < (num_windows - num_nominal) % len(scenarios))
-        for number in range(len(scenarios))
-    ]
-    if scenarios and nominal_share < 1 and counts[-1] == 0:
+    scenarios = [Degraded(part.mode, part.severity[0], part.onset[0]) for part in mix.scenarios]
+    num_nominal = round(mix.nominal * num_windows)
+    each, left = divmod(num_windows - num_nominal, len(scenarios) or 1)
+    counts = [num_nominal, *(each + (number < left) for number in range(len(scenarios)))]
+    if mix.nominal < 1 and counts[-1] == 0:
         raise InputError(
             f"Expected at least one window for each of {len(scenarios)} scenarios. Received: {num_windows} windows, of which a share of "
-            f"{nominal_share:g} is nominal. Ask for more windows."
+            f"{mix.nominal:g} is nominal. Ask for more windows."
         )
     seeds = np.random.SeedSequence(seed).generate_state(len(counts)).tolist()
-    return [Share(*each) for each in zip([None, *scenarios], counts, seeds, strict=True) if each[1]]
+    return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
 def columns_of(window: int) -> dict[str, "pa.DataType"]:

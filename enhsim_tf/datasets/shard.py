@@ -20,8 +20,8 @@ from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.labelled_windows import NOMINAL, columns_of
 from enhsim_tf.datasets.plan import FORMAT, Plan
+from enhsim_tf.enhanced_simulator.batches import complete_batch
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
-from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 _STREAM = 0x666C656574  # distinguishes these seeds from all others in the package
-_BEGINS = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
+_START_RANGE = 1_000_000  # windows start at a random sample below this one, so that every phase of the waves occurs
 _BATCH, _BATCH_VALUES = 1_024, 2**19  # maximum windows and values per call of the networks
 _ROW_GROUP = 4_096
 
@@ -49,7 +49,7 @@ class Rows(NamedTuple):
     scenario: np.ndarray
     severity: np.ndarray
     onset: np.ndarray
-    begin: np.ndarray
+    start: np.ndarray
     level: np.ndarray
 
 
@@ -83,7 +83,7 @@ def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.ran
     ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
     severity, onset = (ranges[..., 0] + (ranges[..., 1] - ranges[..., 0]) * mixing.random((num_rows, 2))).T
     severity = severity.astype(np.float32).astype(np.float64)  # the precision of the label
-    return Rows(model, scenario, severity, onset, placing.integers(0, _BEGINS, num_rows), placing.random(num_rows)), happening, noise
+    return Rows(model, scenario, severity, onset, placing.integers(0, _START_RANGE, num_rows), placing.random(num_rows)), happening, noise
 
 
 def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
@@ -98,8 +98,8 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
         The category of each row in random order, integers of shape `(num_rows,)`.
     """
     edges = np.cumsum(shares) / np.sum(shares)
-    places = (rng.random() + np.arange(num_rows)) / num_rows
-    return rng.permutation(np.minimum(np.searchsorted(edges, places, side="right"), np.flatnonzero(shares)[-1]))
+    points = (rng.random() + np.arange(num_rows)) / num_rows
+    return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
 
 
 def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, Rows]:
@@ -114,29 +114,29 @@ def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: i
         The windows, float32 of shape `(rows, samples)`, and their properties.
     """
     rows, happening, noise = draw_rows(plan, shard)
-    windows = np.empty((len(rows.begin), plan.window), np.float32)
+    windows = np.empty((len(rows.start), plan.window), np.float32)
     batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // plan.window))
     for number, simulator in enumerate(simulators):
         own = np.flatnonzero(rows.model == number)
         for first in range(0, len(own), batch):
-            places = own[first : first + batch]
+            chosen = own[first : first + batch]
             coarse = np.zeros((batch, plan.window), np.float32)
-            for place, window in zip(places, coarse, strict=False):
-                times = simulator.interval_s * (rows.begin[place] + np.arange(plan.window))
-                window[:] = simulator.coarse.simulate(times[None], _scenario_of(plan, rows, place), happening)[0]
-            clean = simulator.enhance(coarse)[: len(places)]
+            for row, window in zip(chosen, coarse, strict=False):
+                times = simulator.interval_s * (rows.start[row] + np.arange(plan.window))
+                window[:] = simulator.coarse.simulate(times[None], _scenario_of(plan, rows, row), happening)[0]
+            levels = None
             if simulator.levels is not None:
-                levels = simulator.levels[(rows.level[places] * len(simulator.levels)).astype(int)]
-                clean = apply_shift_and_gain(clean, *levels.T)
-            windows[places] = clean + simulator.noise.generate(batch, noise)[: len(places)]
+                levels = np.zeros((batch, 2))
+                levels[: len(chosen)] = simulator.levels[(rows.level[chosen] * len(simulator.levels)).astype(int)]
+            windows[chosen] = complete_batch(simulator, coarse, levels, noise)[: len(chosen)]
     return windows, rows
 
 
-def _scenario_of(plan: Plan, rows: Rows, place: int) -> Degraded | None:
-    number = rows.scenario[place]
+def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
+    number = rows.scenario[row]
     if number == 0:
         return None
-    return Degraded(plan.mix.scenarios[number - 1].mode, float(rows.severity[place]), float(rows.onset[place]))
+    return Degraded(plan.mix.scenarios[number - 1].mode, float(rows.severity[row]), float(rows.onset[row]))
 
 
 def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
@@ -205,7 +205,7 @@ class ShardMaker:
         windows, rows = make_windows(self.plan, self.simulators, shard)
         nominal = rows.severity == 0  # including scenario 0
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
-        scenarios = [_scenario_of(self.plan, rows, place) for place in range(len(nominal))]
+        scenarios = [_scenario_of(self.plan, rows, row) for row in range(len(nominal))]
         onsets = np.array([0 if each is None else each.first_sample(self.plan.window) for each in scenarios], np.int32)
         columns = [
             pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), self.plan.window),

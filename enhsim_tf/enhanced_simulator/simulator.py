@@ -11,6 +11,7 @@ from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator.batches import complete_batch
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
@@ -268,28 +269,20 @@ class EnhancedSimulator:
         Raises:
             InputError: If `num_windows` is negative or not a whole number.
         """
-        check_counts(num_windows=(num_windows, 0))
-        windows, filled = np.empty((num_windows, self.window), np.float32), 0
-        for chunk in self.generate_chunks(num_windows, scenario, seed):
-            windows[filled : filled + len(chunk)] = chunk
-            filled += len(chunk)
-        return windows
+        return self._join(num_windows, self.generate_chunks(num_windows, scenario, seed))
 
     def generate_chunks(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> Iterator[np.ndarray]:
-        """Yields the windows of `generate` in chunks of some thousand, so that memory does not grow with their number.
+        """Generates the windows of `generate` in chunks of some thousand, so that memory does not grow with their number.
 
         Args:
             num_windows: Number of windows.
             scenario: A degraded mode, or None for nominal telemetry.
             seed: Random seed. The same seed gives the same windows.
 
-        Yields:
-            float32 arrays of shape `(chunk, samples)`, in the telemetry's unit.
+        Returns:
+            An iterator over float32 arrays of shape `(chunk, samples)`, in the telemetry's unit.
         """
-        noise_rng = _noise_rng(seed)
-        for windows in self._clean_chunks(num_windows, scenario, seed):
-            windows += self.noise.generate(len(windows), noise_rng)
-            yield windows
+        return self._chunks(num_windows, scenario, seed, _noise_rng(seed))
 
     def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Returns the windows of `generate` before noise is added.
@@ -302,17 +295,26 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
-        chunks = list(self._clean_chunks(num_windows, scenario, seed))
-        return np.concatenate(chunks) if chunks else np.empty((0, self.window), np.float32)
+        return self._join(num_windows, self._chunks(num_windows, scenario, seed, None))
 
-    def _clean_chunks(self, num_windows: int, scenario: Degraded | None, seed: int) -> Iterator[np.ndarray]:
+    def _chunks(
+        self, num_windows: int, scenario: Degraded | None, seed: int, noise_rng: np.random.Generator | None
+    ) -> Iterator[np.ndarray]:
         check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
         starts, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         for first in range(0, num_windows, _CHUNK):
             times = self.interval_s * (starts[first : first + _CHUNK, None] + np.arange(self.window))
-            windows = self.enhance(self.coarse.simulate(times, scenario, rng))
-            yield windows if levels is None else apply_shift_and_gain(windows, *levels[first : first + _CHUNK].T)
+            coarse = self.coarse.simulate(times, scenario, rng)
+            yield complete_batch(self, coarse, None if levels is None else levels[first : first + _CHUNK], noise_rng)
+
+    def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
+        check_counts(num_windows=(num_windows, 0))
+        windows, filled = np.empty((num_windows, self.window), np.float32), 0
+        for chunk in chunks:
+            windows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+        return windows
 
     def generate_to_parquet(self, path: str | os.PathLike, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> None:
         """Writes the windows of `generate` to a Parquet file, chunk by chunk, so that memory does not grow with their number.
@@ -351,9 +353,8 @@ class EnhancedSimulator:
         if scenario is not None:  # the scenario covers only the series, and the last window may extend beyond it
             coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
         starts = hop * np.arange(num_windows)
-        enhanced = self.enhance(cut_windows(coarse, starts, window))
-        if self.levels is not None:
-            enhanced = apply_shift_and_gain(enhanced, *self._follow_levels(num_windows, seed).T)
+        levels = None if self.levels is None else self._follow_levels(num_windows, seed)
+        enhanced = complete_batch(self, cut_windows(coarse, starts, window), levels, None)
 
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
         signal, total = np.zeros((2, length))

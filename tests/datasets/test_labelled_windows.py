@@ -12,15 +12,16 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.labelled_windows import (
     Share,
+    divide_windows,
     num_samples_of,
     parse_length,
     parse_scenario,
     series_labelled,
-    shares_of,
     start_of,
     write_series_labelled,
     write_windows_labelled,
 )
+from enhsim_tf.datasets.scenario_file import mix_of
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise.surrogates import GaussianNoise
 
@@ -135,23 +136,24 @@ def test_invalid_start_times_are_refused(refused, text):
 )
 def test_windows_are_divided_between_scenarios(num_scenarios, num_windows, nominal_share, expected):
     scenarios = [Degraded(mode) for mode in list(MODES)[:num_scenarios]]
-    shares = shares_of(scenarios, num_windows, nominal_share, seed=3)
+    mix = mix_of(scenarios, nominal_share)
+    shares = divide_windows(mix, num_windows, seed=3)
     assert [share.num_windows for share in shares] == expected and sum(expected) == num_windows
     present = ([None] if nominal_share or not scenarios else []) + (scenarios if nominal_share < 1 else [])
     assert [share.scenario for share in shares] == present
     assert len({share.seed for share in shares}) == len(shares)
-    assert shares == shares_of(scenarios, num_windows, nominal_share, seed=3) != shares_of(scenarios, num_windows, nominal_share, seed=4)
+    assert shares == divide_windows(mix, num_windows, seed=3) != divide_windows(mix, num_windows, seed=4)
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
 def test_a_share_out_of_range_is_refused(refused, share):
     with refused("from 0 to 1"):
-        shares_of([Degraded("stuck")], 10, share, 0)
+        mix_of([Degraded("stuck")], share)
 
 
 def test_no_scenario_is_dropped_silently(refused):
     with refused("each of 3 scenarios", "4 windows"):
-        shares_of([Degraded("stuck"), Degraded("drift"), Degraded("dropout")], 4, 0.5, 0)
+        divide_windows(mix_of([Degraded("stuck"), Degraded("drift"), Degraded("dropout")], 0.5), 4, 0)
 
 
 # windows
@@ -161,7 +163,7 @@ def test_no_scenario_is_dropped_silently(refused):
 def written(tmp_path):
     """A training set, its shares and the simulator that generated it."""
     scenarios = [Degraded("stuck", 0.5, 0.4), Degraded("drift", 0.8, 0.29), Degraded("gain_loss", 0.0)]
-    shares, path = shares_of(scenarios, 80, 0.25, seed=7), tmp_path / "deep" / "training.parquet"
+    shares, path = divide_windows(mix_of(scenarios, 0.25), 80, seed=7), tmp_path / "deep" / "training.parquet"
     write_windows_labelled(path, known(), shares)
     return path, shares
 
@@ -216,7 +218,7 @@ def test_same_seed_same_bytes(tmp_path):
     scenarios = [Degraded("friction", 0.5), Degraded("dropout", 0.9)]
 
     def sums(seed):
-        write_windows_labelled(tmp_path / "windows.parquet", known(), shares_of(scenarios, 50, 0.5, seed))
+        write_windows_labelled(tmp_path / "windows.parquet", known(), divide_windows(mix_of(scenarios, 0.5), 50, seed))
         write_series_labelled(tmp_path / "series.parquet", known(), 700, scenarios[1], seed)
         return [hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() for name in ("windows.parquet", "series.parquet")]
 

@@ -74,7 +74,7 @@ def test_a_shard_depends_only_on_plan_and_number(tmp_path):
 
 
 def test_shards_do_not_repeat_each_other():
-    drawn = [draw_rows(plan(2_000, 500, seed=seed), shard)[0].begin for seed in (0, 1) for shard in range(4)]
+    drawn = [draw_rows(plan(2_000, 500, seed=seed), shard)[0].start for seed in (0, 1) for shard in range(4)]
     assert len({values.tobytes() for values in drawn}) == 8
     assert len(np.unique(np.concatenate(drawn))) > 3_980  # 4,000 draws from a million values: about 8 repeat by chance
 
@@ -154,7 +154,7 @@ def test_shards_of_real_networks_equal_the_output_of_the_simulator(model, tmp_pa
     maker = ShardMaker(made, tmp_path)
     windows = np.stack(table_of(maker, 1)[1]["window"])
     (simulator,), (rows, _, noise) = maker.simulators, draw_rows(made, 1)
-    coarse = simulator.coarse.simulate(2.0 * (rows.begin[:, None] + np.arange(60)))
+    coarse = simulator.coarse.simulate(2.0 * (rows.start[:, None] + np.arange(60)))
     np.testing.assert_allclose(windows, simulator.enhance(coarse) + simulator.noise.generate(40, noise), atol=1e-5)
 
 

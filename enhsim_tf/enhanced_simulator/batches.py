@@ -1,0 +1,30 @@
+"""The step that all generation of windows shares: one batch from coarse windows to telemetry ("Combined" in the paper's pipeline)."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+
+def complete_batch(
+    simulator: "EnhancedSimulator", coarse: np.ndarray, levels: np.ndarray | None, noise_rng: np.random.Generator | None
+) -> np.ndarray:
+    """Enhances coarse windows, sets their level and adds noise.
+
+    Args:
+        simulator: The simulator.
+        coarse: Coarse windows, float32 of shape `(windows, samples)`.
+        levels: Offset and gain of each window, shape `(windows, 2)`, or None for a simulator whose level is constant.
+        noise_rng: Random generator of the noise, or None for windows without noise.
+
+    Returns:
+        float32 array of the same shape, in the telemetry's unit.
+    """
+    windows = simulator.enhance(coarse)
+    if levels is not None:
+        windows = apply_shift_and_gain(windows, *levels.T)
+    return windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng)
