@@ -50,12 +50,12 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 def plan_for(options: argparse.Namespace) -> "Plan":
     """Returns the plan of the data set, which is the same for all rows."""
     from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.datasets.plan import plan_of
-    from enhsim_tf.datasets.scenario_file import mix_of
+    from enhsim_tf.datasets.plan import make_plan
+    from enhsim_tf.datasets.scenario_file import make_mix
 
-    mix = mix_of([Degraded("stuck", 0.5), Degraded("drift", 0.3)], options.nominal_share)
+    mix = make_mix([Degraded("stuck", 0.5), Degraded("drift", 0.3)], options.nominal_share)
     mix = dataclasses.replace(mix, shard=min(8_192, max(1, options.windows // 8)))
-    return plan_of(mix, options.models, 0, options.windows)
+    return make_plan(mix, options.models, 0, options.windows)
 
 
 def measure_row(options: argparse.Namespace) -> dict:
@@ -75,7 +75,7 @@ def measure_row(options: argparse.Namespace) -> dict:
     engines.run = timed
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        generate.generate_fleet(Path(folder) / "set", plan, workers, engine, tell=lambda line: None)
+        generate.generate_data_set(Path(folder) / "set", plan, workers, engine, tell=lambda line: None)
         seconds = time.perf_counter() - began
         num_bytes = sum(file.stat().st_size for file in (Path(folder) / "set").glob("shard-*.parquet"))
         checksums = generate.read_manifest(Path(folder) / "set")["shards"]

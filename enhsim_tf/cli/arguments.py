@@ -72,7 +72,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="training iterations of the noise networks (default: 1000)")
     fit.add_argument("--workers", metavar="auto|N", help="channels fitted in parallel, two threads each (default: auto, one per core)")
     fit.add_argument(
-        "--engine", choices=("local", "ray"), default="local", help="run workers on this machine (default) or with Ray (docs/fleet.md)"
+        "--engine",
+        choices=("local", "ray"),
+        default="local",
+        help="run workers on this machine (default) or with Ray (docs/large_data_sets.md)",
     )
     _add_seed(fit)
 
@@ -102,7 +105,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
     generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
     generate.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet file, or a folder for several channels")
-    large = generate.add_argument_group("large data sets", "with any of these options, OUT is a folder of many files (docs/fleet.md)")
+    large = generate.add_argument_group(
+        "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
+    )
     large.add_argument("--workers", metavar="auto|N", help="number of worker processes (default: auto, one per core)")
     large.add_argument(
         "--engine", choices=("local", "ray"), help="run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS"

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from enhsim_tf.cli.options import cleaning_of, tell_failed
+from enhsim_tf.cli.options import cleaning_options, tell_failed
 from enhsim_tf.common.console import tell
 
 
@@ -23,7 +23,7 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.enhanced_simulator.fit_many import fit_channels  # imported here, because pandas is slow to import
     from enhsim_tf.telemetry.sources import read_source
 
-    cleaning = cleaning_of(options, options.window or 64)
+    cleaning = cleaning_options(options, options.window or 64)
     series = read_source(options.source, options.column, options.time, cleaning)
     is_terminal = sys.stdout.isatty()
     failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, speaks=not is_terminal)

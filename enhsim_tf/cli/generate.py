@@ -2,7 +2,7 @@
 
 import argparse
 
-from enhsim_tf.cli.options import counted, for_each, load, outputs_of
+from enhsim_tf.cli.options import counted, for_each, load, output_paths
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -22,20 +22,20 @@ def run_generate(options: argparse.Namespace) -> int:
             f"Expected --start only together with --continuous. Received: --start {options.start} with --windows. Leave it out."
         )
     if options.workers or options.engine or options.scenarios:
-        from enhsim_tf.cli.generate_many import run_fleet
+        from enhsim_tf.cli.generate_many import run_generate_many
 
-        return run_fleet(options, tell)
+        return run_generate_many(options, tell)
     options.seed = options.seed or 0
     from enhsim_tf.datasets.labelled_windows import (
         divide_windows,
-        num_samples_of,
         parse_length,
+        parse_num_samples,
         parse_scenario,
-        start_of,
+        parse_start,
         write_series_labelled,
         write_windows_labelled,
     )
-    from enhsim_tf.datasets.scenario_file import mix_of
+    from enhsim_tf.datasets.scenario_file import make_mix
 
     scenarios = [parse_scenario(text) for text in options.scenario]
     if options.windows is None and options.continuous is None:
@@ -45,14 +45,14 @@ def run_generate(options: argparse.Namespace) -> int:
     if options.continuous is not None and len(scenarios) > 1:
         raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write one series for each.")
     nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
-    shares = divide_windows(mix_of(scenarios, nominal_share), options.windows, options.seed) if options.windows else []
-    start = None if options.start is None else start_of(options.start)
+    shares = divide_windows(make_mix(scenarios, nominal_share), options.windows, options.seed) if options.windows else []
+    start = None if options.start is None else parse_start(options.start)
     if options.continuous is not None:
         parse_length(options.continuous)
     from enhsim_tf.enhanced_simulator.model_folder import chosen_of, models_of
 
     models = chosen_of(models_of(options.models), options.channel)
-    paths = outputs_of(options.out, models, (".parquet",))
+    paths = output_paths(options.out, models, (".parquet",))
 
     def write(channel: str) -> None:
         simulator = load(models[channel])
@@ -60,7 +60,7 @@ def run_generate(options: argparse.Namespace) -> int:
             write_windows_labelled(paths[channel], simulator, shares)
             what = f"{counted(options.windows, 'window')} of {simulator.window} samples"
         else:
-            length = num_samples_of(options.continuous, simulator.interval_s)
+            length = parse_num_samples(options.continuous, simulator.interval_s)
             scenario = scenarios[0] if scenarios else None
             write_series_labelled(paths[channel], simulator, length, scenario, options.seed, start)
             what = f"{counted(length, 'sample')}, one every {simulator.interval_s:g} s"

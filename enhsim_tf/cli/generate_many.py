@@ -7,14 +7,14 @@ from pathlib import Path
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.engines import parse_workers
-from enhsim_tf.datasets.generate import generate_fleet
+from enhsim_tf.datasets.generate import generate_data_set
 from enhsim_tf.datasets.labelled_windows import parse_scenario
-from enhsim_tf.datasets.plan import Plan, plan_of
-from enhsim_tf.datasets.scenario_file import Mix, ModelShare, mix_of, read_mix
+from enhsim_tf.datasets.plan import Plan, make_plan
+from enhsim_tf.datasets.scenario_file import Mix, ModelShare, make_mix, read_mix
 from enhsim_tf.enhanced_simulator.model_folder import chosen_of, folder_of, models_of
 
 
-def run_fleet(options: argparse.Namespace, tell: Callable[[str], None]) -> int:
+def run_generate_many(options: argparse.Namespace, tell: Callable[[str], None]) -> int:
     """Generates one data set per channel, or one data set from several models, and returns the exit code.
 
     Args:
@@ -22,13 +22,13 @@ def run_fleet(options: argparse.Namespace, tell: Callable[[str], None]) -> int:
         tell: Function that is called with each line of output.
     """
     workers = parse_workers(options.workers)
-    plans = plans_of(options)  # all plans are checked before the first data set is generated
+    plans = make_plans(options)  # all plans are checked before the first data set is generated
     for out, plan in plans.items():
-        generate_fleet(out, plan, workers, options.engine or "local", tell)
+        generate_data_set(out, plan, workers, options.engine or "local", tell)
     return 0
 
 
-def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
+def make_plans(options: argparse.Namespace) -> dict[Path, Plan]:
     """Returns the plan of each data set, by its output folder.
 
     Args:
@@ -40,7 +40,7 @@ def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
     if options.continuous is not None:
         raise InputError("Expected --windows with --workers, --engine or --scenarios. Received: --continuous.")
     if options.scenarios is None:
-        mix = mix_of([parse_scenario(text) for text in options.scenario], 0.5 if options.nominal_share is None else options.nominal_share)
+        mix = make_mix([parse_scenario(text) for text in options.scenario], 0.5 if options.nominal_share is None else options.nominal_share)
     elif options.scenario or options.nominal_share is not None:
         raise InputError(
             "Expected scenarios in one place. Received: --scenarios with --scenario or --nominal-share. Put them all in the file."
@@ -54,12 +54,12 @@ def plans_of(options: argparse.Namespace) -> dict[Path, Plan]:
             raise InputError(
                 "Expected models in one place. Received: --channel, and a scenario file that names models. Leave out --channel."
             )
-        return {options.out: plan_of(mix, options.models, seed, num_windows)}
+        return {options.out: make_plan(mix, options.models, seed, num_windows)}
     models = chosen_of(models_of(options.models), options.channel)
     plans = {}
     for name, folder in models.items():
         out = options.out if len(models) == 1 else folder_of(options.out, name)
-        plans[out] = plan_of(_named(mix, name), folder, seed, num_windows)
+        plans[out] = make_plan(_named(mix, name), folder, seed, num_windows)
     return plans
 
 

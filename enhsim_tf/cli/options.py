@@ -51,7 +51,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
 
 
-def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
+def cleaning_options(options: argparse.Namespace, min_part: int) -> "Cleaning":
     """Returns the cleaning settings given by the options.
 
     Args:
@@ -71,7 +71,7 @@ def cleaning_of(options: argparse.Namespace, min_part: int) -> "Cleaning":
     )
 
 
-def outputs_of(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
+def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) -> dict[str, Path]:
     """Returns the output file of each channel.
 
     Args:

@@ -3,7 +3,7 @@
 import argparse
 import os
 
-from enhsim_tf.cli.options import cleaning_of, counted, for_each, load, outputs_of
+from enhsim_tf.cli.options import cleaning_options, counted, for_each, load, output_paths
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -19,7 +19,7 @@ def run_score(options: argparse.Namespace) -> int:
 
     detector = {option_name(name): name for name in DETECTORS}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
-    cleaning = cleaning_of(options, 2)
+    cleaning = cleaning_options(options, 2)
     from enhsim_tf.enhanced_simulator.model_folder import models_of
     from enhsim_tf.telemetry.cleaning.clean import clean
     from enhsim_tf.telemetry.sources import read_source
@@ -34,7 +34,7 @@ def run_score(options: argparse.Namespace) -> int:
         raise InputError(
             f"Expected fitted channels: {printable(known)}. Received: {unknown[0]!r}. Select the channels to score with --column."
         )
-    paths = outputs_of(options.out, series, (".parquet", ".csv"))
+    paths = output_paths(options.out, series, (".parquet", ".csv"))
     for path in paths.values():
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
             raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")

@@ -18,9 +18,9 @@ import filelock
 from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import read_json
-from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan, key_of
+from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan, plan_key
 from enhsim_tf.datasets.scenario_file import MOST_WINDOWS
-from enhsim_tf.datasets.shard import Record, file_of, schema_of
+from enhsim_tf.datasets.shard import Record, shard_file, shard_schema
 
 MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
 _SHARD = re.compile(r"shard-(\d{6,})\.parquet")
@@ -132,7 +132,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def _record_of(number: int, content: Mapping[str, Any]) -> Record:
     record = Record(number, content["rows"], content["sha256"])
-    if not _is_record(record) or content["file"] != file_of(number):
+    if not _is_record(record) or content["file"] != shard_file(number):
         raise ValueError(f"what is recorded of shard {number}")
     return record
 
@@ -206,7 +206,7 @@ def finish_manifest(folder: Path, plan: Plan, records: Mapping[int, Record]) -> 
         records: The records of all shards, by the number of the shard.
     """
     shards = [
-        {"file": file_of(number), "rows": records[number].rows, "sha256": records[number].sha256} for number in range(plan.num_shards)
+        {"file": shard_file(number), "rows": records[number].rows, "sha256": records[number].sha256} for number in range(plan.num_shards)
     ]
     write_json(folder / MANIFEST, {"format": FORMAT, "settings": plan.settings(), "shards": shards})
     (folder / JOURNAL).unlink(missing_ok=True)
@@ -215,12 +215,12 @@ def finish_manifest(folder: Path, plan: Plan, records: Mapping[int, Record]) -> 
 def is_intact(folder: Path, record: Record) -> bool:
     """Whether the file of a shard exists and has the recorded checksum."""
     try:
-        return sha256(folder / file_of(record.shard)) == record.sha256
+        return sha256(folder / shard_file(record.shard)) == record.sha256
     except OSError:
         return False
 
 
-def problems_of(folder: str | os.PathLike) -> Iterable[str]:
+def find_problems(folder: str | os.PathLike) -> Iterable[str]:
     """Verifies a data set against its manifest and yields one line for each problem.
 
     Args:
@@ -241,9 +241,9 @@ def problems_of(folder: str | os.PathLike) -> Iterable[str]:
         return
     if len(records) != expected or sum(record.rows for record in records) != settings["windows"]:
         yield f"{MANIFEST}: {len(records):,} shards recorded of {expected:,}, {sum(record.rows for record in records):,} windows"
-    schema = schema_of(settings, key_of(settings))
+    schema = shard_schema(settings, plan_key(settings))
     for record in records:
-        path = folder / file_of(record.shard)
+        path = folder / shard_file(record.shard)
         if not path.is_file():
             yield f"{path.name}: missing"
         elif not is_intact(folder, record):
@@ -258,7 +258,7 @@ def problems_of(folder: str | os.PathLike) -> Iterable[str]:
                 yield f"{path.name}: {num_rows:,} windows, {record.rows:,} recorded"
             if not found.equals(schema) or found.metadata != schema.metadata:
                 yield f"{path.name}: its columns or settings differ from those of the manifest"
-    known = {file_of(record.shard) for record in records}
+    known = {shard_file(record.shard) for record in records}
     for path in sorted(folder.iterdir()):
         if path.name not in known and (_SHARD.fullmatch(path.name) or path.name == JOURNAL):
             yield f"{path.name}: not a file of this data set"

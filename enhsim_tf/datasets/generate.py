@@ -18,21 +18,21 @@ from enhsim_tf.common.parallel import engines
 from enhsim_tf.datasets.folder import (
     MANIFEST,
     check_folder,
+    find_problems,
     finish_manifest,
     is_intact,
     locked,
     open_journal,
-    problems_of,
     read_manifest,
     read_records,
     remove_temporary_files,
     start_manifest,
 )
 from enhsim_tf.datasets.plan import Plan
-from enhsim_tf.datasets.shard import Record, ShardMaker, file_of
+from enhsim_tf.datasets.shard import Record, ShardMaker, shard_file
 
 
-def generate_fleet(
+def generate_data_set(
     out: str | os.PathLike, plan: Plan, workers: int | None = None, engine: str = "local", tell: Callable[[str], None] = print
 ) -> None:
     """Generates a data set, or the missing shards of a data set.
@@ -72,7 +72,7 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
     records: dict[int, Record] = {}
     for number in progress(range(plan.num_shards), "checking", unit="shards", disable=quiet or not recorded, leave=False):
         record = recorded.get(number)
-        if record is not None and record.rows == plan.rows_of(number) and is_intact(out, record):
+        if record is not None and record.rows == plan.num_windows_in(number) and is_intact(out, record):
             records[number] = record
     if recorded:
         tell(f"{len(records):,} of {plan.num_shards:,} shards are there and intact; {plan.num_shards - len(records):,} to generate")
@@ -85,12 +85,12 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
             before = recorded.get(record.shard, record)
             if before.sha256 != record.sha256 and before.rows == record.rows:
                 raise InputError(
-                    f"Expected {file_of(record.shard)} to match its record in {out}. Received: other bytes, because this machine computes "
+                    f"Expected {shard_file(record.shard)} to match its record in {out}. Received: other bytes, because this machine computes "
                     f"different results or the record is damaged. Remove {MANIFEST} and run the same command again to generate all shards."
                 )
-            if not (out / file_of(record.shard)).is_file():
+            if not (out / shard_file(record.shard)).is_file():
                 raise InputError(
-                    f"Expected {file_of(record.shard)} in {out} after it was written. Received: no such file, because another machine wrote it elsewhere. "
+                    f"Expected {shard_file(record.shard)} in {out} after it was written. Received: no such file, because another machine wrote it elsewhere. "
                     "Give an --out that all machines share."
                 )
             write(record)
@@ -116,7 +116,7 @@ def verify(folder: str | os.PathLike, tell: Callable[[str], None] = print) -> in
         InputError: If the folder is not a data set, or if its manifest is damaged.
     """
     num_problems = 0
-    for line in problems_of(folder):
+    for line in find_problems(folder):
         num_problems += 1
         tell(line)
     if not num_problems:

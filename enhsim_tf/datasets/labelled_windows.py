@@ -85,7 +85,7 @@ def parse_length(text: str) -> tuple[float, str]:
     return (length * _SECONDS[found["unit"]], "s") if found["unit"] else (length, "samples")
 
 
-def num_samples_of(text: str, interval_s: float) -> int:
+def parse_num_samples(text: str, interval_s: float) -> int:
     """Converts a length to a number of samples.
 
     Args:
@@ -105,7 +105,7 @@ def num_samples_of(text: str, interval_s: float) -> int:
     return samples
 
 
-def start_of(start: "str | pd.Timestamp") -> "pd.Timestamp":
+def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
     """Converts a start time to UTC. A time without a time zone is taken as UTC.
 
     Args:
@@ -129,7 +129,7 @@ def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     """Divides windows between nominal telemetry and scenarios. Scenarios get equal numbers; the first ones get the remainder.
 
     Args:
-        mix: Scenarios with equal shares and fixed severities, as from `mix_of`.
+        mix: Scenarios with equal shares and fixed severities, as from `make_mix`.
         num_windows: Total number of windows.
         seed: Random seed of the whole set.
 
@@ -152,7 +152,7 @@ def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
-def columns_of(window: int) -> dict[str, "pa.DataType"]:
+def window_columns(window: int) -> dict[str, "pa.DataType"]:
     """Returns the columns of labelled windows and their types.
 
     Args:
@@ -177,7 +177,7 @@ def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulato
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = pa.schema(columns_of(simulator.window)).with_metadata(
+    schema = pa.schema(window_columns(simulator.window)).with_metadata(
         {"interval_s": repr(simulator.interval_s), "channel": str(simulator.trained.get("telemetry", ""))}
     )
     make_folder(Path(path).parent)
@@ -224,7 +224,7 @@ def series_labelled(
     seconds = np.arange(num_samples) * simulator.interval_s
     index = pd.Index(seconds, name="time_s")
     if start is not None:
-        index = pd.DatetimeIndex(start_of(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"), name="time")
+        index = pd.DatetimeIndex(parse_start(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"), name="time")
     late = np.zeros(num_samples, bool) if onset is None else np.arange(num_samples) >= onset
     columns = {
         "value": simulator.generate_series(num_samples, scenario, seed),

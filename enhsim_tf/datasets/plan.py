@@ -94,7 +94,7 @@ class Plan:
         """Number of shards."""
         return -(-self.num_windows // self.shard)
 
-    def rows_of(self, shard: int) -> int:
+    def num_windows_in(self, shard: int) -> int:
         """Returns the number of windows in a shard."""
         return min(self.shard, self.num_windows - shard * self.shard)
 
@@ -118,10 +118,10 @@ class Plan:
     @property
     def key(self) -> str:
         """Checksum of all settings except the number of windows. Shards with equal key, number and size have identical bytes."""
-        return key_of(self.settings())
+        return plan_key(self.settings())
 
 
-def key_of(settings: Mapping[str, Any]) -> str:
+def plan_key(settings: Mapping[str, Any]) -> str:
     """Returns the `Plan.key` for given settings.
 
     Args:
@@ -131,7 +131,7 @@ def key_of(settings: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
 
-def plan_of(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) -> Plan:
+def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) -> Plan:
     """Makes the plan of a data set.
 
     Args:

@@ -69,7 +69,7 @@ class Mix:
     shard: int | None = None
 
 
-def mix_of(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
+def make_mix(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
     """Makes the mix given by the options `--scenario` and `--nominal-share`. All scenarios get equal shares.
 
     Args:

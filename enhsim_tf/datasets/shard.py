@@ -18,7 +18,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.labelled_windows import NOMINAL, columns_of
+from enhsim_tf.datasets.labelled_windows import NOMINAL, window_columns
 from enhsim_tf.datasets.plan import FORMAT, Plan
 from enhsim_tf.enhanced_simulator.batches import complete_batch
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
@@ -53,7 +53,7 @@ class Rows(NamedTuple):
     level: np.ndarray
 
 
-def file_of(shard: int) -> str:
+def shard_file(shard: int) -> str:
     """Returns the file name of a shard.
 
     Args:
@@ -77,7 +77,7 @@ def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.ran
     """
     seeds = np.random.SeedSequence([_STREAM, plan.seed, shard]).spawn(4)
     mixing, placing, happening, noise = map(np.random.default_rng, seeds)
-    num_rows = plan.rows_of(shard)
+    num_rows = plan.num_windows_in(shard)
     model = systematic([model.share for model in plan.models], num_rows, mixing)
     scenario = systematic([plan.mix.nominal, *(part.share for part in plan.mix.scenarios)], num_rows, mixing)
     ranges = np.array([((0, 0), (0, 0)), *((part.severity, part.onset) for part in plan.mix.scenarios)], float)[scenario]
@@ -139,7 +139,7 @@ def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
     return Degraded(plan.mix.scenarios[number - 1].mode, float(rows.severity[row]), float(rows.onset[row]))
 
 
-def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
+def shard_schema(settings: dict[str, Any], key: str) -> "pa.Schema":
     """Returns the Parquet schema of the shards of a data set, with format, key and sampling interval in its metadata.
 
     Args:
@@ -148,7 +148,7 @@ def schema_of(settings: dict[str, Any], key: str) -> "pa.Schema":
     """
     import pyarrow as pa
 
-    columns = columns_of(settings["window"])
+    columns = window_columns(settings["window"])
     if len(settings["models"]) > 1:
         columns["model"] = pa.string()
     return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})
@@ -215,11 +215,11 @@ class ShardMaker:
         ]
         if len(self.plan.models) > 1:
             columns.append(pa.array(np.array([model.name for model in self.plan.models], object)[rows.model], pa.string()))
-        table = pa.table(columns, schema=schema_of(self.settings, self.key))
+        table = pa.table(columns, schema=shard_schema(self.settings, self.key))
         names = [name for name in ("scenario", "model") if name in table.column_names]
         # stores bytes of equal significance together: signs and exponents compress well, mantissas of noise do not
         options = {"use_dictionary": names, "column_encoding": {"window.list.element": "BYTE_STREAM_SPLIT"}, "write_statistics": names}
-        path = self.folder / file_of(shard)
+        path = self.folder / shard_file(shard)
         try:
             with replace_file(path) as temporary:
                 pq.write_table(table, temporary, row_group_size=_ROW_GROUP, compression="zstd", **options)

@@ -164,12 +164,12 @@ from pathlib import Path
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
 from enhsim_tf.datasets.scenario_file import read_mix
-from enhsim_tf.datasets.folder import problems_of
+from enhsim_tf.datasets.folder import find_problems
 import pyarrow.parquet, pandas, yaml
 path = Path(sys.argv[1])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 try:
-    {"json": lambda: list(problems_of(path.parent)), "yaml": lambda: read_mix(path)}.get(path.suffix[1:], lambda: read_source(path))()
+    {"json": lambda: list(find_problems(path.parent)), "yaml": lambda: read_mix(path)}.get(path.suffix[1:], lambda: read_source(path))()
 except InputError as error:
     print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024, error)
 """

@@ -22,10 +22,10 @@ from enhsim_tf.cli import generate_many
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.datasets import generate
 from enhsim_tf.datasets.folder import locked
-from enhsim_tf.datasets.generate import generate_fleet, verify
-from enhsim_tf.datasets.plan import plan_of
+from enhsim_tf.datasets.generate import generate_data_set, verify
+from enhsim_tf.datasets.plan import make_plan
 from enhsim_tf.datasets.scenario_file import Mix
-from enhsim_tf.datasets.shard import file_of
+from enhsim_tf.datasets.shard import shard_file
 from tests.faults.small_data_set import PlainMaker, plan
 
 ROOT = Path(__file__).parents[2]
@@ -58,7 +58,7 @@ def undisturbed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed") / "set"
     before = generate.ShardMaker, generate.engines.run
     generate.ShardMaker, generate.engines.run = PlainMaker, serial
-    generate_fleet(folder, plan(), tell=lambda line: None)
+    generate_data_set(folder, plan(), tell=lambda line: None)
     generate.ShardMaker, generate.engines.run = before
     return folder
 
@@ -84,7 +84,7 @@ def told(call, *arguments, **options):
 
 def test_the_manifest_contains_settings_and_records(undisturbed):
     manifest = json.loads((undisturbed / "_manifest.json").read_text())
-    assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(file_of(shard) for shard in range(20))])
+    assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(shard_file(shard) for shard in range(20))])
     assert (
         manifest["format"] == "enhsim_tf.datasets.generate/1" and manifest["settings"]["seed"] == 3 and manifest["settings"]["window"] == 60
     )
@@ -97,15 +97,15 @@ def test_the_manifest_contains_settings_and_records(undisturbed):
 
 def test_a_second_run_finds_all_shards(undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
-    lines = told(generate_fleet, folder, plan())
+    lines = told(generate_data_set, folder, plan())
     assert lines[0].startswith("20 of 20 shards") and here == [] and content_of(folder) == content_of(undisturbed)
 
 
 DAMAGES = {
-    "shards removed": lambda folder: [(folder / file_of(shard)).unlink() for shard in (3, 7)],
-    "shards cut": lambda folder: [os.truncate(folder / file_of(shard), 1_000) for shard in (3, 7)],
-    "a byte changed": lambda folder: [flip(folder / file_of(shard)) for shard in (3, 7)],
-    "shards exchanged": lambda folder: exchange(folder / file_of(3), folder / file_of(7)),
+    "shards removed": lambda folder: [(folder / shard_file(shard)).unlink() for shard in (3, 7)],
+    "shards cut": lambda folder: [os.truncate(folder / shard_file(shard), 1_000) for shard in (3, 7)],
+    "a byte changed": lambda folder: [flip(folder / shard_file(shard)) for shard in (3, 7)],
+    "shards exchanged": lambda folder: exchange(folder / shard_file(3), folder / shard_file(7)),
 }
 
 
@@ -126,8 +126,8 @@ def test_damaged_shards_are_found_and_generated_again(name, undisturbed, tmp_pat
     folder = copy_of(undisturbed, tmp_path / "set")
     DAMAGES[name](folder)
     lines = told(verify, folder)
-    assert len(lines) == 2 and [line.split(":")[0] for line in lines] == [file_of(3), file_of(7)]
-    assert told(generate_fleet, folder, plan())[0].startswith("18 of 20 shards") and here == [3, 7]
+    assert len(lines) == 2 and [line.split(":")[0] for line in lines] == [shard_file(3), shard_file(7)]
+    assert told(generate_data_set, folder, plan())[0].startswith("18 of 20 shards") and here == [3, 7]
     assert content_of(folder) == content_of(undisturbed) and verify(folder, lambda line: None) == 0
 
 
@@ -139,8 +139,8 @@ def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
     (folder / "_journal.jsonl").write_bytes(b"".join(lines) + tail)
     (folder / "_manifest.json").write_text(json.dumps(manifest | {"shards": None}))
     for shard in set(range(20)) - set(done):
-        (folder / file_of(shard)).unlink()
-    (folder / f".{file_of(9)}.host.123.0123abcd.parquet").write_bytes(b"half")
+        (folder / shard_file(shard)).unlink()
+    (folder / f".{shard_file(9)}.host.123.0123abcd.parquet").write_bytes(b"half")
     return folder
 
 
@@ -157,7 +157,7 @@ def begun(folder, undisturbed, done=(0, 1, 2, 5), tail=b""):
 def test_a_run_resumes_after_the_finished_shards(tail, undisturbed, tmp_path, here):
     folder = begun(tmp_path / "set", undisturbed, tail=tail)
     assert told(verify, folder)[0].startswith("not finished")
-    told(generate_fleet, folder, plan())
+    told(generate_data_set, folder, plan())
     assert here == [shard for shard in range(20) if shard not in (0, 1, 2, 5)]
     assert content_of(folder) == content_of(undisturbed)
 
@@ -166,16 +166,16 @@ def test_a_journal_continues_after_an_incomplete_line(undisturbed, tmp_path, mon
     folder = begun(tmp_path / "set", undisturbed, tail=b'[3, 50, "01')
     monkeypatch.setattr(generate.engines, "run", lambda engine, work, numbers, workers: serial(engine, work, itertools.islice(numbers, 3)))
     with pytest.raises(KeyError):  # this engine stops after three shards
-        told(generate_fleet, folder, plan())
+        told(generate_data_set, folder, plan())
     monkeypatch.setattr(generate.engines, "run", serial)
-    assert told(generate_fleet, folder, plan())[0].startswith("7 of 20 shards")
+    assert told(generate_data_set, folder, plan())[0].startswith("7 of 20 shards")
     assert content_of(folder) == content_of(undisturbed)
 
 
 def test_a_removed_manifest_is_written_again(undisturbed, tmp_path, here):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").unlink()
-    told(generate_fleet, folder, plan())
+    told(generate_data_set, folder, plan())
     assert len(here) == 20 and content_of(folder) == content_of(undisturbed)
 
 
@@ -195,7 +195,7 @@ def test_a_removed_manifest_is_written_again(undisturbed, tmp_path, here):
 def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
-    for call in (lambda: generate_fleet(folder, plan()), lambda: verify(folder)):
+    for call in (lambda: generate_data_set(folder, plan()), lambda: verify(folder)):
         with refused("_manifest.json", "Remove it"):
             call()
     assert not here
@@ -219,8 +219,8 @@ def test_a_shard_that_does_not_match_its_record_is_an_error(undisturbed, tmp_pat
     manifest = json.loads((folder / "_manifest.json").read_text())
     manifest["shards"][4]["sha256"] = "0" * 64
     (folder / "_manifest.json").write_text(json.dumps(manifest))
-    with refused(file_of(4), "computes different results"):
-        generate_fleet(folder, plan())
+    with refused(shard_file(4), "computes different results"):
+        generate_data_set(folder, plan())
 
 
 def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, here, monkeypatch, refused):
@@ -228,22 +228,22 @@ def test_a_shard_written_to_the_disk_of_another_machine_is_an_error(tmp_path, he
         def __call__(self, shard):
             record = super().__call__(shard)
             if shard == 3:
-                (self.folder / file_of(shard)).unlink()
+                (self.folder / shard_file(shard)).unlink()
             return record
 
     maker = generate.ShardMaker
     monkeypatch.setattr(generate, "ShardMaker", Elsewhere)
-    with refused(file_of(3), "all machines share"):
-        generate_fleet(tmp_path / "set", plan())
+    with refused(shard_file(3), "all machines share"):
+        generate_data_set(tmp_path / "set", plan())
     monkeypatch.setattr(generate, "ShardMaker", maker)
-    assert told(generate_fleet, tmp_path / "set", plan())[0].startswith("3 of 20 shards")
+    assert told(generate_data_set, tmp_path / "set", plan())[0].startswith("3 of 20 shards")
 
 
 def test_shards_of_a_larger_data_set_are_refused(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").unlink()
-    with refused(file_of(10)):
-        generate_fleet(folder, plan(500))
+    with refused(shard_file(10)):
+        generate_data_set(folder, plan(500))
     assert not here
 
 
@@ -252,7 +252,7 @@ def test_locking_a_folder_writes_only_the_lock_file(tmp_path, refused):
         assert os.listdir(tmp_path / "above" / "set") == [".lock"]
     (tmp_path / "file").touch()
     with refused("can be written to"):
-        generate_fleet(tmp_path / "file" / "set", plan())
+        generate_data_set(tmp_path / "file" / "set", plan())
 
 
 @pytest.mark.parametrize("reason", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
@@ -300,7 +300,7 @@ def test_a_closed_pipe_is_not_reported_as_an_error_of_the_folder(tmp_path, here)
         raise BrokenPipeError
 
     with pytest.raises(BrokenPipeError):
-        generate_fleet(tmp_path / "set", plan(), tell=left)
+        generate_data_set(tmp_path / "set", plan(), tell=left)
 
 
 # other folders
@@ -322,7 +322,7 @@ def test_a_data_set_with_other_settings_is_left_unchanged(other, words, finished
     folder = copy_of(undisturbed, tmp_path / "set") if finished else begun(tmp_path / "set", undisturbed)
     before = content_of(folder)
     with refused(*words, "--out"):
-        generate_fleet(folder, other)
+        generate_data_set(folder, other)
     assert content_of(folder) == before and not here
 
 
@@ -330,30 +330,30 @@ def test_a_run_with_other_library_versions_does_not_resume(undisturbed, tmp_path
     folder, known = begun(tmp_path / "set", undisturbed), importlib.metadata.version
     monkeypatch.setattr(importlib.metadata, "version", lambda name: "9.9" if name == "keras" else known(name))
     with refused("versions", "9.9"):
-        generate_fleet(folder, plan())
+        generate_data_set(folder, plan())
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "shard-000000.parquet", "training.parquet", "folder"])
 def test_a_folder_with_other_content_is_left_unchanged(name, tmp_path, here, refused):
     (tmp_path / name).mkdir() if name == "folder" else (tmp_path / name).write_text("mine")
     with refused(name):
-        generate_fleet(tmp_path, plan())
+        generate_data_set(tmp_path, plan())
     assert [path.name for path in tmp_path.iterdir()] == [name] and not here
 
 
 def test_shards_of_another_data_set_are_not_overwritten(undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").unlink()
-    with refused(file_of(0)):
-        generate_fleet(folder, plan(seed=4))
+    with refused(shard_file(0)):
+        generate_data_set(folder, plan(seed=4))
 
 
 def test_outputs_that_are_not_folders_are_refused(tmp_path, here, refused):
     (tmp_path / "file").touch()
     with refused("folder"):
-        generate_fleet(tmp_path / "file", plan())
+        generate_data_set(tmp_path / "file", plan())
     with refused("folder"):
-        generate_fleet(tmp_path / "set.parquet", plan())
+        generate_data_set(tmp_path / "set.parquet", plan())
 
 
 @pytest.mark.parametrize("extra", ["shard-000020.parquet", "_journal.jsonl"])
@@ -368,14 +368,14 @@ def test_verify_checks_content_with_a_correct_checksum(undisturbed, tmp_path):
 
     folder = copy_of(undisturbed, tmp_path / "set")
     manifest = json.loads((folder / "_manifest.json").read_text())
-    pq.write_table(pq.read_table(folder / file_of(0)).slice(1), folder / file_of(0))
-    pq.write_table(pq.read_table(folder / file_of(1)).drop(["onset"]), folder / file_of(1))
-    (folder / file_of(2)).write_text("no table")
+    pq.write_table(pq.read_table(folder / shard_file(0)).slice(1), folder / shard_file(0))
+    pq.write_table(pq.read_table(folder / shard_file(1)).drop(["onset"]), folder / shard_file(1))
+    (folder / shard_file(2)).write_text("no table")
     for shard in range(3):
-        manifest["shards"][shard]["sha256"] = sha256(folder / file_of(shard))
+        manifest["shards"][shard]["sha256"] = sha256(folder / shard_file(shard))
     (folder / "_manifest.json").write_text(json.dumps(manifest))
     lines = told(verify, folder)
-    assert [line.split(":")[0] for line in lines] == [file_of(0), file_of(1), file_of(2)]
+    assert [line.split(":")[0] for line in lines] == [shard_file(0), shard_file(1), shard_file(2)]
     assert "49 windows, 50 recorded" in lines[0] and "columns" in lines[1] and "not a Parquet file" in lines[2]
 
 
@@ -467,7 +467,7 @@ def test_a_disk_that_becomes_full_while_records_are_written(undisturbed, tmp_pat
 
     monkeypatch.setattr(shard_folder.json, "dumps", full)
     with refused("No space left"):
-        generate_fleet(folder, plan())
+        generate_data_set(folder, plan())
     monkeypatch.undo()
     assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
 
@@ -517,7 +517,7 @@ def test_the_command_writes_the_same_bytes_as_one_process(models, tmp_path, monk
     assert main(["generate", str(models), "--scenarios", str(mix), "--workers", "2", "--out", str(tmp_path / "set")]) == 0
     assert capsys.readouterr().out.startswith("150 windows of 60 samples in 3 shards")
     monkeypatch.setattr(generate.engines, "run", serial)
-    generate_fleet(tmp_path / "serial", plan_of(generate_many.read_mix(mix), models, 5, 150), tell=lambda line: None)
+    generate_data_set(tmp_path / "serial", make_plan(generate_many.read_mix(mix), models, 5, 150), tell=lambda line: None)
     assert content_of(tmp_path / "set") == content_of(tmp_path / "serial")
     assert main(["verify", str(tmp_path / "set")]) == 0
 
@@ -567,7 +567,7 @@ def test_contradicting_options_are_refused(options, words, models, tmp_path, mon
 # reading
 
 
-DOCS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8"), re.DOTALL)
+DOCS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "large_data_sets.md").read_text(encoding="utf-8"), re.DOTALL)
 
 
 @pytest.mark.parametrize(("number", "library"), list(enumerate(("pandas", "pyarrow.dataset", "tensorflow"))))
@@ -576,7 +576,7 @@ def test_the_reading_examples_of_the_documentation_return_the_data_set(number, l
     code = DOCS[number].replace('"training"', '"set"')
     assert f"import {library}" in code and len(DOCS) == 3
     names = {}
-    exec(compile(code, "docs/fleet.md", "exec"), names)
+    exec(compile(code, "docs/large_data_sets.md", "exec"), names)
     import pandas as pd
 
     table = pd.read_parquet(sorted(undisturbed.glob("shard-*.parquet")))

@@ -13,15 +13,15 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimula
 from enhsim_tf.datasets.labelled_windows import (
     Share,
     divide_windows,
-    num_samples_of,
     parse_length,
+    parse_num_samples,
     parse_scenario,
+    parse_start,
     series_labelled,
-    start_of,
     write_series_labelled,
     write_windows_labelled,
 )
-from enhsim_tf.datasets.scenario_file import mix_of
+from enhsim_tf.datasets.scenario_file import make_mix
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise.surrogates import GaussianNoise
 
@@ -89,7 +89,7 @@ def test_invalid_scenarios_are_refused(refused, text):
     ],
 )
 def test_lengths_are_converted_to_samples(text, interval_s, expected):
-    assert num_samples_of(text, interval_s) == expected
+    assert parse_num_samples(text, interval_s) == expected
 
 
 @pytest.mark.parametrize(
@@ -105,19 +105,19 @@ def test_invalid_lengths_are_refused(refused, text):
 def test_lengths_out_of_range_for_the_interval_are_refused(refused, text, interval_s):
     assert parse_length(text)
     with refused(f"one every {interval_s:g} s", repr(text)):
-        num_samples_of(text, interval_s)
+        parse_num_samples(text, interval_s)
 
 
 def test_start_times_are_converted_to_utc():
-    assert start_of("2024-01-01") == pd.Timestamp("2024-01-01", tz="UTC")
-    assert start_of("2024-06-01T12:00+02:00") == pd.Timestamp("2024-06-01T10:00", tz="UTC")
-    assert start_of(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+    assert parse_start("2024-01-01") == pd.Timestamp("2024-01-01", tz="UTC")
+    assert parse_start("2024-06-01T12:00+02:00") == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+    assert parse_start(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp("2024-06-01T10:00", tz="UTC")
 
 
 @pytest.mark.parametrize("text", ["", "soon", "01.02.2024", "1066-10-14", "9999-01-01", "2024-13-01"])
 def test_invalid_start_times_are_refused(refused, text):
     with refused("2024-01-01"):
-        start_of(text)
+        parse_start(text)
 
 
 # division of windows
@@ -136,7 +136,7 @@ def test_invalid_start_times_are_refused(refused, text):
 )
 def test_windows_are_divided_between_scenarios(num_scenarios, num_windows, nominal_share, expected):
     scenarios = [Degraded(mode) for mode in list(MODES)[:num_scenarios]]
-    mix = mix_of(scenarios, nominal_share)
+    mix = make_mix(scenarios, nominal_share)
     shares = divide_windows(mix, num_windows, seed=3)
     assert [share.num_windows for share in shares] == expected and sum(expected) == num_windows
     present = ([None] if nominal_share or not scenarios else []) + (scenarios if nominal_share < 1 else [])
@@ -148,12 +148,12 @@ def test_windows_are_divided_between_scenarios(num_scenarios, num_windows, nomin
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
 def test_a_share_out_of_range_is_refused(refused, share):
     with refused("from 0 to 1"):
-        mix_of([Degraded("stuck")], share)
+        make_mix([Degraded("stuck")], share)
 
 
 def test_no_scenario_is_dropped_silently(refused):
     with refused("each of 3 scenarios", "4 windows"):
-        divide_windows(mix_of([Degraded("stuck"), Degraded("drift"), Degraded("dropout")], 0.5), 4, 0)
+        divide_windows(make_mix([Degraded("stuck"), Degraded("drift"), Degraded("dropout")], 0.5), 4, 0)
 
 
 # windows
@@ -163,7 +163,7 @@ def test_no_scenario_is_dropped_silently(refused):
 def written(tmp_path):
     """A training set, its shares and the simulator that generated it."""
     scenarios = [Degraded("stuck", 0.5, 0.4), Degraded("drift", 0.8, 0.29), Degraded("gain_loss", 0.0)]
-    shares, path = divide_windows(mix_of(scenarios, 0.25), 80, seed=7), tmp_path / "deep" / "training.parquet"
+    shares, path = divide_windows(make_mix(scenarios, 0.25), 80, seed=7), tmp_path / "deep" / "training.parquet"
     write_windows_labelled(path, known(), shares)
     return path, shares
 
@@ -218,7 +218,7 @@ def test_same_seed_same_bytes(tmp_path):
     scenarios = [Degraded("friction", 0.5), Degraded("dropout", 0.9)]
 
     def sums(seed):
-        write_windows_labelled(tmp_path / "windows.parquet", known(), divide_windows(mix_of(scenarios, 0.5), 50, seed))
+        write_windows_labelled(tmp_path / "windows.parquet", known(), divide_windows(make_mix(scenarios, 0.5), 50, seed))
         write_series_labelled(tmp_path / "series.parquet", known(), 700, scenarios[1], seed)
         return [hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() for name in ("windows.parquet", "series.parquet")]
 

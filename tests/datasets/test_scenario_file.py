@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare, mix_of, read_mix
+from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare, make_mix, read_mix
 
 DOCS = Path(__file__).parents[2] / "docs" / "scenarios.md"
 GOOD = {
@@ -57,10 +57,10 @@ def test_the_example_of_the_documentation_is_valid(tmp_path):
 
 
 def test_options_give_the_same_mix_as_a_file(tmp_path):
-    by_option = mix_of([Degraded("stuck", 0.5), Degraded("drift", 0.2, 0.0)], 0.4)
+    by_option = make_mix([Degraded("stuck", 0.5), Degraded("drift", 0.2, 0.0)], 0.4)
     text = "nominal: 0.4\nscenarios:\n- {mode: stuck, share: 0.3, severity: 0.5}\n- {mode: drift, share: 0.3, severity: 0.2, onset: 0}\n"
     assert read_mix(written(tmp_path / "mix.yaml", text)) == by_option
-    assert mix_of([], 0.5) == Mix(1.0)
+    assert make_mix([], 0.5) == Mix(1.0)
 
 
 def changed(*path, to):

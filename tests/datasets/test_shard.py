@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.datasets.plan import key_of, plan_of
+from enhsim_tf.datasets.plan import make_plan, plan_key
 from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare
-from enhsim_tf.datasets.shard import draw_rows, file_of, make_windows, schema_of, systematic
+from enhsim_tf.datasets.shard import draw_rows, make_windows, shard_file, shard_schema, systematic
 from tests.faults.small_data_set import COARSE, INTERVAL_S, WINDOW, Plain, PlainMaker, plan
 
 EVERY_MODE = ("stuck", "drift", "gain_loss", "period_change")  # the modes without random draws
@@ -21,7 +21,7 @@ ALL = Mix(0.2, tuple(ScenarioShare(mode, 0.2, (0.2, 0.9), (0.1, 0.7)) for mode i
 
 def table_of(maker, shard):
     record = maker(shard)
-    return record, pq.read_table(maker.folder / file_of(shard)).to_pandas()
+    return record, pq.read_table(maker.folder / shard_file(shard)).to_pandas()
 
 
 def test_each_window_agrees_with_its_labels(tmp_path):
@@ -99,21 +99,21 @@ def test_the_content_of_a_shard_file(tmp_path):
     family = plan(100, 100, shares=(0.25, 0.75))
     maker = PlainMaker(family, tmp_path)
     record, table = table_of(maker, 0)
-    schema = pq.read_schema(tmp_path / file_of(0))
+    schema = pq.read_schema(tmp_path / shard_file(0))
     assert list(table) == ["window", "scenario", "severity", "onset", "model"]
     assert table["model"].value_counts().to_dict() == {"model-0": 25, "model-1": 75}
     stated = json.loads(json.dumps(family.settings()))
-    assert schema.equals(schema_of(stated, key_of(stated))) and schema.metadata[b"settings"].decode() == family.key
+    assert schema.equals(shard_schema(stated, plan_key(stated))) and schema.metadata[b"settings"].decode() == family.key
     assert np.stack(table["window"]).dtype == np.float32 and np.stack(table["window"]).shape == (100, WINDOW)
     assert [path.name for path in tmp_path.iterdir()] == ["shard-000000.parquet"]
 
 
 def test_a_worker_with_other_library_versions_is_refused(tmp_path, monkeypatch, refused):
-    from enhsim_tf.datasets import plan as fleet_plan
+    from enhsim_tf.datasets import plan as plan_module
     from enhsim_tf.datasets.shard import ShardMaker
 
     maker = ShardMaker(plan(), tmp_path)
-    monkeypatch.setattr(fleet_plan.importlib.metadata, "version", lambda name: "0.0")
+    monkeypatch.setattr(plan_module.importlib.metadata, "version", lambda name: "0.0")
     with refused("every machine", "tensorflow"):
         maker(0)
 
@@ -141,16 +141,16 @@ def copied(model, tmp_path):
 
 
 def test_a_plan_is_made_without_loading_the_model(model):
-    made = plan_of(Mix(), model, seed=1, num_windows=20_000)
+    made = make_plan(Mix(), model, seed=1, num_windows=20_000)
     assert (made.window, made.models[0].interval_s, made.models[0].name) == (60, 2.0, "volts")
-    assert (made.shard, made.num_shards, made.rows_of(2)) == (8_192, 3, 20_000 - 2 * 8_192)
+    assert (made.shard, made.num_shards, made.num_windows_in(2)) == (8_192, 3, 20_000 - 2 * 8_192)
     assert str(model) not in json.dumps(made.settings())
 
 
 def test_shards_of_real_networks_equal_the_output_of_the_simulator(model, tmp_path):
     from enhsim_tf.datasets.shard import ShardMaker
 
-    made = plan_of(Mix(shard=40), model, seed=1, num_windows=80)
+    made = make_plan(Mix(shard=40), model, seed=1, num_windows=80)
     maker = ShardMaker(made, tmp_path)
     windows = np.stack(table_of(maker, 1)[1]["window"])
     (simulator,), (rows, _, noise) = maker.simulators, draw_rows(made, 1)
@@ -168,7 +168,7 @@ def test_damaged_models_are_refused(copied, file, damage, refused):
     else:
         path.write_bytes(content[: len(content) // 2] if damage == "cut" else content.replace(content[50:60], b"\x00" * 10))
     with refused():
-        plan_of(Mix(), copied, 0, 10)
+        make_plan(Mix(), copied, 0, 10)
 
 
 @pytest.mark.parametrize("interval", ["1" + "0" * 400, "-1", "1e999", "true", '"2"', "null"])
@@ -177,7 +177,7 @@ def test_an_invalid_interval_is_refused(copied, interval, refused):
     (copied / "settings.json").write_text(json.dumps(settings | {"interval_s": 12345}).replace("12345", interval))
     vouch(copied)
     with refused("interval_s"):
-        plan_of(Mix(), copied, 0, 10)
+        make_plan(Mix(), copied, 0, 10)
 
 
 def vouch(folder):
@@ -193,7 +193,7 @@ def test_enhancers_without_a_fixed_width_are_refused(copied, config, refused):
             archive.writestr(name, content)
     vouch(copied)
     with refused("width"):
-        plan_of(Mix(), copied, 0, 10)
+        make_plan(Mix(), copied, 0, 10)
 
 
 def test_compressed_large_descriptions_are_refused(copied, refused):
@@ -201,7 +201,7 @@ def test_compressed_large_descriptions_are_refused(copied, refused):
         archive.writestr("config.json", b" " * 60_000_000)
     vouch(copied)
     with refused("too large"):
-        plan_of(Mix(), copied, 0, 10)
+        make_plan(Mix(), copied, 0, 10)
 
 
 @pytest.mark.parametrize("interval", ["0", "-1", "true", '"1"', "NaN", "null", "1e999"])
@@ -210,13 +210,13 @@ def test_invalid_intervals_of_any_type_are_refused(copied, interval, refused):
     path.write_text(path.read_text().replace('"interval_s": 2.0', f'"interval_s": {interval}'))
     vouch(copied)
     with refused("interval_s"):
-        plan_of(Mix(), copied, 0, 10)
+        make_plan(Mix(), copied, 0, 10)
 
 
 def test_a_model_replaced_after_planning_is_refused(copied, tmp_path, refused):
     from enhsim_tf.datasets.shard import ShardMaker
 
-    maker = ShardMaker(plan_of(Mix(), copied, 0, 10), tmp_path)
+    maker = ShardMaker(make_plan(Mix(), copied, 0, 10), tmp_path)
     path = copied / "settings.json"
     path.write_text(path.read_text().replace('"offset": 0.1', '"offset": 0.2'))
     vouch(copied)
@@ -231,7 +231,7 @@ def test_models_with_different_windows_are_refused(model, tmp_path, refused):
     (tmp_path / "narrow").symlink_to(model)
     mix = Mix(models=(ModelShare("a", "narrow", 0.5), ModelShare("b", "wide", 0.5)))
     with refused("same window", "60", "64"):
-        plan_of(mix, tmp_path, 0, 10)
+        make_plan(mix, tmp_path, 0, 10)
 
 
 @pytest.mark.parametrize(

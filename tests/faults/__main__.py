@@ -24,7 +24,7 @@ from tests.faults.in_common import MISSED
 ROOT = Path(__file__).parents[2]
 
 BENCHES = {
-    "fleet": (of_data_sets.FleetBench, of_data_sets.FAULTS),
+    "fleet": (of_data_sets.DataSetBench, of_data_sets.FAULTS),
     "reproduce": (of_reproduce.ReproduceBench, of_reproduce.FAULTS),
 }
 TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)"), 20)  # of the others 3

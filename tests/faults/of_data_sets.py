@@ -13,7 +13,7 @@ from tests.faults.in_common import MISSED, ROOT, Bench, clock_change, flip, full
 MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n"
 
 
-class FleetBench(Bench):
+class DataSetBench(Bench):
     """Tiny networks, a scenario file, and the data set of an undisturbed run."""
 
     same = "same bytes"

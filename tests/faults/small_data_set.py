@@ -114,7 +114,7 @@ def main():
     generate.ShardMaker = SlowMaker
 
     def run():
-        generate.generate_fleet(options.out, plan(options.windows), options.workers)
+        generate.generate_data_set(options.out, plan(options.windows), options.workers)
         return 0
 
     return run_command(run, "interrupted; what was finished is kept")

@@ -16,9 +16,9 @@ import numpy as np
 
 from enhsim_tf.datasets.folder import JOURNAL, MANIFEST, check_folder, read_manifest, read_records
 from enhsim_tf.datasets.generate import verify
-from enhsim_tf.datasets.plan import FORMAT, Model, Plan, plan_of
+from enhsim_tf.datasets.plan import FORMAT, Model, Plan, make_plan
 from enhsim_tf.datasets.scenario_file import Mix, ScenarioShare
-from enhsim_tf.datasets.shard import file_of
+from enhsim_tf.datasets.shard import shard_file
 from enhsim_tf.enhanced_simulator.model_folder import models_of, refuse_foreign
 from tests.fuzzing.target import Target, all_of, json_of
 
@@ -85,7 +85,7 @@ def member_of(name: str, member: str) -> bytes:
 
 
 def _plan(folder: Path) -> None:
-    plan_of(_MIX, folder, 0, 100)
+    make_plan(_MIX, folder, 0, 100)
 
 
 def _load(folder: Path) -> None:
@@ -146,7 +146,7 @@ def data_set() -> dict[str, bytes]:
         before = os.environ.copy()
         maker = small_data_set.PlainMaker(_PLAN, folder)
         records = [maker(number) for number in range(2)]
-        shards = [{"file": file_of(each.shard), "rows": each.rows, "sha256": each.sha256} for each in records]
+        shards = [{"file": shard_file(each.shard), "rows": each.rows, "sha256": each.sha256} for each in records]
         files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
         os.environ.update(before)
     manifest = {"format": FORMAT, "settings": _PLAN.settings(), "shards": shards}
@@ -160,7 +160,7 @@ def write_data_set(folder: Path, **changed: bytes) -> Path:
         folder: Where to.
         **changed: Contents of `manifest`, `journal` and `shard`, which is the first.
     """
-    names = {"manifest": MANIFEST, "journal": JOURNAL, "shard": file_of(0)}
+    names = {"manifest": MANIFEST, "journal": JOURNAL, "shard": shard_file(0)}
     files = data_set() | {names[name]: content for name, content in changed.items()}
     folder.mkdir(parents=True)
     for name, content in files.items():
@@ -203,7 +203,7 @@ def _shard(data: bytes, folder: Path) -> None:
 
 
 def _shard_seeds() -> list[bytes]:
-    return [data_set()[file_of(0)]]
+    return [data_set()[shard_file(0)]]
 
 
 TARGETS = {

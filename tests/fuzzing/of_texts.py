@@ -13,7 +13,7 @@ import pandas as pd
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.cli.generate_many import parse_workers
 from enhsim_tf.coarse_simulator.degraded import MODES
-from enhsim_tf.datasets.labelled_windows import num_samples_of, parse_scenario, start_of
+from enhsim_tf.datasets.labelled_windows import parse_num_samples, parse_scenario, parse_start
 from enhsim_tf.datasets.scenario_file import read_mix
 from enhsim_tf.enhanced_simulator.model_folder import folder_of
 from enhsim_tf.telemetry import influx_client
@@ -193,10 +193,10 @@ TARGETS = {
         lambda data, folder: parse_scenario(text_of(data)), _lines(*(f"{mode}:0.5:0.25" for mode in MODES), "stuck:1"), "text", 10
     ),
     "option --continuous": Target(
-        lambda data, folder: num_samples_of(text_of(data), 0.5), _lines("1d", "6h", "90min", "5000", "1.5 s"), "text", 10
+        lambda data, folder: parse_num_samples(text_of(data), 0.5), _lines("1d", "6h", "90min", "5000", "1.5 s"), "text", 10
     ),
     "option --start": Target(
-        lambda data, folder: start_of(text_of(data)), _lines("2024-01-01", "2024-01-01T12:00:00.5+02:00", "2024-W01-1"), "text", 6
+        lambda data, folder: parse_start(text_of(data)), _lines("2024-01-01", "2024-01-01T12:00:00.5+02:00", "2024-W01-1"), "text", 6
     ),
     "option --workers": Target(lambda data, folder: parse_workers(text_of(data)), _lines("auto", "2", "16"), "text", 4),
     "option --timezone": Target(_zone, _lines("Europe/Berlin", "UTC", "+02:00", "America/New_York"), "text", 2),

@@ -14,7 +14,7 @@ import keras
 import numpy as np
 import pytest
 
-from enhsim_tf.datasets.plan import plan_of
+from enhsim_tf.datasets.plan import make_plan
 from enhsim_tf.datasets.scenario_file import Mix
 from enhsim_tf.enhanced_simulator.safe_loading import check_network, read_description
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -63,7 +63,7 @@ def with_layer(added) -> bytes:
 
 def test_the_model_as_it_was_written_loads(tmp_path):
     model = write_model(tmp_path / "model")
-    assert EnhancedSimulator.load(model).generate(2).shape == (2, 24) and plan_of(Mix(), model, 0, 5).window == 24
+    assert EnhancedSimulator.load(model).generate(2).shape == (2, 24) and make_plan(Mix(), model, 0, 5).window == 24
 
 
 @pytest.mark.filterwarnings("default")  # as for users: Keras would only warn and keep untrained weights
