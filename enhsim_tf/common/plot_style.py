@@ -17,6 +17,7 @@ STYLE = ("default", Path(__file__).with_name("style.mplstyle"))  # for `matplotl
 REAL, COARSE, ENHANCED, GENERATED, AVERAGE = "#1a1a1a", "#8c8c8c", "#0072b2", "#d55e00", "#e69f00"
 QUIET, LINE = "#595959", "#8c8c8c"  # secondary text; outlines
 IN_PRINT = {COARSE: QUIET, GENERATED: "#b85000", AVERAGE: "#946300"}  # darker colours for text that names a curve
+DASHED = (0, (4, 2))  # line style of the second curve of a panel
 BLUE_TINT, ORANGE_TINT, GREY_TINT = "#e4eff7", "#fdeadd", "#f3f3f3"
 SINGLE, DOUBLE = 3.5, 7.2  # widths of one and two journal columns, in inches
 FOOT = 0.26  # free space for the caption line at the bottom of each figure, in inches

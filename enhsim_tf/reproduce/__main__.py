@@ -88,7 +88,6 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.figure import save
     from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge, ranges
     from enhsim_tf.reproduce.paper.data import Source
-    from enhsim_tf.reproduce.paper.figure_data import FIGURE_DATA, WITHOUT_TRAINING
     from enhsim_tf.reproduce.paper.figures import FIGURES
     from enhsim_tf.reproduce.paper.pipeline import Experiment
     from enhsim_tf.reproduce.publish.page import write_page
@@ -114,7 +113,7 @@ def run(options: argparse.Namespace) -> int:
         """Draws figures and returns the time of the drawing alone, in seconds."""
         drawn_s = 0.0
         for name in names:
-            data = FIGURE_DATA[name](experiment)  # runs the stages that the figure needs; these report their own time
+            data = FIGURES[name].arrays(experiment)  # runs the stages that the figure needs; these report their own time
             drawing = time.perf_counter()
             save(name, data, folder, caption_of(name, experiment), is_smoke, figures=FIGURES)
             drawn_s += time.perf_counter() - drawing
@@ -123,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
         return drawn_s
 
     chosen, records, drawn_s = chosen_figures(options.only), [], 0.0
-    early = [] if options.only else [name for name in chosen if name in WITHOUT_TRAINING]
+    early = [] if options.only else [name for name in chosen if not FIGURES[name].needs_training]
     if early:  # drawn first, before the minutes of training
         drawn_s += draw(early)
         tell(f"figures {listed(early)} drawn in {folder}/ before any training")
@@ -250,7 +249,7 @@ def location_of(place: str) -> str:
 def chosen_figures(only: str | None) -> list[str]:
     """Names of the figures to draw: all, or the one given by its number or full name."""
     from enhsim_tf.common.errors import InputError
-    from enhsim_tf.reproduce.settings import FIGURES
+    from enhsim_tf.reproduce.paper.figures import FIGURES
 
     chosen = [name for name in FIGURES if only is None or only in (name, name.split("_")[0])]
     if not chosen:

@@ -16,7 +16,7 @@ def caption_of(name: str, experiment: "Experiment") -> str:
     """The caption line of a figure, with every option that differs from its default and affects the figure.
 
     Args:
-        name: One of `settings.FIGURES`.
+        name: One of `paper.figures.FIGURES`.
         experiment: What its arrays come from.
     """
     settings, source, options = experiment.settings, experiment.source, []

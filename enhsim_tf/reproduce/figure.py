@@ -20,11 +20,11 @@ WATERMARK = "SMOKE BUDGET"
 
 @dataclasses.dataclass(frozen=True)
 class Figure:
-    """A figure of the paper.
+    """A figure.
 
     Args:
-        number: Its number; 14 is the one the paper commented out.
-        title: The paper's caption.
+        number: Its number.
+        title: What it shows, in a few words.
         alt: Text alternative for readers who cannot see the figure.
         drawn_by: Function that draws the figure from its arrays.
     """
@@ -38,7 +38,7 @@ class Figure:
         """Draws the figure in the common style.
 
         Args:
-            data: The arrays that `figure_data.FIGURE_DATA` makes for it.
+            data: The arrays that it shows.
         """
         with matplotlib.style.context(STYLE):
             return self.drawn_by(data)
@@ -104,8 +104,3 @@ def save_all(
     """
     caption = caption_of_findings(found, command)
     return [path for name in names or figures for path in save(name, found, folder, caption, found["budget"] == "smoke", figures=figures)]
-
-
-def _shape(words: np.ndarray) -> str:
-    """The number of samples in a Keras shape such as `(None, 500, 1)`."""
-    return str(words).strip("()").split(", ")[1]

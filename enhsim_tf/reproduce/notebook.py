@@ -25,8 +25,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import STYLE
 from enhsim_tf.reproduce import figure
 from enhsim_tf.reproduce.caption import caption_of, in_seeds
-from enhsim_tf.reproduce.paper import claims, figures
-from enhsim_tf.reproduce.paper.figure_data import FIGURE_DATA
+from enhsim_tf.reproduce.paper import claims
+from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.robustness import figures as robustness_figures
 from enhsim_tf.reproduce.robustness import findings
@@ -109,11 +109,11 @@ def prepare(experiment: Experiment) -> list[str]:
 
 
 def show(experiment: Experiment, name: str) -> Arrays:
-    """Shows a figure (one of `settings.FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
-    arrays, is_smoke = FIGURE_DATA[name](experiment), experiment.settings.budget == "smoke"
+    """Shows a figure (one of `FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
+    arrays, is_smoke = FIGURES[name].arrays(experiment), experiment.settings.budget == "smoke"
     with tempfile.TemporaryDirectory() as folder:
-        (path,) = figure.save(name, arrays, folder, caption_of(name, experiment), is_smoke, ("png",), figures=figures.FIGURES)
-        _show_picture(path.read_bytes(), figures.FIGURES[name].alt)
+        (path,) = figure.save(name, arrays, folder, caption_of(name, experiment), is_smoke, ("png",), figures=FIGURES)
+        _show_picture(path.read_bytes(), FIGURES[name].alt)
     return Arrays(arrays)
 
 

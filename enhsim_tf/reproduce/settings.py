@@ -14,22 +14,6 @@ from enhsim_tf.common.errors import InputError
 OUR_CHOICE = "our choice"
 BUDGETS = ("smoke", "full")
 LOCATION = "influxdb://telemetry/enhsim_tf/value"  # where `--store influxdb` places the telemetry
-FIGURES = (
-    "fig01_pipeline",
-    "fig02_source_target",
-    "fig03_enhancer",
-    "fig04_enhanced_simulation",
-    "fig05_real_or_generated",
-    "fig06_real_or_generated_noise",
-    "fig07_real_or_generated_series",
-    "fig08_source_noise",
-    "fig09_generator",
-    "fig10_discriminator",
-    "fig11_gan_training",
-    "fig12_accuracy_loss",
-    "fig13_combined",
-    "fig14_telemetry_store",
-)
 
 
 def setting(value: Any, unit: str, source: str, paper: str = "-", author: str = "-", smoke: Any = None) -> Any:

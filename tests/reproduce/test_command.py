@@ -1,5 +1,6 @@
 """The command, end to end: what it writes, and that a run found done, killed or repeated ends with the same numbers."""
 
+import dataclasses
 import json
 import re
 import shlex
@@ -18,9 +19,9 @@ import pytest
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce import figure
 from enhsim_tf.reproduce.__main__ import main, parse
-from enhsim_tf.reproduce.paper import claims, figure_data
+from enhsim_tf.reproduce.paper import claims, figures
+from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.publish import page
-from enhsim_tf.reproduce.settings import FIGURES
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf.reproduce"]
@@ -234,11 +235,16 @@ def test_killed_in_each_stage_it_ends_with_the_same_numbers(smoke, tmp_path):
 # -- full budget: exit codes and the README, with the work itself left out -------------------------------------------------
 
 
+def with_arrays(arrays):
+    """The figures of the paper, with another function for their arrays."""
+    return {name: dataclasses.replace(FIGURES[name], arrays=arrays) for name in FIGURES}
+
+
 @pytest.fixture
 def pretended(tmp_path, monkeypatch):
     """In an empty folder: a full run whose verdicts are given, whose figures are empty and which trains nothing."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(figure_data, "FIGURE_DATA", dict.fromkeys(FIGURES, lambda experiment: {}))
+    monkeypatch.setattr(figures, "FIGURES", with_arrays(lambda experiment: {}))
     monkeypatch.setattr(figure, "save", lambda name, data, folder, caption, is_smoke, figures: [])
     monkeypatch.setattr(page, "write_page", lambda folder, found, figures: folder / "report.html")
 
@@ -278,7 +284,7 @@ def test_figures_that_need_no_training_are_drawn_once_and_before_any_claim_is_ju
     monkeypatch.setattr(claims, "judge", lambda *arguments: events.append("judged") or judge(*arguments))
     del events[:]
     assert main(["--cache", str(tmp_path / "cache")]) == 0
-    early = list(figure_data.WITHOUT_TRAINING)
+    early = [name for name in FIGURES if not FIGURES[name].needs_training]
     assert events == [*early, "judged", *(name for name in FIGURES if name not in early)]
     del events[:]
     capsys.readouterr()
@@ -292,13 +298,14 @@ def test_a_stage_that_fails_leaves_the_early_figures_whole_and_nothing_else(tmp_
 
     monkeypatch.setattr(claims, "judge", fails)
     assert main(["--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--arrays"]) == 2
-    assert "figures 2, 3, 8, 9, 10, 11 and 14 drawn" in capsys.readouterr().out
-    expected = {f"{name}.{kind}" for name in figure_data.WITHOUT_TRAINING for kind in ("png", "svg", "npz")}
+    early = [name for name in FIGURES if not FIGURES[name].needs_training]
+    assert f"figures {command.listed(early)} drawn" in capsys.readouterr().out
+    expected = {f"{name}.{kind}" for name in early for kind in ("png", "svg", "npz")}
     assert {file.name for file in (tmp_path / "out").iterdir()} == expected
     assert [stage.name.split("-")[0] for stage in (tmp_path / "cache").iterdir()] == ["telemetry"]
 
 
-@pytest.mark.parametrize(("names", "words"), [(FIGURES[1:2], "2"), (FIGURES[:2], "1 and 2"), (FIGURES[8:11], "9, 10 and 11")])
+@pytest.mark.parametrize(("names", "words"), [([*FIGURES][1:2], "2"), ([*FIGURES][:2], "1 and 2"), ([*FIGURES][8:11], "9, 10 and 11")])
 def test_figures_are_listed_in_words(names, words):
     assert command.listed(names) == words
 
@@ -314,7 +321,7 @@ def test_the_time_of_figures_is_that_of_drawing_alone(pretended, tmp_path, monke
         return work
 
     monkeypatch.setattr(command, "time", clock)
-    monkeypatch.setattr(figure_data, "FIGURE_DATA", dict.fromkeys(FIGURES, takes(100, {})))  # stages that are still to be done
+    monkeypatch.setattr(figures, "FIGURES", with_arrays(takes(100, {})))  # stages that are still to be done
     monkeypatch.setattr(figure, "save", takes(2, []))
     assert pretended("--only", "fig04") == 0
     assert capsys.readouterr().out.splitlines()[0].split() == ["figures", "2.0", "s"]
@@ -325,7 +332,7 @@ def test_the_time_of_figures_is_that_of_drawing_alone(pretended, tmp_path, monke
 def test_the_captions_say_commands_that_draw_the_same_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     said = []
-    monkeypatch.setattr(figure_data, "FIGURE_DATA", dict.fromkeys(FIGURES, lambda experiment: {}))
+    monkeypatch.setattr(figures, "FIGURES", with_arrays(lambda experiment: {}))
     monkeypatch.setattr(figure, "save", lambda name, data, folder, caption, is_smoke, figures: said.append(caption))
     Path("my data").mkdir()
     values = np.sin(np.arange(2_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(2_000)

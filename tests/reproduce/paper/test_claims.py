@@ -9,7 +9,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge, of_most, ranges, title_verdict
-from enhsim_tf.reproduce.settings import FIGURES
+from enhsim_tf.reproduce.paper.figures import FIGURES
 
 YES, PARTLY, NO, NOT_TESTED, NOT_MEASURED = "reproduced", "partly", "not reproduced", "not tested by the paper", "not measured"
 ARMS = ["coarse", "enhanced", "enhanced + GAN noise", "enhanced + Gaussian noise", "real"]

@@ -1,5 +1,6 @@
 """The figures hold the arrays they are given, stay legible, and are written the same way twice; most need no TensorFlow."""
 
+import functools
 import re
 import struct
 import subprocess
@@ -15,10 +16,9 @@ from matplotlib.text import Text
 
 from enhsim_tf.common import plot_style
 from enhsim_tf.reproduce.figure import WATERMARK, save
-from enhsim_tf.reproduce.paper import figure_data
 from enhsim_tf.reproduce.paper.data import Source
-from enhsim_tf.reproduce.paper.figure_data import FIGURE_DATA, WITHOUT_TRAINING
 from enhsim_tf.reproduce.paper.figures import FIGURES
+from enhsim_tf.reproduce.paper.figures.layer_table import layer_names, layers_of
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
@@ -63,16 +63,15 @@ def table(**changed):
 
 def test_names_of_layers_do_not_tell_what_else_the_process_has_made():
     from enhsim_tf.noise.discriminator import build_discriminator
-    from enhsim_tf.reproduce.paper.figure_data import _names
 
-    found = [_names(build_discriminator(60, 8, seed=0).layers) for _ in range(2)]
+    found = [layer_names(build_discriminator(60, 8, seed=0).layers) for _ in range(2)]
     assert found == [["conv1d", "global_max_pooling1d", "dense", "dense_1"]] * 2
     layers = [type("Dense", (), {"name": name})() for name in ("Input", "Hidden_1", "dense_7", "Hidden_2", "dense_8")]
-    assert _names(layers) == ["Input", "Hidden_1", "dense", "Hidden_2", "dense_1"]
+    assert layer_names(layers) == ["Input", "Hidden_1", "dense", "Hidden_2", "dense_1"]
 
 
 def made_up(name):
-    """Arrays of the shapes that `FIGURE_DATA[name]` makes, of random values."""
+    """Arrays of the shapes that `FIGURES[name].arrays` makes, of random values; None for a figure that is not listed here."""
     guess = {"rows": rows(8, WINDOW), "is_generated": np.array([0, 1, 1, 0, 0, 1, 0, 1], bool)}
     units = {"enhancer_units": np.array([500, 3_200, 3_200, 500]), "latent": rows(16)}
     errors = {"nrmse": np.array(0.094), "identity_nrmse": np.array(0.67), "ridge_nrmse": np.array(0.11), "truth_is_known": np.array(True)}
@@ -108,7 +107,36 @@ def made_up(name):
         "fig12_accuracy_loss": lambda: history,
         "fig13_combined": lambda: window("coarse", "enhanced", "combined", "telemetry"),
         "fig14_telemetry_store": lambda: stored,
-    }[name]()
+    }.get(name, lambda: None)()
+
+
+class Recording(Stages):
+    """Stages that are found in the cache of the smoke run; records which."""
+
+    def __init__(self, cache):
+        super().__init__(cache, tell=lambda line: None)
+        self.names = set()
+
+    def run(self, name, *others, **options):
+        self.names.add(name)
+        folder = super().run(name, *others, **options)
+        assert self.cached[name]
+        return folder
+
+
+class TrainedByDoubler(Experiment):
+    """The experiment with `Doubler` in place of the networks, which are asked for but not loaded."""
+
+    @functools.cached_property
+    def simulator(self):
+        _ = self.enhancer_folder, self.noise_folder
+        return Doubler()
+
+
+@pytest.fixture(scope="module")
+def arrays_of(smoke_run):
+    """Arrays of any figure: made up, or of the smoke run for a figure that `made_up` does not know."""
+    return lambda name: made_up(name) or FIGURES[name].arrays(TrainedByDoubler(make_settings("smoke"), Recording(smoke_run.cache)))
 
 
 def words(figure):
@@ -121,8 +149,8 @@ def draw(name, **changed):
 
 
 def test_names_numbers_and_captions():
-    assert list(FIGURES) == list(FIGURE_DATA)
-    assert [figure.number for figure in FIGURES.values()] == list(range(1, 15))
+    assert list(FIGURES) == sorted(FIGURES) and set(range(1, 15)) <= {figure.number for figure in FIGURES.values()}
+    assert len({figure.number for figure in FIGURES.values()}) == len(FIGURES)
     assert all(name.startswith(f"fig{figure.number:02d}_") for name, figure in FIGURES.items())
     assert {figure.number: figure.title for figure in FIGURES.values() if figure.number in CAPTIONS} == CAPTIONS
     for number in (5, 6, 7):  # borrowed pictures, which cannot be reproduced
@@ -131,8 +159,8 @@ def test_names_numbers_and_captions():
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_legible_at_column_width(name):
-    figure = draw(name)
+def test_legible_at_column_width(name, arrays_of):
+    figure = FIGURES[name].draw(arrays_of(name))
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     width, height = figure.get_size_inches() * figure.dpi
@@ -156,8 +184,8 @@ def test_legible_at_column_width(name):
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_drawing_changes_neither_arrays_nor_settings(name):
-    data, before = made_up(name), dict(matplotlib.rcParams)
+def test_drawing_changes_neither_arrays_nor_settings(name, arrays_of):
+    data, before = arrays_of(name), dict(matplotlib.rcParams)
     for array in data.values():
         array.setflags(write=False)
     FIGURES[name].draw(data)
@@ -323,8 +351,8 @@ def test_words_have_contrast_and_curves_of_one_panel_survive_grey():
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_saved_files(name, tmp_path):
-    caption, data = "seed 0 · full budget", made_up(name)
+def test_saved_files(name, tmp_path, arrays_of):
+    caption, data = "seed 0 · full budget", arrays_of(name)
     png, svg = save(name, data, tmp_path, caption, is_smoke=False, figures=FIGURES)
     assert (png.name, svg.name) == (f"{name}.png", f"{name}.svg") and sorted(tmp_path.iterdir()) == [png, svg]
     inches = FIGURES[name].draw(data).get_size_inches()
@@ -350,7 +378,7 @@ def test_smoke_is_marked_in_both_files(tmp_path):
 
 
 def test_drawing_needs_neither_screen_nor_tensorflow_nor_pyplot():
-    code = "import sys, enhsim_tf.reproduce.paper.figures, enhsim_tf.reproduce.paper.figure_data; print([name for name in sys.modules if name in "
+    code = "import sys; from enhsim_tf.reproduce.paper.figures import FIGURES; list(FIGURES.values()); print([name for name in sys.modules if name in "
     code += "('tensorflow', 'keras', 'matplotlib.pyplot', 'tkinter')])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
 
@@ -389,7 +417,7 @@ def experiment(request, tmp_path_factory):
 
 @pytest.mark.parametrize("name", [name for name in FIGURES if name[3:5] not in ("03", "09", "10")])
 def test_arrays_are_plain_repeatable_and_draw(experiment, name, tmp_path):
-    data, again = (FIGURE_DATA[name](experiment) for _ in range(2))
+    data, again = (FIGURES[name].arrays(experiment) for _ in range(2))
     np.savez(tmp_path / "arrays.npz", **data)
     with np.load(tmp_path / "arrays.npz", allow_pickle=False) as kept:
         assert set(kept) == set(again)
@@ -397,27 +425,12 @@ def test_arrays_are_plain_repeatable_and_draw(experiment, name, tmp_path):
     save(name, data, tmp_path, "seed 0", is_smoke=True, saved_as=("png",), figures=FIGURES)
 
 
-class TrainingError(Exception):
-    """A figure asked for something that is trained."""
-
-
-class Untrained(Stages):
-    """Stages of which only the telemetry is done."""
-
-    def run(self, name, *others, **options):
-        if name != "telemetry":
-            raise TrainingError(name)
-        return super().run(name, *others, **options)
-
-
 @pytest.mark.parametrize("name", FIGURES)
-def test_exactly_the_figures_that_say_so_need_no_training(name, tmp_path):
-    experiment = Experiment(make_settings("smoke"), Untrained(tmp_path, tell=lambda line: None))
-    if name in WITHOUT_TRAINING:
-        save(name, FIGURE_DATA[name](experiment), tmp_path, "seed 0", is_smoke=True, saved_as=("png",), figures=FIGURES)
-    else:
-        with pytest.raises(TrainingError, match="enhancer|noise GAN"):
-            FIGURE_DATA[name](experiment)
+def test_a_figure_needs_exactly_the_stages_that_it_names(smoke_run, name):
+    stages = Recording(smoke_run.cache)
+    FIGURES[name].arrays(TrainedByDoubler(make_settings("smoke"), stages))
+    assert stages.names == set(FIGURES[name].stages)
+    assert FIGURES[name].needs_training == bool(stages.names & {"enhancer", "noise GAN"})
 
 
 def test_a_layer_table_is_that_of_the_network_that_is_trained(tmp_path):
@@ -425,12 +438,12 @@ def test_a_layer_table_is_that_of_the_network_that_is_trained(tmp_path):
     enhancer, noise = experiment.simulator.enhancer, experiment.simulator.noise
     trained = {"fig03_enhancer": enhancer, "fig09_generator": noise.generator, "fig10_discriminator": noise.discriminator}
     for name, network in trained.items():
-        table, same = FIGURE_DATA[name](experiment), figure_data._layers(network)
+        table, same = FIGURES[name].arrays(experiment), layers_of(network)
         assert set(table) == set(same) and all(np.array_equal(table[key], same[key]) for key in table), name
 
 
 def test_source_and_target_are_of_the_same_times(experiment):
-    data, series = FIGURE_DATA["fig02_source_target"](experiment), experiment.data.channels[0].telemetry
+    data, series = FIGURES["fig02_source_target"].arrays(experiment), experiment.data.channels[0].telemetry
     for source, target, begin in zip(data["source"], data["target"], data["begin"].astype(int), strict=True):
         assert np.array_equal(target, series.values[begin : begin + WINDOW])
         if experiment.is_paper:  # the paper's square waves, written down a second time
@@ -440,7 +453,7 @@ def test_source_and_target_are_of_the_same_times(experiment):
 
 
 def test_noise_is_what_the_average_leaves(experiment):
-    data = FIGURE_DATA["fig08_source_noise"](experiment)
+    data = FIGURES["fig08_source_noise"].arrays(experiment)
     assert np.allclose(data["telemetry"] - data["average"], data["noise"], atol=1e-6)
     assert np.allclose(np.convolve(data["telemetry"], np.full(25, 1 / 25), "valid"), data["average"][12:-12], atol=1e-5)
     if experiment.is_paper:  # sigma^2 (1 - 1/w), and the bend of the 2-minute wave within the average
@@ -448,7 +461,7 @@ def test_noise_is_what_the_average_leaves(experiment):
 
 
 def test_combined_adds_noise_to_the_enhanced_held_out_window(experiment):
-    data, test = FIGURE_DATA["fig13_combined"](experiment), experiment.data.channels[0].test.values
+    data, test = FIGURES["fig13_combined"].arrays(experiment), experiment.data.channels[0].test.values
     assert np.array_equal(data["enhanced"], 2 * data["coarse"]) and np.array_equal(data["combined"], data["enhanced"] + 7)
     assert any(np.array_equal(test[begin : begin + WINDOW], data["telemetry"]) for begin in range(len(test) - WINDOW + 1))
 
@@ -457,7 +470,7 @@ def test_combined_adds_noise_to_the_enhanced_held_out_window(experiment):
     ("name", "value"), [("5_real_or_generated", 9), ("6_real_or_generated_noise", 7), ("7_real_or_generated_series", 9)]
 )
 def test_marked_rows_are_the_generated_ones(experiment, name, value):
-    data = FIGURE_DATA[f"fig0{name}"](experiment)
+    data = FIGURES[f"fig0{name}"].arrays(experiment)
     assert np.array_equal(np.all(data["rows"] == value, axis=1), data["is_generated"])
     assert data["is_generated"].mean() == 0.5 and np.isfinite(data["rows"]).all()
     if value == 9:  # the others are held out
@@ -466,9 +479,9 @@ def test_marked_rows_are_the_generated_ones(experiment, name, value):
 
 
 def test_layer_tables_of_the_papers_networks(tmp_path):
-    experiment = Experiment(make_settings(), Untrained(tmp_path, tell=lambda line: None))
+    experiment = Experiment(make_settings(), Stages(tmp_path, tell=lambda line: None))
     experiment.data = SimpleNamespace(window=WINDOW)
-    generator, discriminator = (FIGURE_DATA[name](experiment) for name in ("fig09_generator", "fig10_discriminator"))
+    generator, discriminator = (FIGURES[name].arrays(experiment) for name in ("fig09_generator", "fig10_discriminator"))
     assert generator["parameters"].tolist() == [16 * 64 + 64, 4 * 64, 64 * 500 + 500, 0]
     assert int(generator["total"] - generator["trainable"]) == 2 * 64  # the moving mean and variance
     assert discriminator["parameters"].tolist() == [20 * 500 + 500, 0, 500 * 25 + 25, 25 + 1]

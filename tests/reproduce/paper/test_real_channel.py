@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from enhsim_tf.reproduce.paper.data import Source
+from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.pipeline import Experiment
-from enhsim_tf.reproduce.settings import FIGURES, make_settings
+from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
 
 ROOT = Path(__file__).parents[3]

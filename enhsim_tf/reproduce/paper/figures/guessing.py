@@ -1,0 +1,41 @@
+"""Real and generated rows in random order, to be told apart by the reader (Figures 5 to 7)."""
+
+import matplotlib.figure
+import numpy as np
+
+from enhsim_tf.common.plot_style import DOUBLE, EDGE, FOOT, QUIET, REAL, name_axes, new_sheet, panels
+from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays
+
+
+def shuffled(real: np.ndarray, generated: np.ndarray, rng: np.random.Generator) -> Arrays:
+    """Real and generated rows in random order, and which rows are generated."""
+    is_generated = np.repeat([False, True], [len(real), len(generated)])
+    order = rng.permutation(len(is_generated))
+    return {"rows": np.concatenate([real, generated])[order], "is_generated": is_generated[order]}
+
+
+def guessing_figure(data: Arrays, what: str, remark: str = "", columns: int = 4) -> matplotlib.figure.Figure:
+    """Real and generated rows in random order; the answer is printed upside down at the bottom."""
+    number, generated = len(data["rows"]), int(data["is_generated"].sum())
+    rows = -(-number // columns)
+    counted = {1: "One", 2: "Two", 3: "Three", 4: "Four"}.get(generated, str(generated))
+    total = {2: "two", 4: "four", 8: "eight"}.get(number, str(number))
+    verb = "is" if generated == 1 else "are"
+    figure, down = new_sheet(
+        DOUBLE,
+        1.24 + 0.95 * rows + 0.16 * bool(remark) if columns > 1 else 1.3 + 0.72 * rows,
+        f"{counted} of these {total} {what} {verb} generated. Which?",
+        f"{remark}A counterpart of the paper’s borrowed picture of a generated face, not a reproduction of it.",
+    )
+    axes = panels(figure, down + 0.2, rows, columns, gap=(0.24, 0.14), sharex=True, sharey=True)
+    letters = "abcdefghijklmnop"[:number]
+    for panel, row, letter in zip(axes.flat, data["rows"], letters, strict=True):
+        panel.plot(data["time"], row, color=REAL, linewidth=0.5)
+        panel.set_title(letter, weight="bold")
+    name_axes(axes, data)
+    answer = ", ".join(letter for letter, is_generated in zip(letters, data["is_generated"], strict=True) if is_generated)
+    width, height = figure.get_size_inches()
+    figure.text(
+        1 - EDGE / width, (FOOT + 0.04) / height, f"generated: {answer}", size=7, color=QUIET, rotation=180, ha="right", gid="answer"
+    )
+    return figure
