@@ -27,7 +27,7 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 1: the waveforms of one held-out window in each step, and the widths of the networks."""
+    """The waveforms of one held-out window in each step, and the widths of the networks."""
     simulator, data = experiment.simulator, combined_window(experiment)
     held_out = spread_windows(experiment, "test", 1, "figure 13")
     noise, _ = noise_of_window(experiment, held_out["offset"][0])
@@ -41,7 +41,7 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 1: the nine numbered steps of the paper and their sum, with the waveforms of one window."""
+    """The nine numbered steps of the paper and their sum, with the waveforms of one window."""
     figure, _ = new_sheet(DOUBLE, 4.5, "Two networks turn a coarse simulation into realistic telemetry")
     axes, height, gap = drawing_board(figure), 1.02, 0.3
     top = [FOOT + 0.14 + height * (3 - row) + gap * (2 - row) for row in range(3)]
@@ -94,7 +94,7 @@ def draw(data: Arrays) -> matplotlib.figure.Figure:
     card(axes, left[4], begin, (wide[4], tall), "Combined", "high-fidelity output", edge=REAL, linewidth=1.6)
     curve(4, begin - 0.98, "combined", GENERATED)
     axes.plot((left[4] + 0.13, right[4] - 0.13), (begin - 1.11, begin - 1.11), color=LINE, linewidth=0.5)
-    words(axes, left[4] + 0.13, begin - 1.18, "real telemetry of\nthe same times")
+    words(axes, left[4] + 0.13, begin - 1.18, "real telemetry of\nthe same time")
     curve(4, begin - 2.03, "telemetry", REAL)
 
     turn = top[0] - height - gap / 2
@@ -128,10 +128,9 @@ FIGURE = PaperFigure(
     title="Enhanced simulation pipeline",
     alt=(
         "Diagram of nine numbered steps. A light simulator (1) makes approximate, quantised data (2), which a trained enhancer (3) "
-        "turns into clean data (5). Telemetry from a real source (4) in the store, the goal, trains the enhancer; less its moving "
-        "average it is the environmental noise (6) that trains a GAN (8), which turns random numbers of a latent space (7) into "
-        "generated noise (9). Clean data and generated noise add up to the combined output, drawn beside real telemetry of the same "
-        "times."
+        "turns into clean data (5). Telemetry from a real source (4) is stored as the goal and trains the enhancer. Telemetry minus its "
+        "moving average is the environmental noise (6), which trains a GAN (8) that turns random numbers of a latent space (7) into "
+        "generated noise (9). Clean data and generated noise add up to the combined output, drawn beside real telemetry of the same time."
     ),
     drawn_by=draw,
     arrays=arrays,

@@ -3,6 +3,7 @@
 import matplotlib.figure
 import numpy as np
 
+from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import COARSE, DOUBLE, QUIET, REAL, name_axes, new_sheet, panels
 from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays, PaperFigure
 from enhsim_tf.reproduce.paper.figures.window_arrays import spread_windows, time_axis
@@ -10,7 +11,7 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 2: pairs of training windows, coarse source and recorded target, and where in the series they begin."""
+    """Pairs of training windows, coarse source and recorded target, and where in the series they begin."""
     pairs = spread_windows(experiment, "train", 3, "figure 2")
     telemetry = experiment.data.channels[0].telemetry
     begin = experiment.data.channels[0].train.time_s[pairs["offset"]]
@@ -20,12 +21,12 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 2."""
+    """Draws Figure 2."""
     figure, down = new_sheet(
         DOUBLE,
         3.1,
-        "The enhancer learns from pairs: a coarse simulation, and the telemetry of the same times",
-        "Some of the training windows. They begin at random offsets of the series and are all of one size.",
+        "The enhancer is trained on pairs: the coarse simulation, and telemetry of the same time",
+        f"{in_words(len(data['source'])).capitalize()} of the training pairs. Training windows begin at random times of the series and have the same length.",
     )
     axes = panels(figure, down + 0.2, 2, len(data["source"]), sharex=True, sharey=True)
     for column, begin in enumerate(data["begin"]):
@@ -49,7 +50,7 @@ def start_of_window(begin: float, unit: str) -> str:
 FIGURE = PaperFigure(
     number=2,
     title="Training source and target time series",
-    alt=("Training windows in two rows: above the coarse simulation, a sum of square waves; below the telemetry of the same times."),
+    alt=("Training windows in two rows: above, the coarse simulation, a sum of square waves; below, the telemetry of the same time."),
     drawn_by=draw,
     arrays=arrays,
     stages=("telemetry",),

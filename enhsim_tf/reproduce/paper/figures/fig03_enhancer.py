@@ -13,8 +13,8 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """A table of the layers."""
-    return draw_layers(data, f"{int(data['total']) / 1e6:.1f} million parameters enhance a window")
+    """Draws Figure 3."""
+    return draw_layers(data, f"The enhancer maps a coarse window to a realistic one with {int(data['total']) / 1e6:.1f} million parameters")
 
 
 FIGURE = PaperFigure(

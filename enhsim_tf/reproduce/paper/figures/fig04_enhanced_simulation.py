@@ -11,7 +11,7 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 4: a held-out window, coarse and enhanced, beside the truth, and the errors over all test windows."""
+    """A held-out window, coarse and enhanced, beside the truth, and the errors over all test windows."""
     window = {key: values[0] for key, values in spread_windows(experiment, "test", 1, "figure 4").items()}
     enhanced = experiment.simulator.enhance(window["coarse"][None])[0]
     errors = {key: experiment.enhancement[key] for key in ("nrmse", "identity_nrmse", "ridge_nrmse")}
@@ -20,17 +20,17 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 4."""
+    """Draws Figure 4."""
     before, after, ridge = (float(data[key]) for key in ("identity_nrmse", "nrmse", "ridge_nrmse"))
-    cuts = "cuts the error of the coarse simulation" if after < before else "does not cut the error of the coarse simulation:"
+    verb = "reduces" if after < before else "increases"
     truth = "true signal" if data["truth_is_known"] else "telemetry"
     shown = [nrmse(data[key], data["truth"]) for key in ("coarse", "enhanced")]
     figure, down = new_sheet(
         DOUBLE,
         3.6,
-        f"Enhancing {cuts} from {before:.2f} to {after:.2f}",
-        f"Root-mean-square error over held-out windows in standard deviations of the {truth} (NRMSE); ridge regression reaches {ridge:.2f}. "
-        f"In the held-out window shown: {shown[0]:.2f} coarse, {shown[1]:.2f} enhanced.",
+        f"The enhancer {verb} the error of the coarse simulation from {before:.2f} to {after:.2f}",
+        f"Error: root-mean-square error over all held-out windows, divided by the standard deviation of the {truth} (NRMSE); {ridge:.2f} for ridge "
+        f"regression. In the window shown: {shown[0]:.2f} coarse, {shown[1]:.2f} enhanced.",
     )
     above, below = panels(figure, down + 0.1, 2, 1, right=0.85, height_ratios=(3, 1), sharex=True)[:, 0]
     above.plot(data["time"], data["coarse"], color=COARSE, linewidth=1.2)
@@ -48,7 +48,7 @@ FIGURE = PaperFigure(
     number=4,
     title="Enhanced simulation",
     alt=(
-        "One held-out window: the stepped coarse simulation, the enhanced signal and the signal it should follow; below, the "
+        "One held-out window: the stepped coarse simulation, the enhanced signal and the signal that it should match; below, the "
         "difference of the last two. The title and the line under it give the errors."
     ),
     drawn_by=draw,

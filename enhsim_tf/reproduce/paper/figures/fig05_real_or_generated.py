@@ -9,21 +9,23 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 5: windows of real and of generated telemetry, shuffled."""
+    """Windows of real and of generated telemetry, shuffled."""
     rng = experiment.data.draw("figure 5")
     real = spread_windows(experiment, "test", 4, "figure 5, real")["target"]
     return shuffled(real, experiment.simulator.generate(4, seed=draw_seed(rng)), rng) | time_axis(experiment)
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 5."""
+    """Draws Figure 5."""
     return guessing_figure(data, "windows of telemetry")
 
 
 FIGURE = PaperFigure(
     number=5,
     title="Real or generated: windows of telemetry (counterpart of a borrowed picture)",
-    alt=("Real and generated windows of telemetry in random order, lettered, to be told apart; the answer stands upside down at the foot."),
+    alt=(
+        "Real and generated windows of telemetry in random order, each with a letter, for the reader to tell apart; the answer is printed upside down at the foot."
+    ),
     drawn_by=draw,
     arrays=arrays,
     stages=("telemetry", "enhancer", "noise GAN"),

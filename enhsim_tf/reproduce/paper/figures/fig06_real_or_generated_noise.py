@@ -9,7 +9,7 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 6: windows of real and of generated noise, shuffled, and the effective ranks of many of each."""
+    """Windows of real and of generated noise, shuffled, and the effective ranks of many of each."""
     rng = experiment.data.draw("figure 6")
     real = experiment.data.noise_windows("test", 4, "figure 6, real")
     rows = shuffled(real, experiment.simulator.noise.generate(4, seed=draw_seed(rng)), rng)
@@ -23,18 +23,18 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 6."""
+    """Draws Figure 6."""
     generated, real, number = (float(data[f"rank_{key}"]) for key in ("generated", "real", "windows"))
-    ranks = f"{number:,.0f} windows of generated noise fill {generated:.0f}, as many of real noise {real:.0f} (effective rank)"
-    return guessing_figure(data, "windows of noise", f"An eye does not count dimensions: {ranks}. ")
+    ranks = f"{generated:.0f} for {number:,.0f} windows of generated noise, {real:.0f} for as many of real noise"
+    return guessing_figure(data, "windows of noise", f"Effective rank (number of dimensions in which windows vary): {ranks}. ")
 
 
 FIGURE = PaperFigure(
     number=6,
     title="Real or generated: windows of noise (counterpart of a borrowed picture)",
     alt=(
-        "Real and generated windows of noise in random order, lettered, to be told apart; the answer stands upside down at the "
-        "foot. The line under the title gives the effective rank of generated and of real noise."
+        "Real and generated windows of noise in random order, each with a letter, for the reader to tell apart; the answer is "
+        "printed upside down at the foot. The line under the title gives the effective rank of generated and of real noise."
     ),
     drawn_by=draw,
     arrays=arrays,

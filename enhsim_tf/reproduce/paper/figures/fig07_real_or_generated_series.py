@@ -12,7 +12,7 @@ LONG_STRETCH = 3_000  # samples: six windows of the paper's example
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 7: long stretches of held-out telemetry and as many generated ones of the same times, shuffled."""
+    """Long stretches of held-out telemetry and as many generated ones of the same times, shuffled."""
     rng, test = experiment.data.draw("figure 7"), experiment.data.channels[0].test
     length = min(LONG_STRETCH, len(test))
     begins = np.arange(min(2, len(test) // length)) * (len(test) - length)  # a real channel may be long enough for one only
@@ -22,11 +22,11 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 7."""
+    """Draws Figure 7."""
     return guessing_figure(
         data,
         "stretches of telemetry",
-        "A generated one is made of overlapping windows, without seams, but its noise repeats a pattern every half window. ",
+        "A generated stretch is blended from overlapping windows; its noise repeats a pattern every half window. ",
         columns=1,
     )
 
@@ -35,8 +35,8 @@ FIGURE = PaperFigure(
     number=7,
     title="Real or generated: long stretches of telemetry (counterpart of a borrowed picture)",
     alt=(
-        "Long stretches of telemetry, held-out real and generated ones in random order, lettered, to be told apart; the answer "
-        "stands upside down at the foot."
+        "Long stretches of telemetry, held-out real and generated ones in random order, each with a letter, for the reader to tell "
+        "apart; the answer is printed upside down at the foot."
     ),
     drawn_by=draw,
     arrays=arrays,

@@ -11,7 +11,7 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 8: training telemetry with its moving average, the noise that is left, and its sd over the training part."""
+    """Training telemetry with its moving average, the noise that is left, and its sd over the training part."""
     window = spread_windows(experiment, "train", 1, "figure 8")
     noise, average = noise_of_window(experiment, window["offset"][0], "train")
     width = experiment.settings.noise.moving_average
@@ -21,14 +21,14 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 8."""
+    """Draws Figure 8."""
     width, deviation = int(data["width"]), float(data["standard_deviation"])
     figure, down = new_sheet(
         DOUBLE,
         3.4,
-        f"What a centred moving average of {width} samples leaves is noise of standard deviation {deviation:.3g}",
-        "Over the training part, of which one window is shown. White noise would lose "
-        f"{100 * (1 - np.sqrt(1 - 1 / width)):.1f} % of its standard deviation to the average.",
+        f"Subtracting a moving average of {width} samples leaves noise with a standard deviation of {deviation:.3g}",
+        "The average is centred. The standard deviation is that of the whole training part, of which one window is shown. The "
+        f"subtraction lowers the standard deviation of white noise by {100 * (1 - np.sqrt(1 - 1 / width)):.1f} %.",
     )
     above, below = panels(figure, down + 0.1, 2, 1, right=0.95, height_ratios=(3, 2), sharex=True)[:, 0]
     above.plot(data["time"], data["telemetry"], color=REAL, linewidth=0.5)

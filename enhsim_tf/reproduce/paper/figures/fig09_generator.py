@@ -13,8 +13,11 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """A table of the layers."""
-    return draw_layers(data, f"{num_samples(data['input_shape'])} numbers become {num_samples(data['output_shape'][-1])} samples of noise")
+    """Draws Figure 9."""
+    return draw_layers(
+        data,
+        f"The generator maps a latent vector of {num_samples(data['input_shape'])} random numbers to {num_samples(data['output_shape'][-1])} samples of noise",
+    )
 
 
 FIGURE = PaperFigure(

@@ -13,8 +13,10 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """A table of the layers."""
-    return draw_layers(data, f"{num_samples(data['input_shape'])} samples of noise become one judgement")
+    """Draws Figure 10."""
+    return draw_layers(
+        data, f"The discriminator maps {num_samples(data['input_shape'])} samples of noise to the probability that they are real"
+    )
 
 
 FIGURE = PaperFigure(

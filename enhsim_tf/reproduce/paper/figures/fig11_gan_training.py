@@ -22,27 +22,35 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 11: the numbers of the adversarial training."""
+    """The numbers of the adversarial training."""
     training = experiment.settings.adversarial
     numbers = {"batch_size": training.batch_size, "num_iterations": training.num_iterations, "latent": experiment.settings.noise.latent}
     return {key: np.array(value) for key, value in numbers.items()} | {"mixed_batch": np.array(training.mixed_batch)}
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 11: the two phases of an iteration, one below the other on the same plan."""
+    """The two phases of an iteration, one below the other on the same plan."""
     batch, latent, updates = f"{int(data['batch_size']):,}", int(data["latent"]), "one update" if data["mixed_batch"] else "two updates"
-    title = "Each iteration trains the discriminator alone, then the generator through it"
-    figure, down = new_sheet(DOUBLE, 3.94, title, f"{int(data['num_iterations']):,} iterations; {batch} rows of each kind in each")
+    title = "Each iteration trains the discriminator, then the generator through the frozen discriminator"
+    figure, down = new_sheet(
+        DOUBLE, 3.94, title, f"{int(data['num_iterations']):,} iterations; {batch} rows of real and of generated noise in each"
+    )
     axes, tall, gap = drawing_board(figure), 1.46, 0.12
     left, wide = np.array([0.25, 1.5, 2.86, 4.28, 5.78]), np.array([0.98, 1.09, 1.1, 1.2, 1.2])
     right, middle, height = left + wide, left + wide / 2, 0.46
     first = 3.94 - down - 0.06
     phases = (
-        (first, "1  The discriminator learns", f"alone, from equal amounts of real and generated noise, in {updates}", ENHANCED, BLUE_TINT),
+        (
+            first,
+            "1  The discriminator learns",
+            f"from equal amounts of real and generated noise, in {updates} of its weights",
+            ENHANCED,
+            BLUE_TINT,
+        ),
         (
             first - tall - gap,
             "2  The generator learns",
-            "through the combined model; the discriminator is told that the generated rows are real",
+            "through the combined model, with labels that say that its rows are real",
             GENERATED,
             ORANGE_TINT,
         ),
@@ -76,9 +84,9 @@ def draw(data: Arrays) -> matplotlib.figure.Figure:
                 arrow(axes, [(right[2], rows), (turn, rows), (turn, into), (left[3], into)])
         else:
             arrow(axes, [(right[2], y), (left[3], y)])
-        # the tags go into the loss from above, the error flows back below to the network that learns
-        tags = "tags: real 1.0, generated 0.0" if phase == 1 else "tags reversed: generated 1.0"
-        axes.text(right[4], judged + height / 2 + 0.07, tags, size=7, ha="right")
+        # the labels enter the loss from above; the gradient flows back below to the network that learns
+        labels = "labels: real 1.0, generated 0.0" if phase == 1 else "label reversed: generated 1.0"
+        axes.text(right[4], judged + height / 2 + 0.07, labels, size=7, ha="right")
         low, back = judged - height / 2 - 0.2, 3 if phase == 1 else 1
         arrow(
             axes,
@@ -87,9 +95,9 @@ def draw(data: Arrays) -> matplotlib.figure.Figure:
             color,
             1.5,
         )
-        moved = ("the error moves", "the error passes the frozen discriminator and moves")[phase - 1]
-        moved += f" the {('discriminator', 'generator')[phase - 1]}’s weights only"
-        axes.text(middle[4], low - 0.14, moved, size=7, color=IN_PRINT.get(color, color), ha="right")
+        updated = ("the gradient updates", "the gradient passes through the frozen discriminator and updates")[phase - 1]
+        updated += f" the {('discriminator', 'generator')[phase - 1]}’s weights only"
+        axes.text(right[4], low - 0.14, updated, size=7, color=IN_PRINT.get(color, color), ha="right")
     return figure
 
 
@@ -97,9 +105,10 @@ FIGURE = PaperFigure(
     number=11,
     title="GAN training",
     alt=(
-        "Diagram of the two phases of an iteration. First the discriminator learns alone: real noise, tagged 1, and noise from the "
-        "frozen generator, tagged 0, go in, and the loss moves the discriminator's weights only. Then the generator learns: its "
-        "noise goes through the frozen discriminator with the tag reversed to 1, and the loss moves the generator's weights only."
+        "Diagram of the two phases of an iteration. In the first, the discriminator learns: it receives real noise, labelled 1, and noise "
+        "from the frozen generator, labelled 0, and the gradient of the loss updates only its own weights. In the second, the generator "
+        "learns: its noise goes through the frozen discriminator with the label reversed to 1, and the gradient of the loss updates only "
+        "the generator's weights."
     ),
     drawn_by=draw,
     arrays=arrays,

@@ -10,20 +10,20 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 12: accuracy and loss of the discriminator on real and on generated noise, by iteration."""
+    """Accuracy and loss of the discriminator on real and on generated noise, by iteration."""
     measures = [f"{measure}_{kind}" for measure in ("accuracy", "loss") for kind in ("real", "generated")]
     return {key: experiment.noise_history[key] for key in ("iteration", *measures)}
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 12."""
+    """Draws Figure 12."""
     iteration = data["iteration"]
     real, generated = (float(data[f"accuracy_{kind}"][-1]) for kind in ("real", "generated"))
     figure, down = new_sheet(
         DOUBLE,
         2.9,
-        f"After {int(iteration[-1]):,} iterations the discriminator is right on {100 * real:.0f} % of real and {100 * generated:.0f} % of generated noise",
-        "Judged on a fresh batch of each kind at every record; the first is before training.",
+        f"After {int(iteration[-1]):,} iterations, {100 * real:.0f} % of real and {100 * generated:.0f} % of generated noise is classified correctly",
+        f"By the discriminator, on a new batch of each kind every {int(iteration[1] - iteration[0]):,} iterations. The first point is before training.",
     )
     accuracy, loss = panels(figure, down + 0.22, 1, 2, right=0.75, gap=(0, 1.15))[0]
     before, *after = zip(data["loss_real"], data["loss_generated"], strict=True)
@@ -32,7 +32,7 @@ def draw(data: Arrays) -> matplotlib.figure.Figure:
         beyond = [f"{value:.2g} {kind}" for value, kind in zip(before, ("real", "generated"), strict=True) if value > top]
         note = f"before training, off scale:\n{', '.join(beyond)}"
         loss.annotate(note, (0.22, 0.99), xycoords="axes fraction", size=7, color=QUIET, va="top")
-    plot_measure(accuracy, data, "accuracy", 1, "share judged rightly", (0.5, "0.5"))
+    plot_measure(accuracy, data, "accuracy", 1, "share classified correctly", (0.5, "0.5"))
     plot_measure(loss, data, "loss", top, "binary cross-entropy (nats)", (np.log(2), "ln 2"))
     return figure
 

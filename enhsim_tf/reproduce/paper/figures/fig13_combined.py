@@ -10,7 +10,7 @@ from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 13: a held-out window: coarse, enhanced, enhanced with noise, and the telemetry of the same times."""
+    """A held-out window: coarse, enhanced, enhanced with noise, and the telemetry of the same times."""
     window = {key: values[0] for key, values in spread_windows(experiment, "test", 1, "figure 13").items()}
     enhanced = experiment.simulator.enhance(window["coarse"][None])[0]
     noise = experiment.simulator.noise.generate(1, seed=draw_seed(experiment.data.draw("figure 13, noise")))[0]
@@ -19,15 +19,14 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 13."""
+    """Draws Figure 13."""
     clean, noisy, real = (roughness(data[key]) for key in ("enhanced", "combined", "telemetry"))
-    compared = "less" if noisy < 0.9 * real else "more" if noisy > 1.1 * real else "as"
+    compared = "less rough than" if noisy < 0.9 * real else "rougher than" if noisy > 1.1 * real else "as rough as"
     figure, down = new_sheet(
         DOUBLE,
         4.2,
-        f"With generated noise added, the enhanced signal is {compared} restless {'as' if compared == 'as' else 'than'} telemetry",
-        f"Standard deviation of first differences in this window: {clean:.3f} enhanced, {noisy:.3f} with noise, {real:.3f} in held-out "
-        "telemetry.",
+        f"With generated noise added, the enhanced signal is {compared} telemetry",
+        f"Roughness (standard deviation of first differences) in this window: {clean:.3f} enhanced, {noisy:.3f} with noise, {real:.3f} real.",
     )
     axes = panels(figure, down + 0.2, 3, 1, sharex=True, sharey=True)
     first, second, third = axes[:, 0]
@@ -38,7 +37,7 @@ def draw(data: Arrays) -> matplotlib.figure.Figure:
     for panel, words in (
         (first, (("Simulator output", COARSE), ("enhanced", ENHANCED))),
         (second, (("Enhanced, with generated noise added", GENERATED),)),
-        (third, (("Real telemetry, held out, of the same times", REAL),)),
+        (third, (("Real telemetry of the same time, held out", REAL),)),
     ):
         title_words(panel, words)
     name_axes(axes, data)
@@ -50,7 +49,7 @@ FIGURE = PaperFigure(
     title="Simulator output, enhanced, with noise added",
     alt=(
         "One held-out window in three panels: the coarse simulation with the enhanced signal; the enhanced signal with generated "
-        "noise added; real telemetry of the same times. The line under the title gives the standard deviation of the first "
+        "noise added; real telemetry of the same time. The line under the title gives the standard deviation of the first "
         "differences of each."
     ),
     drawn_by=draw,

@@ -13,7 +13,7 @@ STRETCH = 3_600  # samples: an hour of the paper's example
 
 
 def arrays(experiment: Experiment) -> Arrays:
-    """Figure 14: the beginning of the series as the store holds it, with its timestamps where the source has them."""
+    """The beginning of the series as the store holds it, with its timestamps where the source has them."""
     series = experiment.store.read(experiment.store.names()[0])
     stretch = series.part(0, min(STRETCH, len(series)))
     time = stretch.time_s
@@ -25,16 +25,16 @@ def arrays(experiment: Experiment) -> Arrays:
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
-    """Figure 14."""
+    """Draws Figure 14."""
     number, interval = int(data["num_samples"]), float(data["interval_s"])
     has_time = data["time"].dtype.kind == "M"
     figure, down = new_sheet(
         DOUBLE,
         2.5,
         f"The telemetry store holds {number:,} samples of “{data['name']}”",
-        f"One every {interval:g} s; the first {len(data['values']):,} as read back."
+        f"One sample every {interval:g} s. Shown: the first {len(data['values']):,}, as read back from the store."
         if has_time
-        else f"The first {len(data['values']):,} as read back; the source gives no times.",
+        else f"Shown: the first {len(data['values']):,}, as read back from the store; the source gives no times.",
     )
     panel = panels(figure, down + 0.1, 1, 1)[0, 0]
     panel.plot(data["time"], data["values"], color=REAL, linewidth=0.4)

@@ -3,6 +3,7 @@
 import matplotlib.figure
 import numpy as np
 
+from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import DOUBLE, EDGE, FOOT, QUIET, REAL, name_axes, new_sheet, panels
 from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays
 
@@ -18,14 +19,12 @@ def guessing_figure(data: Arrays, what: str, remark: str = "", columns: int = 4)
     """Real and generated rows in random order; the answer is printed upside down at the bottom."""
     number, generated = len(data["rows"]), int(data["is_generated"].sum())
     rows = -(-number // columns)
-    counted = {1: "One", 2: "Two", 3: "Three", 4: "Four"}.get(generated, str(generated))
-    total = {2: "two", 4: "four", 8: "eight"}.get(number, str(number))
     verb = "is" if generated == 1 else "are"
     figure, down = new_sheet(
         DOUBLE,
         1.24 + 0.95 * rows + 0.16 * bool(remark) if columns > 1 else 1.3 + 0.72 * rows,
-        f"{counted} of these {total} {what} {verb} generated. Which?",
-        f"{remark}A counterpart of the paper’s borrowed picture of a generated face, not a reproduction of it.",
+        f"{in_words(generated).capitalize()} of these {in_words(number)} {what} {verb} generated. Which?",
+        f"{remark}Counterpart, not a reproduction, of a generated face that the paper shows here.",
     )
     axes = panels(figure, down + 0.2, rows, columns, gap=(0.24, 0.14), sharex=True, sharey=True)
     letters = "abcdefghijklmnop"[:number]

@@ -32,7 +32,10 @@ def layers_of(model: "keras.Model") -> Arrays:
 
 
 def layer_names(layers: Sequence) -> list[str]:
-    """Names of layers. Those that Keras makes up count what the process has made, so tell what came from the cache; here the network's."""
+    """Names of layers, with the numbers that Keras appends counted within this network.
+
+    Keras counts all layers that the process has created, so its numbers would depend on what came from the cache.
+    """
     names, made_up = [], collections.Counter()
     for layer in layers:
         root = re.sub(r"_\d+$", "", layer.name)
