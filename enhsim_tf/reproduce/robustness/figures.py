@@ -38,6 +38,11 @@ def _per_cent(axes: Axes, ticks: Sequence[float]) -> None:
     axes.minorticks_off()
 
 
+def _signed(value: float) -> str:
+    """A number with two decimals and a minus sign instead of a hyphen."""
+    return f"{value:.2f}".replace("-", "−")
+
+
 def _scope(found: Findings) -> str:
     return f"{in_seeds(found['seeds'])}, {found['num_windows']:,} nominal windows each"
 
@@ -131,16 +136,17 @@ def realism_value(found: Findings) -> matplotlib.figure.Figure:
     """Rank correlation of each measure of realism with the share of the false-alarm gap that a noise closes."""
     measures = sorted(found["measures"]["predicts"].items(), key=lambda each: each[1]["rho"])
     (best, strongest), (within, inside) = measures[0], min(measures, key=lambda each: each[1]["within"])
-    there = f"{inside['within']:.2f}"
-    is_tie = f"{measures[0][1]['within']:.2f}" == there
-    names = f"{best} and {within} do" if is_tie else f"{within} does"
-    inside_too = "on average within an environment, " + ("it does too" if within == best else f"{names} ({there})")
+    there = _signed(inside["within"])
+    is_tie = _signed(strongest["within"]) == there
+    names = f"“{best}” and “{within}” do" if is_tie else f"“{within}” does"
+    inside_too = "within each kind of noise, on average, " + ("it does too" if within == best else f"{names} ({there})")
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        f"Over all environments, {best} best predicts how much a noise reduces false alarms (rank correlation {strongest['rho']:.2f}); {inside_too}",
-        f"Dot and bar: Spearman's rank correlation between the departure from real noise and the share of the false-alarm gap closed, over {found['measures']['num_rows']} "
-        "noises of all environments and seeds, with its 95 % interval; cross: mean of the correlations within each environment. A perfect predictor has −1.",
+        f"Of all measures of realism, “{best}” best predicts how much a noise model reduces false alarms (rank correlation {_signed(strongest['rho'])}); {inside_too}",
+        "Dot and bar: Spearman's rank correlation between a measure's distance from real noise and the share of the false-alarm gap (coarse to real "
+        f"training) that the noise model closes, with its 95 % interval, over {found['measures']['num_rows']} noise models of all environments and seeds. "
+        "Cross: mean of the correlations within each environment. A perfect predictor has −1.",
     )
     axes = panels(figure, down + 0.12, 1, 1)[0, 0]
     place = axes.get_position()
@@ -150,10 +156,10 @@ def realism_value(found: Findings) -> matplotlib.figure.Figure:
         axes.plot([about["low"], about["high"]], [-height] * 2, color=colour, linewidth=2, alpha=0.5)
         axes.plot(about["rho"], -height, "o", color=colour, markersize=4)
         axes.plot(about["within"], -height, "x", color=REAL, markersize=4)
-    axes.set_yticks(-np.arange(len(measures)), [f"{about['section']}  {name}" for name, about in measures])
+    axes.set_yticks(-np.arange(len(measures)), [name for name, _ in measures])
     axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
     axes.set_xlim(-1.02, max(0.02, *(about[end] + 0.03 for _, about in measures for end in ("high", "within"))))
-    axes.set_xlabel("rank correlation with the gap closed")
+    axes.set_xlabel("rank correlation with the share of the gap closed")
     return figure
 
 
@@ -174,7 +180,7 @@ def scale_and_share(found: Findings) -> matplotlib.figure.Figure:
         DOUBLE,
         4.8,
         f"With noise of the convolutional GAN scaled by {quiet['scale']:g}, the false-alarm rate is {in_environments}; scaled by {loud['scale']:g}, detectors "
-        f"that use samples instead of features find {found_by_values(loud):.0f} % of anomalies instead of {found_by_values(own):.0f} %",
+        f"that use the samples of a window find {found_by_values(loud):.0f} % of anomalies, and {found_by_values(own):.0f} % with noise as generated",
         f"Means over {len(loud['by_detector'])} detectors (no neural networks), environments and {in_seeds(found['seeds'])}. Right: real windows replace some "
         "of the windows for training and threshold (solid) or for training only (dashed). Dotted: upper bound for the solid curves, 1 % divided by the share of real windows.",
     )
@@ -234,8 +240,9 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
         f"Above severity {found['modes']['largest_trained']}, the error of the paper's enhancer is {errors['paper']['outside']:.2f} and that of the coarse signal "
         f"{errors['identity']['outside']:.2f}; trained on randomised configurations up to that severity, a network has {errors['randomised']['outside']:.2f} "
         f"and ridge regression {errors['ridge, randomised']['outside']:.2f}",
-        f"Root mean square error of the enhanced signal with respect to the true degraded signal, in standard deviations of the nominal signal. Grey: "
-        f"severities that the randomised methods were trained on. {in_seeds(found['modes']['seeds'])}.",
+        "Root-mean-square error of the enhanced signal with respect to the true degraded signal, in standard deviations of the nominal signal. "
+        "“More windows”: the paper's network, trained on more nominal windows for fewer epochs. “Randomised”: trained on random configurations of all modes, "
+        f"with severities in the grey area. Mean over {in_seeds(found['modes']['seeds'])}.",
     )
     grid = panels(figure, down + 0.22, 2, 3, right=1.15, gap=(0.42, 0.36), sharex=True)
     for axes, mode in zip(grid.ravel(), modes, strict=True):
