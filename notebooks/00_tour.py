@@ -4,7 +4,7 @@
 # A detector that guards a satellite should know what failure looks like. Nobody breaks satellites to record it, so failures are
 # *simulated*. But simulations are too clean: a detector trained on them takes the ordinary noise of the real thing for an anomaly.
 # Feldman ([arXiv 2008.12082](https://arxiv.org/abs/2008.12082)) proposes a repair: keep the simulator crude and fast, and let two
-# neural networks make its output believable.
+# neural networks make its output realistic.
 #
 # This notebook follows the idea from end to end, one figure a step, and then asks where each step fails. It needs a reader who knows
 # what a Dense layer is, and no more. The other notebooks take one figure each and go deeper.
@@ -20,9 +20,9 @@ from enhsim_tf.reproduce.notebook import drawing, open_experiment, show, verdict
 experiment = open_experiment()
 
 # %% [markdown]
-# What a cell needs and nobody has trained yet is trained there and kept; at full budget that is minutes, once. To try things out in
-# seconds, start Jupyter with `ENHSIM_TF_BUDGET=smoke`: the same path with small counts, and figures that say so. The text below speaks
-# of full budget.
+# Networks are trained in the first cell that needs them, and kept; at full budget this takes minutes, once. To try things out in
+# seconds, start Jupyter with `ENHSIM_TF_BUDGET=smoke`: every step then runs with small counts, and the figures are marked. The text
+# below describes results at full budget.
 #
 # ## The map
 #
@@ -33,8 +33,8 @@ show(experiment, "fig01_pipeline")
 simulator = experiment.simulator
 
 # %% [markdown]
-# *What to see:* the upper row makes a waveform, the lower row makes noise, and they meet at the plus sign and nowhere else. So a
-# healthy satellite and one that got stuck get the same noise from the same seed:
+# *What to see:* the upper row makes a waveform, the lower row makes noise, and the two are independent until they are added. A
+# healthy satellite and one that got stuck therefore get the same noise from the same seed:
 
 # %%
 import numpy as np
@@ -75,8 +75,8 @@ assert len(levels) == 4 and pairs["source"].shape[1] == 500
 enhanced = show(experiment, "fig04_enhanced_simulation")
 
 # %% [markdown]
-# *What to see:* the error against the true signal falls to a fraction of the simulator's own, on telemetry never trained on. The line
-# still trembles a little where the truth is smooth.
+# *What to see:* the error against the true signal falls to a fraction of the simulator's own, on telemetry never trained on. The
+# enhanced signal is still slightly rough where the truth is smooth.
 
 # %%
 before, after = float(enhanced["identity_nrmse"]), float(enhanced["nrmse"])
@@ -90,14 +90,14 @@ assert experiment.enhancement["roughness"] > 2 * experiment.enhancement["truth_r
 #
 # ## Step 6: the noise, taken from real telemetry
 #
-# What a moving average leaves over is called noise, and becomes the training data of network two.
+# Telemetry minus its moving average is called noise, and becomes the training data of the second network.
 
 # %%
 source = show(experiment, "fig08_source_noise")
 
 # %% [markdown]
-# *What to see:* the noise looks the same everywhere, and its standard deviation is close to the true one, which for once we know,
-# because we made the telemetry ourselves.
+# *What to see:* the noise looks the same everywhere, and its standard deviation is close to the true one, which is known here
+# because the telemetry is generated.
 
 # %%
 measured, true = float(source["standard_deviation"]), experiment.settings.telemetry.noise_sd
@@ -114,12 +114,12 @@ assert abs(measured / true - 1) < 0.03
 history = show(experiment, "fig12_accuracy_loss")
 
 # %% [markdown]
-# *What to see:* the discriminator wins at first; then its accuracies fall and its losses rise towards those of somebody who guesses,
-# one half and ln 2. The game is even, and the paper stops here: the noise is "sufficiently similar". At a glance it is:
+# *What to see:* the discriminator wins at first; then its accuracies fall and its losses rise towards chance level, one half and
+# ln 2. The networks are in balance, and the paper stops here: the noise is "sufficiently similar". At a glance it is:
 
 # %%
 late = np.mean([history[f"accuracy_{kind}"][-3:] for kind in ("real", "generated")])
-print(f"judged rightly at the end: {late:.0%} of both kinds together")
+print(f"classified correctly at the end: {late:.0%} of both kinds together")
 assert 0.35 < late < 0.65
 if experiment.settings.budget == "full":
     assert history["accuracy_real"][1] > 0.9 and history["accuracy_generated"][1] > 0.9
@@ -130,8 +130,8 @@ if experiment.settings.budget == "full":
 guess = show(experiment, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* nothing at a glance. Lay the generated ones over each other (their letters stand upside down at the foot): they begin
-# quietly and rise and fall together, which no two real ones do.
+# *What to see:* nothing at a glance. Draw the generated ones over each other (their letters are printed upside down at the foot): they
+# begin with small values and rise and fall together, which no two real ones do.
 
 # %%
 rows, is_generated = guess["rows"], guess["is_generated"]
@@ -161,15 +161,15 @@ assert generated < share * real
 final = show(experiment, "fig13_combined")
 
 # %% [markdown]
-# *What to see:* at a glance the second panel could hang in the place of the third: with its noise, the signal is as restless as
-# telemetry. That is luck of this seed: with two others, the noise ends about a quarter too small (notebook 12).
+# *What to see:* at a glance the second and the third panel look alike: with its noise, the signal is as rough as telemetry. This
+# depends on the seed: with two others, the standard deviation of the noise ends about a quarter too small (notebook 12).
 
 # %%
-restless = {key: float(np.std(np.diff(final[key]))) for key in ("enhanced", "combined", "telemetry")}
-print({key: round(value, 3) for key, value in restless.items()})
-assert restless["enhanced"] < restless["combined"]
+roughness = {key: float(np.std(np.diff(final[key]))) for key in ("enhanced", "combined", "telemetry")}
+print({key: round(value, 3) for key, value in roughness.items()})
+assert roughness["enhanced"] < roughness["combined"]
 if experiment.settings.budget == "full":  # twenty iterations give noise of the wrong size
-    assert abs(restless["combined"] / restless["telemetry"] - 1) < 0.15
+    assert abs(roughness["combined"] / roughness["telemetry"] - 1) < 0.15
 
 # %% [markdown]
 # ## Does it serve its purpose?
@@ -191,9 +191,9 @@ with drawing(alt, 3, 1.7, sharey=True) as panels:
     panels[0].invert_yaxis()
 
 # %% [markdown]
-# *What to see:* trained on the clean signal, a detector cries wolf always. With the GAN's noise the answer depends on the detector: the
-# one that looks at directions, PCA, still alarms on everything. Plain Gaussian noise of the right size does better. Trained on raw
-# square waves, a detector is quiet for a bad reason: it cannot follow their edges, so its threshold is huge. It is blind: its recall,
+# *What to see:* trained on the clean signal, every detector raises a false alarm on every window. With the GAN's noise the result
+# depends on the detector: the PCA residual still alarms on everything. Plain Gaussian noise of the right size does better. Trained on
+# raw square waves, a detector raises few alarms for a bad reason: it cannot follow their edges, so its threshold is high. Its recall,
 # the share of anomalies that it finds, stays far below that of a detector trained on real telemetry.
 
 # %%
@@ -213,8 +213,8 @@ if experiment.settings.budget == "full":  # noise of the wrong size would teach 
 # | coarse simulator | square waves of known period: fast, right rhythm | wrong shape; four values |
 # | enhancer | maps coarse windows to smooth ones | modes it never saw come out wrong (C9) |
 # | moving average | splits telemetry into waveform and noise | a little of the waveform stays in the noise |
-# | noise GAN | sixteen random numbers to a window of noise | fills few directions; the discriminator cannot notice (C6) |
-# | sum | adds the two | noise knows nothing of the signal; a detector of directions is not fooled (C8) |
+# | noise GAN | sixteen random numbers to a window of noise | varies in few dimensions; the discriminator does not detect it (C6) |
+# | sum | adds the two | the noise does not depend on the signal; the PCA residual separates the sum from telemetry (C8) |
 
 # %%
 records = verdict(experiment, "C6", "C8", "C9")
@@ -249,7 +249,7 @@ with drawing(alt, len(MODES), 1.5, sharey=True) as panels:
 #    Notebook 04 looks closer.
 # 2. *Enhanced + Gaussian noise*: the simplest noise that matches the scale gives false alarms near those of real telemetry. First check
 #    that it misses no more anomalies than a detector trained on real telemetry does (`experiment.false_alarms["recall"]`), and whether
-#    the real noise is white at all: here it was made so. For noise with structure the Gaussian arm has no right to win. This tour follows
-#    the paper's recipe; `EnhancedSimulator.fit` trains another generator by default, and notebook 22 compares the two.
+#    the real noise is white at all: here it was made so. For noise with structure the Gaussian arm has no right to win. This tour
+#    follows the paper's recipe; `EnhancedSimulator.fit` trains another generator by default, and notebook 22 compares the two.
 #
 # </details>

@@ -24,7 +24,7 @@ arrays = show(experiment, "fig01_pipeline")
 #
 # ## How it is built
 #
-# `EnhancedSimulator` puts the rooms of the package together. Each step can be called by itself:
+# `EnhancedSimulator` combines the packages of the four steps. Each step can also be called by itself:
 
 # %%
 simulator = experiment.simulator
@@ -37,7 +37,7 @@ telemetry = simulator.generate(num_windows=4, seed=7)  # all of that in one call
 print("windows, samples:", telemetry.shape, telemetry.dtype)
 
 # %% [markdown]
-# *What to see:* the two rows of the figure meet in one plus sign. What is added to a waveform is drawn without a look at it: a
+# *What to see:* the two rows of the figure meet only where they are added. The noise is sampled independently of the waveform: a
 # satellite that got stuck gets the same noise as a healthy one from the same seed.
 
 # %%
@@ -91,11 +91,11 @@ with drawing(alt, height=1.8) as panel:
 # %% [markdown]
 # <details><summary>What to say about it</summary>
 #
-# 1. There is no seam: the edge is one place among many. But there is a *rhythm*. Real telemetry is equally restless at every place; the
-#    generated series is calm at some and wild at others, and repeats that every half window. The fading is not to blame. The
-#    generator's windows share a pattern of their own, which notebook 21 takes out and shows.
-# 2. The noise would come out of one size everywhere, the average over all levels of the signal: too loud where the signal is small, too
-#    quiet where it is large. The arrow that is missing leads from *Clean data* (5) into the GAN (8): a generator that is given the
-#    signal as a condition.
+# 1. There is no seam: the edge is one place among many. But there is a *rhythm*. Real telemetry is equally rough at every place; the
+#    generated series is smooth at some places and rough at others, and repeats this every half window. Blending the windows does not
+#    cause it. The generator's windows share a fixed pattern, which notebook 21 extracts and shows.
+# 2. The noise would have the same size everywhere, the average over all levels of the signal: its standard deviation would be too
+#    large where the signal is small, and too small where it is large. The arrow that is missing leads from *Clean data* (5) into the
+#    GAN (8): a generator that is given the signal as a condition.
 #
 # </details>

@@ -41,8 +41,8 @@ assert 0.74 < max(by_hand) / sum(by_hand) < 0.76
 # %% [markdown]
 # ## How it is trained
 #
-# Mean squared error, Adam, batches of 15 windows. The target is the *noisy* telemetry. That works, because the best guess in the
-# least-squares sense is the mean of what can follow, and noise has mean zero. Here is the loss of every epoch, with that reasoning as a
+# Mean squared error, Adam, batches of 15 windows. The target is the *noisy* telemetry. That works, because the best prediction in the
+# least-squares sense is the conditional mean, and noise has mean zero. Here is the loss of every epoch, with that reasoning as a
 # dotted line: no network can get below the variance of the noise on windows it has not seen.
 
 # %%

@@ -34,21 +34,22 @@ print("windows, samples:", enhanced.shape, f" error {nrmse(enhanced, held_out['t
 arrays = show(experiment, "fig04_enhanced_simulation")
 
 # %% [markdown]
-# *What to see:* the error is a fraction of the simulator's own, but what is left is no smooth curve: the enhanced line trembles.
+# *What to see:* the error is a fraction of the simulator's own, but the enhanced signal is not smooth: it follows the true signal with
+# a small, rough error.
 
 # %%
 signals = {"truth": held_out["truth"], "enhanced": enhanced, "telemetry": held_out["target"]}
-tremble = {name: roughness(windows) for name, windows in signals.items()}
+rough = {name: roughness(windows) for name, windows in signals.items()}
 print("standard deviation of the steps from sample to sample:")
-print({name: round(value, 3) for name, value in tremble.items()})
+print({name: round(value, 3) for name, value in rough.items()})
 
 error = float(arrays["nrmse"])
 assert abs(error - nrmse(enhanced, held_out["truth"])) < 1e-3
 assert error < {"full": 0.15, "smoke": 1.0}[experiment.settings.budget]
-assert tremble["enhanced"] > 2 * tremble["truth"]
+assert rough["enhanced"] > 2 * rough["truth"]
 
 # %% [markdown]
-# The tremble is what the network has learned by heart of the noise in its targets. Is so large a network needed at all? Ridge
+# This error is noise of the training targets that the network has memorised. Is so large a network needed at all? Ridge
 # regression, one matrix from 500 to 500 samples, gets far:
 
 # %%
@@ -61,7 +62,7 @@ assert found["ridge_nrmse"] < found["identity_nrmse"] / 3
 # The last line explains why training and held-out error agree so well: a periodic simulator has few different windows (notebook 02),
 # and the network has met nearly all of them.
 #
-# ## What the ledger says
+# ## The verdict
 
 # %%
 records = verdict(experiment, "C1", "C2", "C3")
@@ -106,7 +107,7 @@ for mode, after, before in zip(modes["modes"], modes["nrmse"], modes["identity_n
 # %% [markdown]
 # <details><summary>What to say about it</summary>
 #
-# 1. The matrix knows no relu and no epochs, and yet the network adds little to it, or nothing: the ledger's verdict on C1 hangs on that
+# 1. The matrix knows no relu and no epochs, and yet the network adds little to it, or nothing: the verdict on C1 depends on that
 #    comparison. In this example the map from a square wave to the sine of the same phase is close to linear on the few windows that
 #    occur.
 # 2. The enhancer has learned one thing: which healthy waveform goes with which healthy input. A stuck simulator is no healthy input,

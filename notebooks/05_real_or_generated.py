@@ -40,7 +40,7 @@ assert windows["is_generated"].sum() == 4 and round(lucky, 2) == 0.24
 
 # %%
 (record,) = verdict(experiment, "C7")
-print(f"a classifier tells sum from telemetry at AUC {record['value']:.2f}; chance is 0.5")
+print(f"a classifier separates sum and telemetry with an AUC of {record['value']:.2f}; chance is 0.5")
 assert record["value"] > 0.8
 
 # %% [markdown]
@@ -50,8 +50,8 @@ assert record["value"] > 0.8
 noise = show(experiment, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* again nothing at a glance. Lay the generated ones over each other: they begin quietly and rise and fall together, since
-# all hold the same pattern. With that in mind, the eye finds them.
+# *What to see:* again nothing at a glance. Draw the generated ones over each other: they begin with small values and rise and fall
+# together, since all share the same pattern. With that in mind, the eye finds them.
 
 # %%
 rows, is_generated = noise["rows"], noise["is_generated"]
@@ -112,8 +112,8 @@ assert np.min(np.array(repeats)[is_generated]) > least > np.max(np.array(repeats
 # ## Exercises
 #
 # 1. A classifier beats your eye, so what does it look at? Rank the features of `two_sample.window_features` by how well each one alone
-#    tells generated from real noise.
-# 2. How many windows would you have to judge, and how many of them rightly, before you may claim to see a difference?
+#    separates generated from real noise.
+# 2. How many windows would you have to classify, and how many of them correctly, before you may claim to see a difference?
 
 # %% [markdown] jp-MarkdownHeadingCollapsed=true
 # ## Solution
@@ -139,7 +139,7 @@ assert np.abs(alone - 0.5).max() > 0.25
 # %% [markdown]
 # <details><summary>What to say about it</summary>
 #
-# 1. (An AUC of 0 tells as much as one of 1.) At full budget one feature gives the game away: the power in the band of four to seven
+# 1. (An AUC of 0 separates as well as one of 1.) At full budget a single feature is enough: the power in the band of four to seven
 #    cycles a window. The 2-minute wave lies there, of which the moving average leaves a little in the real noise (notebook 08), in
 #    every window the same amount. The generator misses it.
 # 2. For a chance of error of 5 % in a test of $n$ windows, half of them generated, you need about $n/2+0.8\sqrt n$ right: 8 windows ask

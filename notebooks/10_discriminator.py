@@ -63,8 +63,8 @@ with drawing(alt, 2, 2.6, sharex=True, sharey=True) as panels:
         panel.set(title=name, xlabel="judged real, as recorded", ylabel="judged real, reordered")
 
 # %% [markdown]
-# *What to see:* on the left the points keep to the diagonal. For this judge a window is a bag of snippets 20 samples long. Whatever
-# sets windows apart over longer stretches, it cannot punish, and the generator need not learn.
+# *What to see:* on the left the points stay on the diagonal. For this discriminator, a window is an unordered set of pieces of 20
+# samples. It cannot detect differences over longer stretches, so the generator does not learn to avoid them.
 
 # %%
 moved = {name: float(np.mean(np.abs(other - judged))) for name, other in reordered.items()}

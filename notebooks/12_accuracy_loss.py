@@ -20,7 +20,7 @@ claim("C4", "C5")
 # %% [markdown]
 # ## How it is built
 #
-# `NoiseGAN.fit` judges a fresh batch of each kind at every record and returns the history:
+# `NoiseGAN.fit` records accuracy and loss on a new batch of each kind and returns the history:
 #
 # ```python
 # history = gan.fit(noise_windows, num_iterations=1_000, record_every=100)
@@ -80,8 +80,8 @@ assert rank.max() < {"full": 0.5, "smoke": 0.9}[experiment.settings.budget]
 assert abs(np.log(size[-1])) < {"full": 0.1, "smoke": 3.0}[experiment.settings.budget]
 
 # %% [markdown]
-# One seed is one story. Two of the three that the ledger looks at end with noise about a quarter too small, and keep it so while the
-# game stays as even as here:
+# One seed is not enough. With two of the three seeds of the claims, the standard deviation of the noise ends about a quarter too
+# small, although the networks are as balanced as here:
 
 # %%
 import json
@@ -92,11 +92,11 @@ off = np.exp(
     -np.sort(spread["claims"]["C4"]["values"])[::-1]
 )  # the value is the size's distance from 1, as a log
 print(f"seeds {spread['seeds']}: the noise misses its size by the factors", off.round(2))
-print("share of rows judged rightly:", np.round(spread["claims"]["C5"]["values"], 2))
+print("share of rows classified correctly:", np.round(spread["claims"]["C5"]["values"], 2))
 assert off[0] < 0.85 and off[1] < 0.85 and np.ptp(spread["claims"]["C5"]["values"]) < 0.05
 
 # %% [markdown]
-# ## What the ledger says
+# ## The verdicts
 
 # %%
 records = verdict(experiment, "C4", "C5")
@@ -135,10 +135,10 @@ assert sizes[2] < sizes[1] < sizes[0]
 # <details><summary>What to say about it</summary>
 #
 # 1. Neither knows anything: both are right on half of all rows. The first says "real" to three quarters of whatever it sees. That is
-#    why the ledger judges both kinds together.
+#    why the claim is evaluated on both kinds together.
 # 2. The slow discriminator is no teacher: after 400 iterations the noise still has the size that it began with. The fast one is ahead
 #    most of the time, and the generator learns *fastest* of all, since reversed tags pull hard while the discriminator is sure
-#    (notebook 11). With this loss, "slightly faster" is no condition for learning; a judge that is sure of itself does no harm, one
-#    that learns too little does.
+#    (notebook 11). With this loss, "slightly faster" is no condition for learning: a discriminator with high confidence does no
+#    harm, one that learns too little does.
 #
 # </details>

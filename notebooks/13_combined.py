@@ -31,19 +31,19 @@ arrays = show(experiment, "fig13_combined")
 
 # %% [markdown]
 # *What to see:* at a glance the orange line and the black one under it could be exchanged. They agree in size, in their values and in
-# how restless they are. Several windows laid over each other would tell: the noise of all holds one pattern (notebook 05).
+# how rough they are. Several windows drawn over each other would show a difference: the noise of all shares one pattern (notebook 05).
 
 # %%
 from enhsim_tf.realism.measures import marginal_distance, roughness, scale_difference
 
 real = held_out["target"]
-size, restless = scale_difference(combined, real), roughness(combined) / roughness(real)
+size, relative = scale_difference(combined, real), roughness(combined) / roughness(real)
 print(f"standard deviation off by {np.expm1(size):.1%}, values by {marginal_distance(combined, real):.3f} sd")
 rough = roughness(clean) / roughness(real)
-print(f"roughness, share of the real: {rough:.2f} clean, {restless:.2f} combined")
-assert rough < restless
+print(f"roughness, share of the real: {rough:.2f} clean, {relative:.2f} combined")
+assert rough < relative
 if experiment.settings.budget == "full":  # twenty iterations give noise of the wrong size
-    assert size < 0.1 and 0.8 < restless < 1.25 and marginal_distance(combined, real) < 0.05
+    assert size < 0.1 and 0.8 < relative < 1.25 and marginal_distance(combined, real) < 0.05
     shared = np.corrcoef((combined - clean)[:100])
     assert (shared.sum() - 100) / (100 * 99) > 0.2
 

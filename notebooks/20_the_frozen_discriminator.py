@@ -131,9 +131,9 @@ with drawing(alt, 2, 2.3, sharey=True) as panels:
         panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* both pictures move, so both look like training. On the left all of the movement is the generator's, which learns to
-# please a judge who learned nothing: the loss on generated noise *rises*. On the right the judge finds the generated noise out within a
-# few steps.
+# *What to see:* both losses change, so both look like training. On the left only the generator learns, against a discriminator
+# that does not: the loss on generated noise *rises*. On the right the discriminator learns to recognise generated noise within a few
+# steps.
 
 # %%
 first, last = np.array(frozen)[[0, -1], 1], history["loss_generated"][[0, -1]]

@@ -106,9 +106,9 @@ assert alike > 0.5
 # %% [markdown]
 # ## What is hard: how the windows differ from each other
 #
-# Take that pattern away, since it is the same for all. Now take windows as points in 500 dimensions and ask how many directions the
-# cloud fills. The *effective rank* is the exponential of the entropy of the variance's shares: 1 for a cloud on a line, 500 for a round
-# one of endless size.
+# Subtract that pattern, since it is the same for all windows, and consider windows as points in 500 dimensions: in how many of them do
+# they vary? The *effective rank* is the exponential of the entropy of the shares of the variance: 1 for points on a line, 500 for an
+# infinite sample of white noise.
 
 # %%
 alt = "Variance gathered by the largest directions of real, GAN and Gaussian noise"
@@ -120,8 +120,8 @@ with drawing(alt, height=2.2) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* a few directions hold all of the GAN's variance; the real noise needs hundreds. The GAN's cloud is a thin sheet through
-# a round ball. Every point of the sheet could be a point of the ball. That is why no window by itself looks wrong.
+# *What to see:* a few directions hold all of the GAN's variance; the real noise needs hundreds. The GAN's windows lie in a subspace of
+# few dimensions, and each of them could be a window of real noise. That is why no single window looks wrong.
 
 # %%
 rank = {name: measures.effective_rank(rows) for name, rows in noises.items()}
@@ -199,8 +199,8 @@ assert records[0]["verdict"] != "reproduced"
 #
 # 1. A number needs a floor. Compute the effective rank of 50, 100, 200, 400 and 800 windows of real noise. May one compare a rank from
 #    200 windows with one from 1,000?
-# 2. Repair the sheet cheaply: mix the GAN's noise with Gaussian noise so that the total variance stays, and find the smallest share of
-#    Gaussian variance at which PCA stops crying wolf.
+# 2. Raise the effective rank cheaply: mix the GAN's noise with Gaussian noise so that the total variance stays, and find the smallest
+#    share of Gaussian variance at which the PCA residual no longer raises false alarms.
 
 # %% [markdown] jp-MarkdownHeadingCollapsed=true
 # ## Solution

@@ -1,9 +1,10 @@
 # %% [markdown]
 # # Does it make detectors robust?
 #
-# **What the paper says** (title): "Training robust anomaly detection". It trains no detector. This notebook does what the title promises:
-# it trains detectors on simulated windows, with noise of one kind or another, and counts how often they cry wolf on real, healthy ones.
-# *Real* means here: example telemetry, the paper's waves with noise that we draw, in the part of the real (notebook 24 has a spacecraft).
+# **What the paper says** (title): "Training robust anomaly detection". It trains no detector. This notebook does what the title
+# promises: it trains detectors on simulated windows, with noise of one kind or another, and measures how often they raise false alarms
+# on real, healthy ones. Example telemetry, the paper's waves with generated noise, stands in for *real* telemetry here (notebook 24 has
+# a spacecraft).
 
 # %%
 import sys
@@ -58,8 +59,8 @@ with drawing(alt, height=2.2) as panel:
     panel.legend(frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
 
 # %% [markdown]
-# *What to see:* the same healthy windows, three detectors. Trained on real telemetry it alarms about as often as it was set for. Trained
-# on the clean simulation every healthy window is strange to it, because every real window has noise.
+# *What to see:* the same healthy windows, three detectors. Trained on real telemetry it alarms about as often as it was set for.
+# Trained on the clean simulation every healthy window is strange to it, because every real window has noise.
 
 # %%
 assert rate["clean"] > 0.9 and rate["real"] < 0.1
@@ -68,10 +69,10 @@ assert rate["clean"] > 0.9 and rate["real"] < 0.1
 # ## The experiment
 #
 # One detector, one kind of noise and one seed prove little. `python -m enhsim_tf.reproduce --experiment robustness` trains every
-# detector on every arm, in four environments, everything anew with each seed. It takes hours; its tables are kept with the project.
-# An arm is what a detector is trained on. Arms that begin with *enhanced* use the paper's pipeline. Arms that begin with *residual* use the
-# default pipeline of `EnhancedSimulator.fit`: it extracts the noise as the residual of the enhancer, instead of subtracting a moving
-# average, and a convolutional GAN learns that noise.
+# detector on every arm, in four environments, everything anew with each seed. It takes hours; its tables are kept with the project. An
+# arm is what a detector is trained on. Arms that begin with *enhanced* use the paper's pipeline. Arms that begin with *residual* use
+# the default pipeline of `EnhancedSimulator.fit`: it extracts the noise as the residual of the enhancer, instead of subtracting a
+# moving average, and a convolutional GAN learns that noise.
 
 # %%
 from enhsim_tf.reproduce.robustness.replicate import ARMS
@@ -86,10 +87,10 @@ for name in ("alarms", "recall", "realism"):
 show_finding(found, "false_alarms")
 
 # %% [markdown]
-# *What to see:* orange is the paper's pipeline, blue is the residual pipeline. The orange dots with the noise of the paper's GAN lie far to
-# the right of the line: those detectors alarm on real, healthy telemetry, some of them on all of it. So do detectors trained with a
-# bootstrap of the noise that the moving average extracts, when the noise is coloured: the moving average has removed its slow part. The
-# blue dots with generated noise (*residual + convolutional GAN*) lie near the detectors trained on real telemetry in all four
+# *What to see:* orange is the paper's pipeline, blue is the residual pipeline. The orange dots with the noise of the paper's GAN lie
+# far to the right of the line: those detectors alarm on real, healthy telemetry, some of them on all of it. So do detectors trained
+# with a bootstrap of the noise that the moving average extracts, when the noise is coloured: the moving average has removed its slow
+# part. The blue dots with generated noise (*residual + convolutional GAN*) lie near the detectors trained on real telemetry in all four
 # environments, and the bootstrap nearly so. Gaussian noise and the autoregression do so only where the noise is of their kind. Without
 # noise, blue is as far off as orange.
 
@@ -107,16 +108,16 @@ assert mean["residual, no noise"] > 0.8
 # %% [markdown]
 # ## Quiet is not the same as good
 #
-# A detector that never alarms raises no false alarms either. So each rate is read beside the recall: how many of the anomalies, put into
-# the same real windows at the same places for every arm, it finds.
+# A detector that never alarms raises no false alarms either. So each rate is read beside the recall: how many of the anomalies, put
+# into the same real windows at the same places for every arm, it finds.
 
 # %%
 show_finding(found, "recall")
 
 # %% [markdown]
 # *What to see:* with the threshold set for all arms on the same real windows, which a user would not have, detectors trained on the
-# second generator's windows rank anomalies nearly as well as those trained on real telemetry (black). The paper's noise costs some kinds
-# more than others.
+# second generator's windows rank anomalies nearly as well as those trained on real telemetry (black). The paper's noise costs some
+# kinds more than others.
 
 # %%
 at_real_rate = {arm: about["recall_at_real_rate"] for arm, about in found["arms"].items()}
@@ -132,13 +133,13 @@ assert abs(at_real_rate["residual + convolutional GAN"] - at_real_rate["real"]) 
 show_finding(found, "scale_and_share")
 
 # %% [markdown]
-# *What to see:* the left column shows means over environments. Where all windows are equally loud (white and coloured noise), the scale has
-# to be right. Detectors trained with noise that is too quiet alarm on most real windows. Detectors trained with noise that is too loud
-# find fewer anomalies if they use the samples themselves; the isolation forest and the one-class SVM, which use features such as the
-# standard deviation, alarm on real windows because these are then too quiet. Where loudness differs between windows, the scale matters
-# less. The right column shows what real windows in the training set change. The solid curves fall along the dotted line, which is
-# arithmetic: where one in twenty of the windows that set a threshold is real, at most a fifth of the real windows can lie above it. The
-# dashed curve shows what those windows teach the detector itself.
+# *What to see:* the left column shows means over environments. Where the noise has the same standard deviation in all windows (white
+# and coloured noise), its scale has to be right. Detectors trained with too small a scale alarm on most real windows. With too large a
+# scale, detectors find fewer anomalies if they use the samples themselves; the isolation forest and the one-class SVM, which use
+# features such as the standard deviation, alarm on real windows because their standard deviation is then too small. Where the standard
+# deviation differs between windows, the scale matters less. The right column shows what real windows in the training set change. The
+# solid curves fall along the dotted line, which is arithmetic: where one in twenty of the windows that set a threshold is real, at most
+# a fifth of the real windows can lie above it. The dashed curve shows what those windows teach the detector itself.
 
 # %%
 arm = "residual + convolutional GAN"
@@ -155,8 +156,8 @@ for row in found["variations"]:  # the line, with the scatter of a threshold tha
 # %% [markdown]
 # ## Exercises
 #
-# 1. From `tables["alarms"]`, find the detector that suffers most from the paper's GAN, averaged over environments, and the one that does
-#    not notice. What does each look at?
+# 1. From `tables["alarms"]`, find the detector that suffers most from the paper's GAN, averaged over environments, and the one that
+#    does not notice. What does each look at?
 # 2. The limit check that learnt from real telemetry raises few false alarms. Does that make it a good detector? Look at its recall by
 #    kind of anomaly.
 
@@ -174,9 +175,9 @@ print(limit.groupby("kind", observed=True)["recall"].mean().sort_values().map("{
 # %% [markdown]
 # <details><summary>What to say about it</summary>
 #
-# 1. The residual of principal components looks at directions, and the GAN's noise fills few of them. That a detector is quiet does not
-#    mean that it was deceived: look at its recall beside the real-trained one's. The isolation forest and the one-class SVM see the same
-#    features of a window, and one is quiet where the other is not.
+# 1. The PCA residual measures the variance outside the principal components of training, and the GAN's noise varies in few dimensions.
+#    Few alarms do not mean that the noise is realistic: compare the recall with that of the detector trained on real telemetry. The
+#    isolation forest and the one-class SVM use the same features of a window, and one raises few alarms where the other raises many.
 # 2. It sees only values beyond those of training. What stays inside the range of the waves, such as a stuck value, it cannot see.
 #
 # </details>
