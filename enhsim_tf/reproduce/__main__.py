@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     if options.experiment:
         return run_labelled(options, folder) if options.experiment == "labelled" else run_experiment(options, folder)
     from enhsim_tf.common.atomic_files import write_json
-    from enhsim_tf.reproduce.caption import caption_of
+    from enhsim_tf.reproduce.caption import figure_caption
     from enhsim_tf.reproduce.figure import save
     from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge, ranges
     from enhsim_tf.reproduce.paper.data import Source
@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
 
-    def experiment_of(seed: int) -> Experiment:
+    def make_experiment(seed: int) -> Experiment:
         is_terminal = sys.stdout.isatty()
         stages = Stages(options.cache or default_cache(), options.fresh, tell, speaks=not is_terminal)
         given = make_settings(options.budget, seed), stages, source, int(is_terminal)
@@ -103,11 +103,11 @@ def run(options: argparse.Namespace) -> int:
             return Experiment(*given)
         from enhsim_tf.reproduce.paper.influx_pipeline import InfluxExperiment
 
-        return InfluxExperiment(location_of(options.store), *given)
+        return InfluxExperiment(influx_location(options.store), *given)
 
     began, is_smoke = time.perf_counter(), options.budget == "smoke"
     source = None if options.telemetry is None else Source(options.telemetry, options.column, options.time)
-    experiment = experiment_of(options.seed)
+    experiment = make_experiment(options.seed)
 
     def draw(names: Sequence[str]) -> float:
         """Draws figures and returns the time of the drawing alone, in seconds."""
@@ -115,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
         for name in names:
             data = FIGURES[name].arrays(experiment)  # runs the stages that the figure needs; these report their own time
             drawing = time.perf_counter()
-            save(name, data, folder, caption_of(name, experiment), is_smoke, figures=FIGURES)
+            save(name, data, folder, figure_caption(name, experiment), is_smoke, figures=FIGURES)
             drawn_s += time.perf_counter() - drawing
             if options.arrays:
                 save_arrays(folder, data, name)
@@ -125,7 +125,7 @@ def run(options: argparse.Namespace) -> int:
     early = [] if options.only else [name for name in chosen if not FIGURES[name].needs_training]
     if early:  # drawn first, before the minutes of training
         drawn_s += draw(early)
-        tell(f"figures {listed(early)} drawn in {folder}/ before any training")
+        tell(f"figures {figure_numbers(early)} drawn in {folder}/ before any training")
     if not options.only:
         records = judge(CLAIMS, experiment)
     drawn_s += draw([name for name in chosen if name not in early])
@@ -140,7 +140,7 @@ def run(options: argparse.Namespace) -> int:
     tell(f"{found['verdict']}  {len(chosen)} figures and results.json in {folder}/; {found['this_run_s']:.0f} s in all")
     if options.spread:
         others = range(options.seed + 1, options.seed + 1 + options.spread)
-        more = {seed: judge(CLAIMS, experiment_of(seed)) for seed in others}
+        more = {seed: judge(CLAIMS, make_experiment(seed)) for seed in others}
         write_json(folder / "spread.json", ranges({options.seed: records} | more, options.budget))
         tell(f"ranges over seeds {options.seed} to {others[-1]} in {folder}/spread.json")
     tell(f"the whole run on one page: {write_page(folder, found, chosen)}")
@@ -183,7 +183,10 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
 
     out = folder / FOLDER
     chosen = None if options.channels is None else [name.strip() for name in options.channels.split(",")]
-    cache, is_shown = options.cache or default_cache(), not is_other(options)  # checked before the run overwrites the published results
+    cache, is_shown = (
+        options.cache or default_cache(),
+        not is_other(options),
+    )  # checked before the run overwrites the published results
     found = run(make_settings(options.budget), cache, options.data, out, chosen, options.fresh, tell)
     tell("\n" + "\n".join(lines(found)))
     kept = findings_of(Path(), "robustness")
@@ -227,7 +230,7 @@ def check(options: argparse.Namespace) -> None:
     if options.store != "parquet":
         from enhsim_tf.telemetry.influx_store import InfluxStore
 
-        InfluxStore(location_of(options.store)).check()
+        InfluxStore(influx_location(options.store)).check()
     if options.telemetry is not None:
         from enhsim_tf.reproduce.paper.data import least_part
         from enhsim_tf.reproduce.settings import Settings
@@ -236,7 +239,7 @@ def check(options: argparse.Namespace) -> None:
         read_telemetry(options.telemetry, options.column, options.time, 2 * least_part(Settings()))
 
 
-def location_of(place: str) -> str:
+def influx_location(place: str) -> str:
     """The location in InfluxDB to which `--store` writes the telemetry."""
     from enhsim_tf.common.errors import InputError
     from enhsim_tf.reproduce.settings import LOCATION
@@ -257,7 +260,7 @@ def chosen_figures(only: str | None) -> list[str]:
     return chosen
 
 
-def listed(names: Sequence[str]) -> str:
+def figure_numbers(names: Sequence[str]) -> str:
     """Numbers of figures as text, such as `2, 3 and 11`."""
     *numbers, last = [str(int(name.removeprefix("fig")[:2])) for name in names]
     return f"{', '.join(numbers)} and {last}" if numbers else last

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
-def caption_of(name: str, experiment: "Experiment") -> str:
+def figure_caption(name: str, experiment: "Experiment") -> str:
     """The caption line of a figure, with every option that differs from its default and affects the figure.
 
     Args:
@@ -32,7 +32,7 @@ def caption_of(name: str, experiment: "Experiment") -> str:
     return f"seed {settings.seed} · {settings.budget} budget · {shlex.join(['python', '-m', 'enhsim_tf.reproduce', *options])}"
 
 
-def caption_of_findings(found: Mapping[str, Any], command: str) -> str:
+def experiment_caption(found: Mapping[str, Any], command: str) -> str:
     """The caption line of the figures of an experiment: its `seeds`, its `budget` and its command."""
     seeds = found["seeds"]
     ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"

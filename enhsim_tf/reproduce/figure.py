@@ -13,7 +13,7 @@ import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.plot_style import EDGE, GENERATED, QUIET, STYLE
-from enhsim_tf.reproduce.caption import caption_of_findings
+from enhsim_tf.reproduce.caption import experiment_caption
 
 WATERMARK = "SMOKE BUDGET"
 
@@ -102,5 +102,5 @@ def save_all(
     Returns:
         The paths of the files.
     """
-    caption = caption_of_findings(found, command)
+    caption = experiment_caption(found, command)
     return [path for name in names or figures for path in save(name, found, folder, caption, found["budget"] == "smoke", figures=figures)]

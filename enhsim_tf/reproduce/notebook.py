@@ -24,7 +24,7 @@ from PIL import Image
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import STYLE
 from enhsim_tf.reproduce import figure
-from enhsim_tf.reproduce.caption import caption_of, in_seeds
+from enhsim_tf.reproduce.caption import figure_caption, in_seeds
 from enhsim_tf.reproduce.paper import claims
 from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.pipeline import Experiment
@@ -112,7 +112,7 @@ def show(experiment: Experiment, name: str) -> Arrays:
     """Shows a figure (one of `FIGURES`) as `figures/` holds it, and returns the arrays behind it."""
     arrays, is_smoke = FIGURES[name].arrays(experiment), experiment.settings.budget == "smoke"
     with tempfile.TemporaryDirectory() as folder:
-        (path,) = figure.save(name, arrays, folder, caption_of(name, experiment), is_smoke, ("png",), figures=FIGURES)
+        (path,) = figure.save(name, arrays, folder, figure_caption(name, experiment), is_smoke, ("png",), figures=FIGURES)
         _show_picture(path.read_bytes(), FIGURES[name].alt)
     return Arrays(arrays)
 

@@ -299,7 +299,7 @@ def test_a_stage_that_fails_leaves_the_early_figures_whole_and_nothing_else(tmp_
     monkeypatch.setattr(claims, "judge", fails)
     assert main(["--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--arrays"]) == 2
     early = [name for name in FIGURES if not FIGURES[name].needs_training]
-    assert f"figures {command.listed(early)} drawn" in capsys.readouterr().out
+    assert f"figures {command.figure_numbers(early)} drawn" in capsys.readouterr().out
     expected = {f"{name}.{kind}" for name in early for kind in ("png", "svg", "npz")}
     assert {file.name for file in (tmp_path / "out").iterdir()} == expected
     assert [stage.name.split("-")[0] for stage in (tmp_path / "cache").iterdir()] == ["telemetry"]
@@ -307,7 +307,7 @@ def test_a_stage_that_fails_leaves_the_early_figures_whole_and_nothing_else(tmp_
 
 @pytest.mark.parametrize(("names", "words"), [([*FIGURES][1:2], "2"), ([*FIGURES][:2], "1 and 2"), ([*FIGURES][8:11], "9, 10 and 11")])
 def test_figures_are_listed_in_words(names, words):
-    assert command.listed(names) == words
+    assert command.figure_numbers(names) == words
 
 
 def test_the_time_of_figures_is_that_of_drawing_alone(pretended, tmp_path, monkeypatch, capsys):

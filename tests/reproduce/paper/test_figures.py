@@ -18,7 +18,7 @@ from enhsim_tf.common import plot_style
 from enhsim_tf.reproduce.figure import WATERMARK, save
 from enhsim_tf.reproduce.paper.data import Source
 from enhsim_tf.reproduce.paper.figures import FIGURES
-from enhsim_tf.reproduce.paper.figures.layer_table import layer_names, layers_of
+from enhsim_tf.reproduce.paper.figures.layer_table import layer_names, layer_rows
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
@@ -442,7 +442,7 @@ def test_a_layer_table_is_that_of_the_network_that_is_trained(tmp_path):
     enhancer, noise = experiment.simulator.enhancer, experiment.simulator.noise
     trained = {"fig03_enhancer": enhancer, "fig09_generator": noise.generator, "fig10_discriminator": noise.discriminator}
     for name, network in trained.items():
-        table, same = FIGURES[name].arrays(experiment), layers_of(network)
+        table, same = FIGURES[name].arrays(experiment), layer_rows(network)
         assert set(table) == set(same) and all(np.array_equal(table[key], same[key]) for key in table), name
 
 

@@ -16,7 +16,7 @@ from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.realism.real_floor import MEASURES
 from enhsim_tf.reproduce import figure
-from enhsim_tf.reproduce.caption import caption_of_findings
+from enhsim_tf.reproduce.caption import experiment_caption
 from enhsim_tf.reproduce.noise_processes import NOISES
 from enhsim_tf.reproduce.publish import report, wording
 from enhsim_tf.reproduce.robustness import figures, findings, targets
@@ -383,7 +383,7 @@ def test_one_seed_is_written_in_singular(found, seeds, words, ran):
     text = " ".join(report.render(some).split())
     assert f"severities and {words};" in text and f"replicates: {words} ({seeds[0]} to {seeds[-1]}) in" in text
     assert f"interval over {words} (" in report.table(some)
-    assert caption_of_findings(some, "python -m this") == f"{ran} · full budget · python -m this"
+    assert experiment_caption(some, "python -m this") == f"{ran} · full budget · python -m this"
 
 
 def test_findings_are_plain_json(found):

@@ -22,7 +22,7 @@ from enhsim_tf.common.plot_style import (
 from enhsim_tf.reproduce.paper.figures.diagram_parts import arrow, box, card, drawing_board, inset, words
 from enhsim_tf.reproduce.paper.figures.fig13_combined import arrays as combined_window
 from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays, PaperFigure
-from enhsim_tf.reproduce.paper.figures.window_arrays import noise_of_window, spread_windows
+from enhsim_tf.reproduce.paper.figures.window_arrays import spread_windows, window_noise
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
@@ -30,7 +30,7 @@ def arrays(experiment: Experiment) -> Arrays:
     """The waveforms of one held-out window in each step, and the widths of the networks."""
     simulator, data = experiment.simulator, combined_window(experiment)
     held_out = spread_windows(experiment, "test", 1, "figure 13")
-    noise, _ = noise_of_window(experiment, held_out["offset"][0])
+    noise, _ = window_noise(experiment, held_out["offset"][0])
     latent = experiment.data.draw("figure 1").standard_normal(simulator.noise.generator.input_shape[1])
     networks = {"enhancer": simulator.enhancer, "generator": simulator.noise.generator, "discriminator": simulator.noise.discriminator}
     widths = {

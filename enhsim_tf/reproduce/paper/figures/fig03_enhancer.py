@@ -2,14 +2,14 @@
 
 import matplotlib.figure
 
-from enhsim_tf.reproduce.paper.figures.layer_table import draw_layers, layers_of
+from enhsim_tf.reproduce.paper.figures.layer_table import draw_layers, layer_rows
 from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays, PaperFigure
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
     """The layers of the network before training."""
-    return layers_of(experiment.untrained_enhancer())
+    return layer_rows(experiment.untrained_enhancer())
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:

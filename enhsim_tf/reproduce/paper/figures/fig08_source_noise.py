@@ -6,14 +6,14 @@ import numpy as np
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, DOUBLE, REAL, label_ends, name_axes, new_sheet, panels
 from enhsim_tf.noise.extraction import extract_noise
 from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays, PaperFigure
-from enhsim_tf.reproduce.paper.figures.window_arrays import noise_of_window, spread_windows, time_axis
+from enhsim_tf.reproduce.paper.figures.window_arrays import spread_windows, time_axis, window_noise
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
     """Training telemetry with its moving average, the noise that is left, and its sd over the training part."""
     window = spread_windows(experiment, "train", 1, "figure 8")
-    noise, average = noise_of_window(experiment, window["offset"][0], "train")
+    noise, average = window_noise(experiment, window["offset"][0], "train")
     width = experiment.settings.noise.moving_average
     deviation = np.std(extract_noise(experiment.data.channels[0].train.values, width)[0])
     shown = {"telemetry": window["target"][0], "average": average, "noise": noise}

@@ -2,14 +2,14 @@
 
 import matplotlib.figure
 
-from enhsim_tf.reproduce.paper.figures.layer_table import draw_layers, layers_of, num_samples
+from enhsim_tf.reproduce.paper.figures.layer_table import draw_layers, layer_rows, num_samples
 from enhsim_tf.reproduce.paper.figures.paper_figure import Arrays, PaperFigure
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 
 def arrays(experiment: Experiment) -> Arrays:
     """The layers of the network before training."""
-    return layers_of(experiment.untrained_noise_networks()[1])
+    return layer_rows(experiment.untrained_noise_networks()[1])
 
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from enhsim_tf.keras_tools.backend import keras
 
 
-def layers_of(model: "keras.Model") -> Arrays:
+def layer_rows(model: "keras.Model") -> Arrays:
     """A Keras model as a table, one row per layer."""
     rows = {
         "layer": layer_names(model.layers),

@@ -21,7 +21,7 @@ def spread_windows(experiment: Experiment, part: str, num_windows: int, purpose:
     return {"coarse": coarse, "target": target, "truth": truth, "offset": offsets}
 
 
-def noise_of_window(experiment: Experiment, offset: int, part: str = "test") -> tuple[np.ndarray, np.ndarray]:
+def window_noise(experiment: Experiment, offset: int, part: str = "test") -> tuple[np.ndarray, np.ndarray]:
     """Noise and moving average of one window of a part; NaN where the part's edge leaves no full average."""
     series, window, width = getattr(experiment.data.channels[0], part), experiment.data.window, experiment.settings.noise.moving_average
     half = width // 2
