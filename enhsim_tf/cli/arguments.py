@@ -1,6 +1,7 @@
 """Options and help texts of the commands for a user's own telemetry. This module imports nothing slow."""
 
 import argparse
+import textwrap
 from pathlib import Path
 
 from enhsim_tf.common.console import Parser
@@ -125,7 +126,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "score",
         help="score telemetry with a detector trained on generated telemetry",
         description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.",
-        epilog=f"detectors: {', '.join(DETECTORS)}\n{EXIT}",
+        epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False) + f"\n{EXIT}",
         **form,
     )
     score.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")

@@ -111,14 +111,14 @@ def test_scores_of_another_shape_are_refused(refused):
 
 def test_a_registered_estimator_takes_part_like_any_other(registered):
     before = list(DETECTORS)
-    registered("local outlier factor", lambda seed: LocalOutlierFactor(novelty=True))
+    registered("their outlier factor", lambda seed: LocalOutlierFactor(novelty=True))
     registered("their forest", lambda seed: IsolationForest(n_estimators=5, random_state=seed))
     registered("largest value", lambda seed: Largest())
-    assert list(DETECTORS) == [*before, "local outlier factor", "their forest", "largest value"]
+    assert list(DETECTORS) == [*before, "their outlier factor", "their forest", "largest value"]
     assert DETECTORS["their forest"](7).estimator.random_state == 7
     assert ScoreOptions(detector="their forest").detector == "their forest"
     trial = make_trial(windows(40, 1, 60), windows(40, 2, 60), None, 1.0, seed=0, num_anomalous=6, rate=0.1)
-    chosen = {name: DETECTORS[name] for name in ("local outlier factor", "their forest", "largest value")}
+    chosen = {name: DETECTORS[name] for name in ("their outlier factor", "their forest", "largest value")}
     tables = evaluate_arm(windows(60, 3, 60), windows(60, 4, 60), trial, chosen, seed=0, num_blocks=2)
     assert {row["detector"] for row in tables["recall"]} == set(chosen)
     loud = [row["recall"] for row in tables["recall"] if row["kind"] == "level_shift" and row["severity"] == 8]
