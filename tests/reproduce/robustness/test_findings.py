@@ -320,7 +320,7 @@ def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():
     assert (
         some["arms"]["residual + convolutional GAN"]["c8"]["replicates"],
         some["arms"]["residual + convolutional GAN"]["c8"]["of_replicates"],
-    ) == (83, 84)
+    ) == (3 * PAIRS - 1, 3 * PAIRS)
     assert some["arms"]["residual + convolutional GAN"]["c8"]["missed"] == dict.fromkeys(ENVIRONMENTS, 0) | {"white": 1}
 
 
