@@ -49,7 +49,7 @@ class AutoregressiveNoise:
 
     def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`, stationary from its first sample."""
-        return self.standard_deviation * _first_order(num_samples, self.coefficient, rng)
+        return self.standard_deviation * first_order(num_samples, self.coefficient, rng)
 
     @staticmethod
     def estimate(windows: np.ndarray) -> dict[str, float]:
@@ -206,7 +206,7 @@ class HeteroscedasticNoise:
 
     def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`."""
-        log_scale = self.log_scale_sd * _first_order(num_samples, np.exp(-1 / self.correlation_samples), rng)
+        log_scale = self.log_scale_sd * first_order(num_samples, np.exp(-1 / self.correlation_samples), rng)
         # the mean of exp(2 l) is exp(2 sd^2), which the scale takes back
         return self.standard_deviation * np.exp(log_scale - self.log_scale_sd**2) * rng.standard_normal(num_samples)
 
@@ -229,7 +229,7 @@ class HeteroscedasticNoise:
         return {"log_scale_sd": float(np.sqrt(level)), "correlation_samples": float(decay)} | WhiteNoise.estimate(windows)
 
 
-def _first_order(num_samples: int, coefficient: float, rng: np.random.Generator) -> np.ndarray:
+def first_order(num_samples: int, coefficient: float, rng: np.random.Generator) -> np.ndarray:
     """A stationary Gaussian AR(1) process of variance 1."""
     from scipy.signal import lfilter
 
