@@ -1,0 +1,321 @@
+"""A network for the distribution of each sample of noise given the samples before it (an alternative to the GAN of section 2.3).
+
+The probability density of a window is the product of the densities of its samples, each given all samples before it. A network
+that predicts these conditional densities can represent any stationary noise, up to its capacity: no correlation time, no period
+and no pulse is built into it. It sees the last samples one by one, and the whole past of the window as averages of the value and
+of its magnitude over the last 2, 4, 8, ... samples. The density of a sample is a mixture of Student's t distributions, so that it
+can have several modes, a skew and heavy tails. Training maximises the likelihood, which held-out windows measure as well.
+
+References:
+    Bishop, "Mixture density networks", 1994.
+    van den Oord et al., "WaveNet: a generative model for raw audio", 2016.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.keras_tools.backend import keras, tf
+from enhsim_tf.keras_tools.training import seeded_initialiser
+
+NUM_LAGS = 64  # samples that the network sees one by one
+_CLIP = 6.0  # largest magnitude, in standard deviations, with which a sample enters the non-linear part
+_TINY = 1e-3  # added to magnitudes before their logarithm is taken
+_LOG_SCALES = (-6.0, 3.0)  # limits of the logarithm of a component's scale, in standard deviations
+_LEAST_DEGREES = 2.1  # degrees of freedom of a component; at 2 its variance is infinite
+_LIMIT = 2.0  # generated samples stay within this multiple of the largest magnitude of the training windows
+_SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
+
+
+class AutoregressiveNetwork:
+    """Noise whose samples are drawn one after the other from the density that a network predicts.
+
+    Args:
+        window: Number of samples of a window, which is also the longest past that the network sees.
+        scale: Standard deviation of the noise, in the unit of the telemetry.
+        limit: Largest magnitude of a generated sample, in units of `scale`.
+        step: Distance of two values if the noise is quantised, in the unit of the telemetry, and 0 otherwise.
+        follows_signal: Whether the density depends on the enhanced signal, too.
+        num_components: Number of components of the mixture.
+        units: Number of units of both hidden layers.
+        seed: Seed for the initial weights and for all random numbers in training.
+    """
+
+    def __init__(
+        self,
+        window: int,
+        scale: float,
+        limit: float = 20.0,
+        step: float = 0.0,
+        follows_signal: bool = False,
+        num_components: int = 8,
+        units: int = 64,
+        seed: int = 0,
+    ):
+        self.window, self.scale, self.limit, self.step, self.seed = int(window), float(scale), float(limit), float(step), int(seed)
+        self.follows_signal, self.num_components, self.units = bool(follows_signal), int(num_components), int(units)
+        self.lags = np.arange(1, min(NUM_LAGS, window) + 1)
+        self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
+        self.start_logits = np.where(np.arange(self.num_components) < 2, -6.0, 0.0).astype(np.float32)
+        self.network = self._build()
+
+    @classmethod
+    def untrained(cls, noise_windows: np.ndarray, signal_windows: np.ndarray | None = None, seed: int = 0) -> "AutoregressiveNetwork":
+        """Creates an untrained network for noise windows of shape `(windows, samples)`, with their scale, limit and step.
+
+        Args:
+            noise_windows: Noise of mean zero, in the unit of the telemetry.
+            signal_windows: Enhanced signal of the same shape, if the noise may depend on it.
+            seed: Seed for the initial weights and for all random numbers in training.
+        """
+        noise = np.asarray(noise_windows, np.float64)
+        scale = float(np.std(noise))
+        if not (np.isfinite(noise).all() and scale > 0):
+            raise InputError("Expected finite noise that varies. Received: windows with a NaN or an infinity, or of one value.")
+        limit = _LIMIT * float(np.max(np.abs(noise))) / scale
+        return cls(noise.shape[1], scale, limit, quantisation_step(noise), signal_windows is not None, seed=seed)
+
+    def _build(self) -> keras.Model:
+        """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
+
+        def kernel(number: int, name: str = "he_uniform") -> keras.Initializer:
+            return seeded_initialiser(name, self.seed * 1000 + number)
+
+        num_linear = len(self.lags) + len(self.octaves)
+        features = keras.Input((num_linear + len(self.octaves) + 2 + len(_SIGNAL_LAGS) * self.follows_signal,))
+        linear = keras.layers.Dense(1, kernel_initializer="zeros", name="linear")(features[:, :num_linear])
+        hidden = keras.ops.clip(features, -_CLIP, _CLIP)
+        for name, number in (("first", 600), ("second", 601)):
+            hidden = keras.layers.Dense(self.units, "swish", kernel_initializer=kernel(number), name=name)(hidden)
+        hidden = keras.layers.Dense(3 * self.num_components, kernel_initializer=kernel(602, "glorot_uniform"), name="last")(hidden)
+        logits, shifts, log_scales = keras.ops.split(hidden, 3, axis=1)
+        logits = logits + self.start_logits
+        degrees = _Degrees(self.num_components, name="degrees")
+        return keras.Model(features, [logits, linear + shifts, keras.ops.clip(log_scales, *_LOG_SCALES), degrees(logits)], name="density")
+
+    def fit(
+        self,
+        noise_windows: np.ndarray,
+        num_iterations: int = 3_000,
+        signal_windows: np.ndarray | None = None,
+        batch_size: int = 200,
+        positions: int = 50,
+        learning_rate: float = 3e-3,
+        held_out: float = 0.1,
+        averaging: float = 0.99,
+        on_iteration: Callable[[int], None] | None = None,
+    ) -> "AutoregressiveNetwork":
+        """Trains the network by maximum likelihood with Adam, and keeps the weights that are best on the held-out windows.
+
+        The weights are averaged over the iterations with exponentially falling weights, and the learning rate falls along a
+        cosine. The averaged weights are compared on the last windows every hundred iterations.
+
+        Args:
+            noise_windows: Noise of shape `(windows, samples)`, in the unit of the telemetry and in the order of time.
+            num_iterations: Number of iterations.
+            signal_windows: Enhanced signal of the same shape, for a network that follows the signal.
+            batch_size: Windows of an iteration.
+            positions: Positions of an iteration, the same in all of its windows.
+            learning_rate: Initial learning rate.
+            held_out: Share of windows, the last ones, that are not used for training.
+            averaging: Decay of the weighted average of the weights.
+            on_iteration: Called after each iteration with the number of completed iterations.
+        """
+        noise = np.asarray(noise_windows, np.float64)
+        rng = np.random.default_rng([self.seed, 61])
+        if self.step:  # a density cannot describe single values: spread them over the step
+            noise = noise + self.step * rng.uniform(-0.5, 0.5, noise.shape)
+        values = (noise / self.scale).astype(np.float32)
+        signal = self._signal(signal_windows, values.shape)
+        num_kept = max(1, round(held_out * len(values)))
+        last = slice(len(values) - num_kept, None) if len(values) > num_kept else slice(None)
+        first = slice(0, max(1, len(values) - num_kept))
+        training = (tf.constant(values[first]), tf.constant(signal[first]))
+        judged = (tf.constant(values[last][:500]), tf.constant(signal[last][:500]))
+        judged_positions = tf.constant(np.linspace(0, self.window - 1, min(100, self.window)).astype(np.int32))
+        schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
+        optimizer = keras.optimizers.Adam(schedule, global_clipnorm=1.0)
+        optimizer.build(self.network.trainable_variables)
+        averages = [tf.Variable(each) for each in self.network.trainable_variables]
+        number = len(values[first])
+
+        @tf.function
+        def iterate(seed: tf.Tensor) -> tf.Tensor:
+            rows = tf.random.stateless_uniform((min(batch_size, number),), seed, 0, number, tf.int32)
+            where = tf.random.stateless_uniform((min(positions, self.window),), seed + 1, 0, self.window, tf.int32)
+            with tf.GradientTape() as tape:
+                loss = self._loss(tf.gather(training[0], rows), tf.gather(training[1], rows), where)
+            variables = self.network.trainable_variables
+            optimizer.apply_gradients(zip(tape.gradient(loss, variables), variables, strict=True))
+            for average, variable in zip(averages, variables, strict=True):
+                average.assign(averaging * average + (1 - averaging) * variable)
+            return loss
+
+        evaluate = tf.function(lambda: self._loss(*judged, judged_positions))
+        best, kept, self.losses = np.inf, None, []
+        for iteration in range(1, num_iterations + 1):
+            loss = iterate(tf.constant(rng.integers(0, 2**30, 2), tf.int32))
+            if iteration % 100 == 0 or iteration == num_iterations:
+                current = [each.numpy() for each in self.network.trainable_variables]
+                self._assign([each.numpy() for each in averages])
+                held = float(evaluate())
+                self.losses.append((iteration, float(loss), held))
+                if held < best:
+                    best, kept = held, [each.numpy() for each in averages]
+                self._assign(current)
+            if on_iteration is not None:
+                on_iteration(iteration)
+        if kept is not None:
+            self._assign(kept)
+        return self
+
+    def _assign(self, weights: list[np.ndarray]) -> None:
+        for variable, value in zip(self.network.trainable_variables, weights, strict=True):
+            variable.assign(value)
+
+    def _signal(self, signal_windows: np.ndarray | None, shape: tuple[int, int]) -> np.ndarray:
+        """Returns the signal at unit scale, or an empty one if the noise does not follow it."""
+        if not self.follows_signal:
+            return np.zeros((shape[0], 0), np.float32)
+        if signal_windows is None or np.shape(signal_windows) != shape:
+            raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal_windows)}.")
+        return np.asarray(signal_windows, np.float32)
+
+    def _loss(self, values: tf.Tensor, signal: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
+        """Computes the mean negative log-likelihood of the samples at the given positions of each window."""
+        num_lags, num_rows = len(self.lags), tf.shape(values)[0]
+        padded = tf.pad(values, [[0, 0], [num_lags, 0]])
+        lags = tf.gather(padded, where[:, None] + num_lags - tf.constant(self.lags, tf.int32)[None, :], axis=1)
+        begin = tf.maximum(where[:, None] - tf.constant(self.octaves, tf.int32)[None, :], 0)
+        length = tf.cast(tf.maximum(where[:, None] - begin, 1), tf.float32)
+        means, magnitudes = (
+            (tf.gather(sums, where, axis=1)[:, :, None] - tf.gather(sums, begin, axis=1)) / length
+            for sums in (tf.pad(tf.cumsum(each, axis=1), [[0, 0], [1, 0]]) for each in (values, tf.abs(values)))
+        )
+        place = tf.cast(where, tf.float32)[:, None]
+        ages = tf.concat([place / self.window, 1 / tf.sqrt(1 + place)], 1)
+        parts = [lags, means, tf.math.log(magnitudes + _TINY), tf.repeat(ages[None], num_rows, axis=0)]
+        if self.follows_signal:
+            around = tf.clip_by_value(where[:, None] + tf.constant(_SIGNAL_LAGS, tf.int32)[None, :], 0, self.window - 1)
+            parts.append(tf.gather(signal, around, axis=1))
+        features = tf.concat(parts, 2)
+        targets = tf.reshape(tf.gather(values, where, axis=1), (-1, 1))
+        logits, means, log_scales, degrees = self.network(tf.reshape(features, (-1, features.shape[2])))
+        standardised = (targets - means) * tf.exp(-log_scales)
+        log_density = (
+            tf.math.lgamma((degrees + 1) / 2)
+            - tf.math.lgamma(degrees / 2)
+            - 0.5 * tf.math.log(math.pi * degrees)
+            - log_scales
+            - (degrees + 1) / 2 * tf.math.log1p(standardised**2 / degrees)
+        )
+        return -tf.reduce_mean(tf.reduce_logsumexp(tf.nn.log_softmax(logits) + log_density, axis=1))
+
+    def generate(self, num_windows: int, seed: int | np.random.Generator, signal_windows: np.ndarray | None = None) -> np.ndarray:
+        """Generates windows of noise. The same seed gives the same noise.
+
+        Args:
+            num_windows: Number of windows.
+            seed: Seed, or a random number generator, whose state advances.
+            signal_windows: Enhanced signal of the windows, for noise that follows it.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`, in the unit of the telemetry.
+        """
+        signal = self._signal(signal_windows, (num_windows, self.window))
+        return self._draw(num_windows, self.window, signal, np.random.default_rng(seed))
+
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Generates one series of any length, without seams: each sample depends on a window of samples before it.
+
+        Args:
+            num_samples: Length of the series.
+            seed: Seed, or a random number generator, whose state advances.
+            signal: Enhanced signal of shape `(num_samples,)`, for noise that follows it.
+
+        Returns:
+            float32 array of shape `(num_samples,)`, in the unit of the telemetry.
+        """
+        signal = self._signal(None if signal is None else signal[None], (1, num_samples))
+        return self._draw(1, num_samples, signal, np.random.default_rng(seed))[0]
+
+    def _draw(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Draws rows sample by sample, with the network's layers in NumPy: a call of a model takes longer than its products."""
+        layers = ("linear", "first", "second", "last", "degrees")
+        (linear, linear_bias), first_layer, second_layer, last_layer, (degrees,) = (self.network.get_layer(name).get_weights() for name in layers)
+        degrees = _degrees(degrees)
+        num_lags, num_linear, parts = len(self.lags), len(linear), self.num_components
+        series = np.zeros((num_rows, num_lags + num_samples), np.float32)
+        sums = np.zeros((2, num_rows, num_samples + 1))
+        features = np.zeros((num_rows, len(first_layer[0])), np.float32)
+        rows = np.arange(num_rows)
+        for place in range(num_samples):
+            begin = np.maximum(place - self.octaves, 0)
+            means, magnitudes = (sums[:, :, place, None] - sums[:, :, begin]) / np.maximum(place - begin, 1)
+            features[:, :num_lags] = series[:, place : place + num_lags][:, ::-1]
+            features[:, num_lags:num_linear] = means
+            features[:, num_linear : num_linear + len(begin)] = np.log(magnitudes + _TINY)
+            age = min(place, self.window - 1)
+            features[:, num_linear + len(begin) : num_linear + len(begin) + 2] = age / self.window, 1 / math.sqrt(1 + age)
+            if self.follows_signal:
+                features[:, -len(_SIGNAL_LAGS) :] = signal[:, np.clip(place + np.array(_SIGNAL_LAGS), 0, num_samples - 1)]
+            hidden = np.clip(features, -_CLIP, _CLIP)
+            for layer, bias in (first_layer, second_layer):
+                hidden = hidden @ layer + bias
+                hidden /= 1 + np.exp(-np.maximum(hidden, -80))
+            logits, shifts, log_scales = np.split(hidden @ last_layer[0] + last_layer[1], 3, axis=1)
+            logits = logits + self.start_logits
+            shares = np.cumsum(np.exp(logits - logits.max(axis=1, keepdims=True)), axis=1)
+            chosen = (rng.random(num_rows)[:, None] * shares[:, -1:] > shares).sum(axis=1).clip(max=parts - 1)
+            centre = features[:, :num_linear] @ linear[:, 0] + linear_bias[0] + shifts[rows, chosen]
+            draw = rng.standard_normal(num_rows) / np.sqrt(2 * rng.standard_gamma(degrees[chosen] / 2) / degrees[chosen])
+            value = centre + np.exp(np.clip(log_scales[rows, chosen], *_LOG_SCALES)) * draw
+            value = np.clip(value, -self.limit, self.limit)
+            series[:, num_lags + place] = value
+            sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
+        noise = series[:, num_lags:] * np.float32(self.scale)
+        return (self.step * np.rint(noise / self.step)).astype(np.float32) if self.step else noise
+
+    def get_config(self) -> dict:
+        """Returns the settings that rebuild the network, as JSON types."""
+        names = ("window", "scale", "limit", "step", "follows_signal", "num_components", "units", "seed")
+        return {name: getattr(self, name) for name in names}
+
+
+@keras.saving.register_keras_serializable("enhsim_tf")
+class _Degrees(keras.layers.Layer):
+    """Degrees of freedom of each component: trainable, the same for all samples."""
+
+    def __init__(self, num_components: int, **settings: object):
+        super().__init__(**settings)
+        self.num_components = num_components
+
+    def build(self, input_shape: tuple) -> None:
+        start = np.where(np.arange(self.num_components) < 2, 1.0, 1000.0)
+        self.degrees = self.add_weight(name="degrees", shape=(self.num_components,), initializer=lambda shape, dtype: start.astype("float32"))
+
+    def call(self, logits: keras.KerasTensor) -> keras.KerasTensor:
+        return _LEAST_DEGREES + keras.ops.softplus(self.degrees) + 0 * logits
+
+
+def _degrees(weights: np.ndarray) -> np.ndarray:
+    """Returns the degrees of freedom for the weights of `_Degrees`."""
+    return _LEAST_DEGREES + np.logaddexp(0, weights.astype(np.float64))
+
+
+def quantisation_step(values: np.ndarray) -> float:
+    """Returns the distance of the values if they are multiples of a step, and 0 otherwise.
+
+    Args:
+        values: Values of any shape. They count as quantised if there are at least ten times as many values as different ones, and
+            if the differences of neighbouring levels are multiples of the smallest difference, to a thousandth of it.
+    """
+    levels = np.unique(np.asarray(values, np.float64))
+    if len(levels) < 2 or len(levels) > np.size(values) / 10:
+        return 0.0
+    gaps = np.diff(levels)
+    step = float(gaps[gaps > 1e-9 * (levels[-1] - levels[0])].min())
+    ratios = (levels - levels[0]) / step
+    return step if np.max(np.abs(ratios - np.rint(ratios))) < 1e-3 else 0.0
