@@ -180,7 +180,9 @@ class AutoregressiveNetwork:
         if not self.follows_signal:
             return np.zeros((shape[0], 0), np.float32)
         if signal_windows is None or np.shape(signal_windows) != shape:
-            raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal_windows)}.")
+            raise InputError(
+                f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal_windows)}."
+            )
         return np.asarray(signal_windows, np.float32)
 
     def _loss(self, values: tf.Tensor, signal: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
@@ -244,7 +246,9 @@ class AutoregressiveNetwork:
     def _draw(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Draws rows sample by sample, with the network's layers in NumPy: a call of a model takes longer than its products."""
         layers = ("linear", "first", "second", "last", "degrees")
-        (linear, linear_bias), first_layer, second_layer, last_layer, (degrees,) = (self.network.get_layer(name).get_weights() for name in layers)
+        (linear, linear_bias), first_layer, second_layer, last_layer, (degrees,) = (
+            self.network.get_layer(name).get_weights() for name in layers
+        )
         degrees = _degrees(degrees)
         num_lags, num_linear, parts = len(self.lags), len(linear), self.num_components
         series = np.zeros((num_rows, num_lags + num_samples), np.float32)
@@ -294,7 +298,9 @@ class _Degrees(keras.layers.Layer):
 
     def build(self, input_shape: tuple) -> None:
         start = np.where(np.arange(self.num_components) < 2, 1.0, 1000.0)
-        self.degrees = self.add_weight(name="degrees", shape=(self.num_components,), initializer=lambda shape, dtype: start.astype("float32"))
+        self.degrees = self.add_weight(
+            name="degrees", shape=(self.num_components,), initializer=lambda shape, dtype: start.astype("float32")
+        )
 
     def call(self, logits: keras.KerasTensor) -> keras.KerasTensor:
         return _LEAST_DEGREES + keras.ops.softplus(self.degrees) + 0 * logits

@@ -25,6 +25,11 @@ exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the in
 
 
 NOISES = ("white", "autoregressive", "heteroscedastic", "shot")
+FAMILIES = (
+    *NOISES, "fractional", "bernoulli", "one_over_f", "interference", "telegraph", "quantised", "bursts", "heavy_tails", "loudness",
+    "signal_dependent",
+)  # fmt: skip
+RUNG_NAMES = ("none", "Gaussian", "autoregression", "residual windows", "autoregressive network", "GAN of the paper", "convolutional GAN")
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -64,13 +69,15 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--experiment",
-        choices=("robustness", "labelled"),
-        help="instead of the paper: robustness trains detectors with each kind of noise; labelled tests them on real telemetry with labelled anomalies",
+        choices=("robustness", "noise", "labelled"),
+        help="instead of the paper: robustness trains detectors with each kind of noise; noise tries noise models on fourteen families; "
+        "labelled tests them on real telemetry with labelled anomalies",
     )
     parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
     parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
-    parser.add_argument("--environment", choices=NOISES, help="run the experiment with this kind of noise only (default: all four)")
+    parser.add_argument("--environment", choices=FAMILIES, help="run the experiment with this kind of noise only (default: all)")
     parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds of the experiment (default: 10; smoke: 2)")
+    parser.add_argument("--rungs", metavar="A,B", help="only these noise models in the experiment on noise (default: all)")
     parser.add_argument("--arrays", action="store_true", help="also save the arrays behind each figure, as .npz")
     parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached stages (default: .cache in a checkout)")
@@ -82,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
     check(options)
     folder = make_folders(options)
     if options.experiment:
-        return run_labelled(options, folder) if options.experiment == "labelled" else run_experiment(options, folder)
+        return {"robustness": run_experiment, "noise": run_noise, "labelled": run_labelled}[options.experiment](options, folder)
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import figure_caption
     from enhsim_tf.reproduce.figure import save
@@ -174,6 +181,36 @@ def run_experiment(options: argparse.Namespace, folder: Path) -> int:
     return 0
 
 
+def run_noise(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the experiment on noise in a subfolder of the figures' folder, and returns the exit code."""
+    from enhsim_tf.reproduce.noise_gallery import GALLERY
+    from enhsim_tf.reproduce.noise_ladder.run import FOLDER, run
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    turned = {} if options.seeds is None else {"ladder__num_seeds": options.seeds}
+    families = tuple(GALLERY) if options.environment is None else (options.environment,)
+    out = folder / FOLDER
+    rungs = tuple(RUNG_NAMES) if options.rungs is None else chosen_rungs(options.rungs)
+    found = run(make_settings(options.budget, **turned), options.cache or default_cache(), out, families, rungs, options.fresh, tell)
+    for name, about in found["families"].items():
+        rates = ", ".join(f"{rung} {values['alarms']:.1%}" for rung, values in about["rungs"].items())
+        tell(f"{name:18} ({about['half']}) chosen: {', '.join(about['chosen'])}; false alarms: {rates}")
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
+def chosen_rungs(given: str) -> tuple[str, ...]:
+    """Reads `--rungs`, in the order of the ladder."""
+    from enhsim_tf.common.errors import InputError
+
+    names = [name.strip() for name in given.split(",")]
+    unknown = [name for name in names if name not in RUNG_NAMES]
+    if unknown:
+        raise InputError(f"Expected --rungs of {', '.join(RUNG_NAMES)}. Received: {unknown[0]!r}.")
+    return tuple(name for name in RUNG_NAMES if name in names)
+
+
 def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     """Runs the study of real telemetry in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.publish.report import findings_of, report
@@ -206,8 +243,8 @@ def check(options: argparse.Namespace) -> None:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)
     for name in ("environment", "seeds"):
-        if getattr(options, name) is not None and options.experiment != "robustness":
-            raise InputError(f"Expected --{name} together with --experiment robustness. Received: --{name} without it.")
+        if getattr(options, name) is not None and options.experiment not in ("robustness", "noise"):
+            raise InputError(f"Expected --{name} together with --experiment robustness or noise. Received: --{name} without it.")
     if (options.experiment == "labelled") != (options.data is not None) or (options.channels and options.data is None):
         raise InputError("Expected --experiment labelled and --data DIR together, and --channels only with them. Received: one alone.")
     if options.data is not None:
@@ -220,6 +257,12 @@ def check(options: argparse.Namespace) -> None:
         )
     if options.experiment and options.store != "parquet":
         raise InputError(f"Expected --experiment with the Parquet store. Received: --store {options.store}.")
+    if options.rungs is not None:
+        if options.experiment != "noise":
+            raise InputError("Expected --rungs together with --experiment noise. Received: --rungs without it.")
+        chosen_rungs(options.rungs)
+    if options.experiment != "noise" and options.environment not in (None, *NOISES):
+        raise InputError(f"Expected --environment {', '.join(NOISES)} with this experiment. Received: {options.environment}.")
     if options.seeds is not None and options.seeds < 1:
         raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
     for name in ("column", "time"):

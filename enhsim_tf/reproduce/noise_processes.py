@@ -16,8 +16,8 @@ class NoiseProcess(Protocol):
 
     standard_deviation: float
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
-        """Draws float64 noise of shape `(num_samples,)`."""
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws float64 noise of shape `(num_samples,)`; a process may depend on a `signal` of this shape."""
 
     @staticmethod
     def estimate(windows: np.ndarray) -> dict[str, float]:
@@ -30,7 +30,7 @@ class WhiteNoise:
 
     standard_deviation: float
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`."""
         return rng.normal(0.0, self.standard_deviation, num_samples)
 
@@ -47,7 +47,7 @@ class AutoregressiveNoise:
     coefficient: float
     standard_deviation: float
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`, stationary from its first sample."""
         return self.standard_deviation * first_order(num_samples, self.coefficient, rng)
 
@@ -66,7 +66,7 @@ class FractionalGaussianNoise:
     hurst: float
     standard_deviation: float
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`, exactly: by circulant embedding (Davies and Harte 1987)."""
         from scipy.fft import irfft, next_fast_len, rfft
 
@@ -113,7 +113,7 @@ class ShotNoise:
         """Overall standard deviation: a pulse has a mean square of twice its squared mean."""
         return float(np.sqrt(2 * self.rate * self.amplitude**2 + self.background_sd**2))
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`."""
         places = rng.integers(0, num_samples, rng.poisson(self.rate * num_samples))
         pulses = np.bincount(places, rng.exponential(self.amplitude, places.size), minlength=num_samples)
@@ -168,7 +168,7 @@ class BernoulliGaussianNoise:
         """Overall standard deviation."""
         return float(np.sqrt(self.probability * self.impulse_sd**2 + self.background_sd**2))
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`."""
         has_impulse = rng.random(num_samples) < self.probability
         return rng.normal(0.0, np.sqrt(self.background_sd**2 + has_impulse * self.impulse_sd**2))
@@ -204,7 +204,7 @@ class HeteroscedasticNoise:
     standard_deviation: float
     correlation_samples: float = 2_000.0
 
-    def draw(self, num_samples: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws float64 noise of shape `(num_samples,)`."""
         log_scale = self.log_scale_sd * first_order(num_samples, np.exp(-1 / self.correlation_samples), rng)
         # the mean of exp(2 l) is exp(2 sd^2), which the scale takes back

@@ -1,0 +1,129 @@
+"""One cell of the experiment on noise: a family of the gallery and a seed, with every rung of the noise ladder.
+
+The noise models learn the true noise, so that errors of the enhancer have no effect. Detectors are trained on the true waves with
+generated noise and judged on nominal windows with real noise, as in the experiment on robustness.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.detection import evaluation
+from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.enhanced_simulator import noise_choice
+from enhsim_tf.noise import ladder
+from enhsim_tf.reproduce.robustness.replicate import Replicate
+from enhsim_tf.reproduce.settings import Settings
+from enhsim_tf.reproduce.stages import Stages
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLES = ("detectors", "realism", "choice")
+REAL = "real"
+"""The arm of real windows, with which every rung is compared."""
+JUDGED = 1_000  # held-out windows on which a rung is chosen
+
+
+class Cell:
+    """A family of the gallery and a seed.
+
+    Args:
+        settings: All settings; `telemetry.noise` is the family.
+        stages: Runs stages and caches their results.
+    """
+
+    def __init__(self, settings: Settings, stages: Stages):
+        self.settings, self.stages = settings, stages
+        self.one = Replicate(settings, stages)
+        self.data = self.one.experiment.data
+
+    @functools.cached_property
+    def learnt(self) -> dict[str, np.ndarray]:
+        """Windows of the training part, from which the models learn: `target`, `truth` and their difference, the noise."""
+        return self._with_noise("train", self.settings.ladder.num_windows, "ladder, learnt")
+
+    def _with_noise(self, part: str, number: int, purpose: str) -> dict[str, np.ndarray]:
+        windows = self.data.windows(part, number, purpose)
+        return {**windows, "noise": windows["target"] - windows["truth"]}
+
+    def tables(self, rungs: Sequence[str]) -> "dict[str, pd.DataFrame]":
+        """The tables of the rungs and of real windows; each rung is a stage of its own, so that an interrupted run goes on."""
+        import pandas as pd
+
+        _ = self.one.experiment.data
+        chosen = self.settings
+        depends = (
+            chosen.telemetry,
+            chosen.split,
+            chosen.robustness.num_windows,
+            chosen.robustness.num_anomalous,
+            chosen.ladder,
+            chosen.seed,
+        )
+        parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
+        for rung in (REAL, *rungs):
+
+            def make(folder: Path, rung: str = rung) -> None:
+                self._make(rung, folder)
+
+            name = "noise rung " + rung.replace(" ", "_")
+            folder = self.stages.run(name, make, ("reproduce.noise_ladder.cells",), (rung, *depends), ("telemetry",))
+            for table, found in parts.items():
+                found.append(pd.read_parquet(folder / f"{table}.parquet"))
+        return {name: pd.concat([each for each in found if len(each)], ignore_index=True) for name, found in parts.items()}
+
+    def _make(self, rung: str, folder: Path) -> None:
+        import pandas as pd
+
+        chosen, seed = self.settings, self.settings.seed
+        number = chosen.robustness.num_windows
+        floor, held_out = self.one.floor()
+        if rung == REAL:
+            arms = [self.data.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
+            generated = held_out
+            choice = []
+        else:
+            number_of_iterations = chosen.ladder.gan_iterations if "GAN" in rung else chosen.ladder.num_iterations
+            model = ladder.RUNGS[rung](self.learnt["noise"], self.learnt["truth"], number_of_iterations, seed)
+            draws = np.random.default_rng([seed, list(ladder.RUNGS).index(rung), 71])
+            waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
+            arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
+            more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
+            generated = ladder.generate(model, len(held_out), draws, more)
+            choice = [dataclasses.asdict(self._judge(rung, model, draws))]
+        judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
+        rates = evaluation.false_alarm_rates(judged["alarms"])
+        detectors = [
+            {
+                "detector": name,
+                "alarms": sum(row["alarms"] for row in judged["alarms"] if row["detector"] == name),
+                "windows": sum(row["windows"] for row in judged["alarms"] if row["detector"] == name),
+                "recall": float(np.mean([row["recall"] for row in judged["recall"] if row["detector"] == name])),
+                "recall_at_real_rate": float(np.mean([row["recall_at_real_rate"] for row in judged["recall"] if row["detector"] == name])),
+            }
+            for name in rates
+        ]
+        realism = [{"measure": row.measure, "value": row.value, "ratio": row.ratio} for row in floor.evaluate(generated).rows]
+        for name, rows in {"detectors": detectors, "realism": realism, "choice": choice}.items():
+            table = pd.DataFrame(rows).assign(family=self.settings.telemetry.noise, seed=seed, rung=rung)
+            table.to_parquet(folder / f"{name}.parquet")
+        self.stages.tell(f"  {rung:24} false alarms {np.mean(list(rates.values())):.2%}")
+
+    def _judge(self, rung: str, model: object, draws: np.random.Generator) -> noise_choice.RungJudgement:
+        """Judges a rung as `fit` would: on held-out windows of the same telemetry, by the cheap detectors and a classifier."""
+        judged = self._with_noise("calibration", min(JUDGED, self.settings.ladder.num_windows), "ladder, judged")
+        learnt = {name: values[: len(judged["noise"])] for name, values in self.learnt.items()}
+        clean = self.data.windows("train", len(judged["noise"]), "ladder, judged, waves")["truth"]
+        generated = ladder.generate(model, len(clean), draws, clean)
+        signals = (clean, learnt["truth"], judged["truth"])
+        return noise_choice.judge(rung, generated, learnt["noise"], judged["noise"], signals, seed=self.settings.seed)
+
+    @functools.cached_property
+    def trial(self) -> evaluation.Trial:
+        """Real nominal windows, and the same with anomalies; without a continuous trace."""
+        return dataclasses.replace(self.one.trial(self.settings.ladder.num_anomalous), trace=None, labels=None)

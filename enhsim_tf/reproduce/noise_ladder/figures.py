@@ -1,0 +1,69 @@
+"""The figure of the experiment on noise, drawn from its findings."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+
+from enhsim_tf.common.number_words import in_words
+from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
+from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.reproduce.figure import Figure
+
+_MARKS = {
+    "Gaussian": ("s", COARSE, "none"),
+    "autoregression": ("^", AVERAGE, "none"),
+    "GAN of the paper": ("x", GENERATED, GENERATED),
+    "convolutional GAN": ("+", GENERATED, GENERATED),
+    "residual windows": ("D", QUIET, "none"),
+    "autoregressive network": ("o", ENHANCED, ENHANCED),
+    "real": ("|", REAL, REAL),
+}
+"""Marker, colour and face colour of each rung. The rung without noise is left out: it alarms on nearly every window."""
+
+
+def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
+    """False alarms on nominal windows for each rung of the noise ladder, one row for each family of noise."""
+    families = sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at")
+    kept, rung = found["limits"], found["limits"]["rung"]
+    words = " and ".join(f"{kept[half]['kept']} of {kept[half]['of']} {half}" for half in ("looked at", "unseen") if kept[half]["of"])
+    seeds = max(len(about["seeds"]) for _, about in families)
+    figure, down = new_sheet(
+        DOUBLE,
+        1.9 + 0.22 * len(families),
+        f"Detectors trained with noise of the {rung} stay within the limit on {words} families of noise",
+        f"Mean over {in_words(len(DETECTORS))} detectors whose thresholds are set for 1 % (vertical line); {in_words(seeds)} seed"
+        f"{'s' * (seeds > 1)}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
+        f"windows on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the unseen ones.",
+    )
+    axes = panels(figure, down + 0.45, 1, 1)[0, 0]
+    place = axes.get_position()
+    axes.set_position([0.2, place.y0 + 0.03, 0.76, place.height - 0.03])
+    for name, (marker, colour, inside) in _MARKS.items():
+        rows = [(100 * about["rungs"][name]["alarms"], -row) for row, (_, about) in enumerate(families) if name in about["rungs"]]
+        if rows:
+            values, heights = np.transpose(rows)
+            axes.plot(values, heights, marker, color=colour, markerfacecolor=inside, markersize=9 if marker == "|" else 5, label=name)
+    axes.axvline(1, color=QUIET, linewidth=0.6, zorder=0)
+    looked_at = sum(about["half"] == "looked at" for _, about in families)
+    if 0 < looked_at < len(families):
+        axes.axhline(0.5 - looked_at, color=QUIET, linewidth=0.6, linestyle=":")
+    axes.set_yticks(-np.arange(len(families)), [f"{name.replace('_', ' ')} ({about['half']})" for name, about in families])
+    axes.set_xscale("symlog", linthresh=1)
+    axes.set_xlim(0, 110)
+    axes.set_xticks([0, 0.5, 1, 2, 5, 10, 20, 50, 100], ["0", "0.5", "1", "2", "5", "10", "20", "50", "100"])
+    axes.set_xlabel("false alarms on nominal windows (%)")
+    axes.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(-0.22, 1.0), handletextpad=0.2, columnspacing=1.0)
+    return figure
+
+
+FIGURES = {
+    "false_alarms": Figure(
+        17,
+        "Noise that no generator was designed for",
+        "A row for each family of noise with a mark for each noise model: the false alarms on nominal windows of detectors trained with its "
+        "noise. The title counts the families on which the autoregressive network stays within the limit.",
+        false_alarms,
+    ),
+}

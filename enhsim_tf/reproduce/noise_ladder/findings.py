@@ -1,0 +1,108 @@
+"""What the experiment on noise found: false alarms, recall and realism of each rung on each family, and the rungs that are chosen."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.enhanced_simulator.noise_choice import RungJudgement, choose
+from enhsim_tf.noise.ladder import RUNGS
+from enhsim_tf.reproduce.noise_gallery import GALLERY, LOOKED_AT
+from enhsim_tf.reproduce.tables import KeptTables
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KEPT = KeptTables(
+    names=("detectors", "realism", "choice"),
+    labels=("family", "rung", "detector", "measure"),
+    digits=4,
+    kind="experiment",
+    command="python -m enhsim_tf.reproduce --experiment noise",
+)
+REAL = "real"
+# Limits that were fixed before the run. All are in shares; excess is that over detectors trained on as many real windows.
+MAX_EXCESS = {"looked at": 0.01, "unseen": 0.03}
+MAX_RECALL_DIFFERENCE = 0.03
+MAX_REALISM_RATIO = 3.0
+MAX_REGRET = 0.005  # by which the excess of the chosen rung may be above that of the best rung
+
+
+def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
+    """Summarises the tables.
+
+    Args:
+        tables: The tables of `KEPT`.
+
+    Returns:
+        For each family, its half, its seeds, each rung's false-alarm rate, excess, recall and share of realism measures within
+        `MAX_REALISM_RATIO` times their floor, the chosen rung and the best one; and whether each limit is kept.
+    """
+    detectors, realism, choice = (tables[name] for name in ("detectors", "realism", "choice"))
+    families = {}
+    for family in (name for name in GALLERY if name in set(detectors["family"])):
+        rungs = {}
+        own = detectors[detectors["family"] == family]
+        for rung in (REAL, *RUNGS):
+            rows = own[own["rung"] == rung]
+            if rows.empty:
+                continue
+            rate = (rows["alarms"] / rows["windows"]).groupby(rows["seed"]).mean()
+            ratios = realism[(realism["family"] == family) & (realism["rung"] == rung)]["ratio"]
+            rungs[rung] = {
+                "alarms": float(rate.mean()),
+                "alarms_range": [float(rate.min()), float(rate.max())],
+                "recall": float(rows["recall"].mean()),
+                "recall_at_real_rate": float(rows["recall_at_real_rate"].mean()),
+                "realism_within": float(np.mean(ratios <= MAX_REALISM_RATIO)),
+            }
+        for values in rungs.values():
+            values["excess"] = values["alarms"] - rungs[REAL]["alarms"]
+            values["recall_difference"] = values["recall_at_real_rate"] - rungs[REAL]["recall_at_real_rate"]
+        learnt = {name: values for name, values in rungs.items() if name != REAL}
+        best = min(learnt, key=lambda name: learnt[name]["excess"])
+        chosen = [_chosen(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
+        families[family] = {
+            "half": "looked at" if family in LOOKED_AT else "unseen",
+            "seeds": sorted(int(seed) for seed in set(own["seed"])),
+            "rungs": rungs,
+            "chosen": chosen,
+            "best": best,
+            "regret": float(np.mean([learnt[name]["excess"] for name in chosen]) - learnt[best]["excess"]),
+        }
+    seeds = sorted({seed for about in families.values() for seed in about["seeds"]})
+    return {"families": families, "limits": _limits(families), "seeds": seeds}
+
+
+def _chosen(rows: "pd.DataFrame") -> str:
+    """The rung that the rule chooses from the judgements of one family and seed."""
+    names = [field for field in RungJudgement.__dataclass_fields__ if field != "rung"]
+    return choose([RungJudgement(row["rung"], *(float(row[name]) for name in names)) for row in rows.to_dict("records")])
+
+
+def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> dict[str, Any]:
+    """Whether the learnt rung and the choice keep the limits, and by how much."""
+    found: dict[str, Any] = {"rung": rung}
+    for half, limit in MAX_EXCESS.items():
+        excess = {
+            name: about["rungs"][rung]["excess"] for name, about in families.items() if about["half"] == half and rung in about["rungs"]
+        }
+        found[half] = {
+            "limit": limit,
+            "excess": excess,
+            "kept": sum(value <= limit for value in excess.values()),
+            "of": len(excess),
+        }
+    learnt = {name: about["rungs"][rung] for name, about in families.items() if rung in about["rungs"]}
+    found["recall"] = {
+        "limit": MAX_RECALL_DIFFERENCE,
+        "kept": sum(abs(about["recall_difference"]) <= MAX_RECALL_DIFFERENCE for about in learnt.values()),
+        "of": len(learnt),
+    }
+    found["realism"] = {
+        "limit": MAX_REALISM_RATIO,
+        "families_with_all": sum(about["realism_within"] == 1 for about in learnt.values()),
+        "mean_share": float(np.mean([about["realism_within"] for about in learnt.values()])) if learnt else None,
+        "of": len(learnt),
+    }
+    found["choice"] = {"limit": MAX_REGRET, "kept": sum(about["regret"] <= MAX_REGRET for about in families.values()), "of": len(families)}
+    return found

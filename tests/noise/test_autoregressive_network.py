@@ -1,0 +1,110 @@
+"""The autoregressive network recovers known processes, and the same seed gives the same noise."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import softmax
+from scipy.stats import t
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork, quantisation_step
+from enhsim_tf.realism.measures import autocorrelation, effective_rank
+from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise
+
+SAMPLES = 64
+
+
+@pytest.fixture(scope="module")
+def coloured():
+    """An AR(1) process of coefficient 0.7, and a network that learnt it."""
+    noise = AutoregressiveNoise(0.7, 0.2).draw(1_500 * SAMPLES, np.random.default_rng(1)).reshape(-1, SAMPLES)
+    return noise, AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 400)
+
+
+def test_the_parameter_of_a_known_process_is_recovered(coloured):
+    noise, network = coloured
+    generated = network.generate(800, 5)
+    assert generated.shape == (800, SAMPLES) and generated.dtype == np.float32
+    assert np.std(generated) == pytest.approx(0.2, rel=0.05)
+    assert_allclose(autocorrelation(generated, 5)[1:], 0.7 ** np.arange(1, 6), atol=0.05)
+    assert effective_rank(generated) == pytest.approx(effective_rank(noise[:800]), rel=0.1)
+
+
+def test_the_likelihood_reaches_the_entropy_of_the_process(coloured):
+    _, network = coloured
+    # a Gaussian innovation has the entropy log(sd sqrt(2 pi e)); the first sample of 64 has the larger sd of the process
+    innovation = np.sqrt(1 - 0.7**2)
+    entropy = 0.5 * np.log(2 * np.pi * np.e) + np.log(innovation) * (SAMPLES - 1) / SAMPLES
+    assert network.losses[-1][2] == pytest.approx(entropy, abs=0.03)
+    assert network.losses[-1][2] < network.losses[0][2]
+
+
+def test_a_series_has_no_seams_and_the_same_process(coloured):
+    _, network = coloured
+    series = network.generate_series(6_000, 2)
+    assert series.shape == (6_000,)
+    steps = np.diff(series)
+    at_seams = steps[SAMPLES - 1 :: SAMPLES]
+    assert np.std(at_seams) == pytest.approx(np.std(steps), rel=0.25)  # 93 seams
+    assert np.sum(series[1:] * series[:-1]) / np.sum(series**2) == pytest.approx(0.7, abs=0.06)
+
+
+def test_the_same_seed_gives_the_same_noise_and_the_owner_moves_on(coloured):
+    _, network = coloured
+    owner = np.random.default_rng(7)
+    assert_array_equal(network.generate(5, 7), network.generate(5, 7))
+    assert_array_equal(network.generate(5, 7), network.generate(5, owner))
+    assert (network.generate(5, owner) != network.generate(5, 7)).any()
+
+
+def test_the_same_seed_gives_the_same_training():
+    noise = np.random.default_rng(0).normal(size=(60, 20))
+    first, again = (AutoregressiveNetwork.untrained(noise, seed=2).fit(noise, 5).generate(4, 1) for _ in range(2))
+    assert_array_equal(first, again)
+
+
+def test_numpy_draws_from_the_density_that_training_maximises():
+    """The density of the first sample, by hand from the layers, against draws of it."""
+    noise = np.random.default_rng(0).normal(size=(200, 8))
+    network = AutoregressiveNetwork.untrained(noise, seed=1)
+    width = network.network.input_shape[1]
+    features = np.zeros((1, width), np.float32)
+    features[0, len(network.lags) + len(network.octaves) :][: len(network.octaves)] = np.log(1e-3)  # no past has no magnitude
+    features[0, -1] = 1.0  # 1 / sqrt(1 + 0)
+    logits, means, log_scales, degrees = (np.asarray(each, np.float64)[0] for each in network.network(features))
+    drawn = network.generate(20_000, 3)[:, 0] / network.scale
+    for value in np.linspace(-5, 5, 21):  # below the limit of generated samples
+        expected = softmax(logits) @ t.cdf((value - means) / np.exp(log_scales), degrees)
+        assert np.mean(drawn <= value) == pytest.approx(expected, abs=0.012)  # three standard errors of a share of 20,000
+
+
+def test_noise_whose_scale_follows_the_signal_is_learnt():
+    rng = np.random.default_rng(4)
+    signal = rng.uniform(-1, 1, (1_000, 1)) * np.ones((1, 30))
+    noise = rng.standard_normal((1_000, 30)) * np.where(signal > 0, 1.0, 0.2)
+    network = AutoregressiveNetwork.untrained(noise, signal, seed=1).fit(noise, 300, signal)
+    quiet, loud = (network.generate(300, 2, np.full((300, 30), level)) for level in (-0.5, 0.5))
+    assert np.std(quiet) == pytest.approx(0.2, rel=0.2) and np.std(loud) == pytest.approx(1.0, rel=0.2)
+    with pytest.raises(InputError, match="Expected the enhanced signal of shape"):
+        network.generate(3, 2)
+
+
+def test_quantised_noise_stays_on_its_grid():
+    noise = 0.25 * np.rint(np.random.default_rng(0).normal(size=(300, 40)) / 0.25)
+    network = AutoregressiveNetwork.untrained(noise, seed=1).fit(noise, 50)
+    generated = network.generate(20, 1) / 0.25
+    assert network.step == pytest.approx(0.25)
+    assert_array_equal(generated, np.rint(generated))
+
+
+def test_the_step_of_quantised_values_is_found_and_others_have_none():
+    rng = np.random.default_rng(0)
+    assert quantisation_step(0.1 * rng.integers(-20, 20, 5_000) + 0.03) == pytest.approx(0.1)
+    assert quantisation_step(rng.normal(size=5_000)) == 0.0
+    assert quantisation_step(rng.choice([0.0, 1.0, 1.7], 500)) == 0.0
+
+
+def test_noise_that_cannot_be_learnt_is_refused():
+    for noise in (np.zeros((20, 10)), np.full((20, 10), np.nan)):
+        with pytest.raises(InputError, match="Expected finite noise that varies"):
+            AutoregressiveNetwork.untrained(noise)

@@ -1,0 +1,87 @@
+"""The experiment on noise: its lists, its choice and its limits."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.enhanced_simulator.noise_choice import RungJudgement, choose, judge
+from enhsim_tf.noise.ladder import RUNGS
+from enhsim_tf.reproduce import __main__ as command
+from enhsim_tf.reproduce.noise_gallery import GALLERY
+from enhsim_tf.reproduce.noise_ladder import findings
+
+
+def test_the_lists_of_the_command_are_those_of_the_gallery_and_the_ladder():
+    assert command.FAMILIES == tuple(GALLERY) and command.RUNG_NAMES == tuple(RUNGS)
+    assert command.chosen_rungs("autoregression, none") == ("none", "autoregression")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--rungs", "none"], "Expected --rungs together with --experiment noise"),
+        (["--experiment", "noise", "--rungs", "pink"], "Expected --rungs of none, Gaussian"),
+        (["--experiment", "robustness", "--environment", "bursts"], "Expected --environment white, autoregressive, heteroscedastic, shot"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused_in_one_line(options, words, capsys):
+    assert command.main(options) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_the_simplest_rung_that_passes_is_chosen_and_else_the_nearest():
+    def judged(rung, auc, alarms):
+        return RungJudgement(rung, auc, 0.5, alarms, 0.01)
+
+    assert choose([judged("none", 1.0, 1.0), judged("Gaussian", 0.54, 0.019), judged("autoregression", 0.5, 0.01)]) == "Gaussian"
+    assert choose([judged("none", 1.0, 1.0), judged("Gaussian", 0.7, 0.2), judged("autoregression", 0.6, 0.05)]) == "autoregression"
+    assert judged("x", 0.4, 0.01).passes  # an AUC below chance is not better than chance
+    assert not judged("x", 0.5, 0.021).passes and not judged("x", 0.56, 0.01).passes
+
+
+def test_noise_of_the_right_scale_passes_and_noise_of_half_the_scale_does_not():
+    rng = np.random.default_rng(5)
+    learnt, held_out, generated, quiet = (rng.normal(0, scale, (600, 60)) for scale in (1, 1, 1, 0.5))
+    signals = [np.zeros((600, 60))] * 3
+    assert judge("right", generated, learnt, held_out, signals).passes
+    wrong = judge("wrong", quiet, learnt, held_out, signals)
+    assert wrong.auc > 0.95 and wrong.alarms > 0.5 and not wrong.passes
+
+
+def test_the_summary_counts_what_a_table_says():
+    def rows(family, rung, alarms):
+        return {
+            "family": family,
+            "seed": 1,
+            "rung": rung,
+            "detector": "a",
+            "alarms": alarms,
+            "windows": 1_000,
+            "recall": 0.5,
+            "recall_at_real_rate": 0.4,
+        }
+
+    detectors = [rows("white", "real", 10), rows("white", "Gaussian", 12), rows("white", "autoregressive network", 30)]
+    detectors += [rows("bursts", "real", 10), rows("bursts", "Gaussian", 500), rows("bursts", "autoregressive network", 30)]
+    realism = [{"family": row["family"], "seed": 1, "rung": row["rung"], "measure": "m", "value": 0.0, "ratio": 4.0} for row in detectors]
+    choice = [
+        {
+            "family": row["family"],
+            "seed": 1,
+            "rung": row["rung"],
+            "auc": 0.5,
+            "real_auc": 0.5,
+            "alarms": row["alarms"] / 1_000,
+            "real_alarms": 0.01,
+        }
+        for row in detectors
+        if row["rung"] != "real"
+    ]
+    found = findings.summarise(
+        {name: pd.DataFrame(table) for name, table in zip(findings.KEPT.names, (detectors, realism, choice), strict=True)}
+    )
+    white, bursts = (found["families"][name] for name in ("white", "bursts"))
+    assert white["chosen"] == ["Gaussian"] and white["regret"] == pytest.approx(0) and white["half"] == "looked at"
+    assert bursts["half"] == "unseen" and bursts["rungs"]["autoregressive network"]["excess"] == pytest.approx(0.02)
+    assert found["limits"]["looked at"]["kept"] == 0 and found["limits"]["unseen"]["kept"] == 1  # two points: above one, below three
+    assert found["limits"]["realism"]["families_with_all"] == 0 and found["limits"]["recall"]["kept"] == 2
