@@ -15,7 +15,8 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_windows_from_parts, evenly_spaced_starts, ridge, window_errors
+from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_aligned_by_its_shape, ridge_windows
+from enhsim_tf.enhancer.training_pairs import cut_pairs, cut_windows_from_parts, evenly_spaced_starts, window_errors
 from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.reproduce.settings import Settings
@@ -237,11 +238,14 @@ class ChannelStudy:
         begins, places = disjoint_offsets(len(test), window), evenly_spaced_starts([train], window, len(train))
         begins = begins[self._is_nominal(begins)]
         by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
+        learnt, interval_s = cut_pairs([train], simulator.coarse, places, window, follow=True), simulator.interval_s
         by_shape = simulator.pairs(test, begins)  # aligned in phase and offset with the enhanced waveform
         windows = {
             "coarse": by_edges.coarse_rescaled,
-            "ridge": ridge(cut_pairs([train], simulator.coarse, places, window, follow=True), by_edges),
-            "ridge, same clock": ridge(simulator.pairs(train, places), by_shape),  # the same alignment, without the network
+            "ridge": ridge_windows(learnt, by_edges, interval_s),
+            "ridge, same clock": ridge_windows(simulator.pairs(train, places), by_shape, interval_s),  # aligned by the network
+            "ridge, own clock": ridge_aligned_by_its_shape(learnt, by_edges, simulator.coarse, interval_s),
+            "nearest windows": nearest_window_means(learnt, by_edges, interval_s),
             "enhanced": simulator.follow(by_shape),
         }
         found = []
