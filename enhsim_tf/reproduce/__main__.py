@@ -86,10 +86,11 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import caption_of
     from enhsim_tf.reproduce.figure import save
-    from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge, ranges
+    from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge
     from enhsim_tf.reproduce.paper.data import Source
     from enhsim_tf.reproduce.paper.figure_data import FIGURE_DATA, WITHOUT_TRAINING
     from enhsim_tf.reproduce.paper.figures import FIGURES
+    from enhsim_tf.reproduce.paper.over_seeds import ranges
     from enhsim_tf.reproduce.paper.pipeline import Experiment
     from enhsim_tf.reproduce.publish.page import write_page
     from enhsim_tf.reproduce.publish.results import fill_readme, results, table
