@@ -245,7 +245,8 @@ def _neighbours(train: np.ndarray, windows: np.ndarray, number: int) -> Iterator
     for first in range(0, len(windows), _ROWS):
         rows = slice(first, min(first + _ROWS, len(windows)))
         distance = length - 2 * (_flat(windows[rows] - middle) / scale) @ learnt.T  # less the length of the window itself
-        yield rows, np.argsort(distance, axis=1, kind="stable")[:, :number]
+        nearest = np.argpartition(distance, number - 1, axis=1)[:, :number]
+        yield rows, np.take_along_axis(nearest, np.argsort(np.take_along_axis(distance, nearest, 1), axis=1, kind="stable"), 1)
 
 
 def _column_deviations(windows: np.ndarray) -> np.ndarray:

@@ -105,7 +105,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
     confirmed = [name for name, about in found["alarms_on_everything"].items() if about["replicates"] == about["of"]]
     return {
         "arms": replicate.ARMS,
-        "methods": degraded_modes.METHODS,
+        "methods": {name: about for name, about in degraded_modes.METHODS.items() if name in found["modes"]["nrmse"]},
         "noises": ["real", *(noise for pipeline in ("residual", "enhanced") for noise in _noises(pipeline, replicate.ARMS))],
         "estimated": (
             "real",
