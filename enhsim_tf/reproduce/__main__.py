@@ -94,6 +94,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.paper.pipeline import Experiment
     from enhsim_tf.reproduce.publish.page import write_page
     from enhsim_tf.reproduce.publish.results import fill_readme, results, table
+    from enhsim_tf.reproduce.publish.verdicts import BEFORE, PATH, fill_verdicts
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
 
@@ -151,6 +152,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if folder == Path("figures"):
         fill_readme(Path("README.md"), folder)
+        fill_verdicts(PATH, BEFORE, folder)
     different = changed(records)
     if different:
         tell(f"Verdicts that changed: {', '.join(different)}")
