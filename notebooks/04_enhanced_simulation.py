@@ -50,13 +50,15 @@ assert rough["enhanced"] > 2 * rough["truth"]
 
 # %% [markdown]
 # This error is noise of the training targets that the network has memorised. Is so large a network needed at all? Ridge
-# regression, one matrix from 500 to 500 samples, gets far:
+# regression is one matrix from 500 to 500 samples. With a penalty that is chosen by cross-validation on the same training windows, it is
+# nearer to the truth than the network, and so is the mean of the nearest training windows:
 
 # %%
 found = {key: float(value) for key, value in experiment.enhancement.items()}
-print({key: round(found[key], 3) for key in ("identity_nrmse", "ridge_nrmse", "nrmse", "train_nrmse")})
+print({key: round(found[key], 3) for key in ("identity_nrmse", "ridge_nrmse", "nearest_nrmse", "nrmse")})
 print(f"held-out coarse windows that occur in training as they are: {found['test_windows_seen']:.0%}")
-assert found["ridge_nrmse"] < found["identity_nrmse"] / 3
+if experiment.settings.budget == "full":
+    assert found["ridge_nrmse"] < found["nearest_nrmse"] < found["nrmse"]
 
 # %% [markdown]
 # The last line explains why training and held-out error agree so well: a periodic simulator has few different windows (notebook 02),
@@ -71,7 +73,8 @@ assert [record["id"] for record in records] == ["C1", "C2", "C3"]
 # %% [markdown]
 # ## Exercises
 #
-# 1. Write the ridge regression yourself in three lines of NumPy and get below half of the coarse error.
+# 1. Write the ridge regression yourself in three lines of NumPy and get below half of the coarse error. How does the error depend on the
+#    penalty?
 # 2. The paper hopes that the enhancer also serves in degraded modes (C9). Plot a window that gets stuck: coarse, enhanced, truth. In
 #    which modes does enhancing make the error larger, and why?
 
@@ -81,10 +84,12 @@ assert [record["id"] for record in records] == ["C1", "C2", "C3"]
 # %%
 train = experiment.data.windows("train", 1_000, "exercise")
 source, target = train["coarse"].astype(float), train["target"]
-matrix = np.linalg.solve(source.T @ source + 1.0 * np.eye(500), source.T @ target)
-ridge_error = nrmse(held_out["coarse"] @ matrix, held_out["truth"])
-print(f"ridge regression: {ridge_error:.3f}")
-assert ridge_error < found["identity_nrmse"] / 2
+ridge_error = {}
+for penalty in (1.0, 300.0, 10_000.0):
+    matrix = np.linalg.solve(source.T @ source + penalty * np.eye(500), source.T @ target)
+    ridge_error[penalty] = nrmse(held_out["coarse"] @ matrix, held_out["truth"])
+    print(f"ridge regression, penalty {penalty:7,.0f}: {ridge_error[penalty]:.3f}")
+assert min(ridge_error.values()) == ridge_error[300.0] < found["identity_nrmse"] / 2
 
 # %%
 from enhsim_tf import Degraded

@@ -28,8 +28,8 @@ class ChannelReport:
         is_held_out: Whether the telemetry of the evaluation was held out from training.
         num_windows: Number of real windows used for errors and false alarms. They may overlap.
         num_disjoint: How many of these windows can be chosen without overlap; this is the effective sample size.
-        nrmse: Normalised root-mean-square error (NRMSE) of `coarse`, `ridge` and `enhanced`: the median over windows of the
-            error divided by the window's standard deviation.
+        nrmse: Normalised root-mean-square error (NRMSE) of `coarse`, `ridge` (regression), `nearest` (mean of the nearest
+            training windows) and `enhanced`: the median over windows of the error divided by the window's standard deviation.
         noise: Rows of `realism.Row` as dictionaries, which compare generated with extracted noise. Empty if there is too
             little telemetry.
         noise_window: Length in samples of the windows in which noise was compared.
@@ -93,12 +93,21 @@ class ChannelReport:
         errors = self.nrmse
         if any(np.isnan(error) for error in errors.values()):
             return f"Signal: no window of {self._where()} moves, so the error cannot be measured."
-        others = {"the coarse simulator": errors["coarse"], "ridge regression": errors["ridge"]}
+        others = {
+            "the coarse simulator": errors["coarse"],
+            "ridge regression": errors["ridge"],
+            "the mean of the nearest training windows": errors["nearest"],
+        }
         beaten = [name for name, error in others.items() if errors["enhanced"] < error]
-        judged = "The enhancer is nearest to it." if len(beaten) == 2 else f"The enhancer is no nearer than {min(others, key=others.get)}."
+        judged = (
+            "The enhancer is nearest to it."
+            if len(beaten) == len(others)
+            else f"The enhancer is no nearer than {min(others, key=others.get)}."
+        )
         return (
             f"Signal: error {errors['enhanced']:.3f} on {self._where()} (NRMSE, median window); the coarse simulator "
-            f"{errors['coarse']:.3f}, ridge regression {errors['ridge']:.3f}. {judged}"
+            f"{errors['coarse']:.3f}, ridge regression {errors['ridge']:.3f}, the mean of the nearest training windows "
+            f"{errors['nearest']:.3f}. {judged}"
         )
 
     def _of_the_noise(self) -> str:

@@ -27,7 +27,7 @@ def channel_figure(report: ChannelReport) -> matplotlib.figure.Figure:
         errors = {key: "not measurable" if np.isnan(error) else f"{error:.2f}" for key, error in report.nrmse.items()}
         subtitle = (
             f"Error on {where} (NRMSE, median window): {errors['coarse']} coarse, {errors['ridge']} ridge regression, "
-            f"{errors['enhanced']} enhanced. Left, above: the window with the median error; below: a generated window, with noise."
+            f"{errors['nearest']} nearest training windows, {errors['enhanced']} enhanced. Left, above: the window with the median error; below: a generated window, with noise."
         )
         figure, down = new_sheet(DOUBLE, _HEIGHT, f"{name}: {_message(report)}", subtitle)
         (signal, alarms), (made, found) = _grid(figure, down + 0.24)
@@ -79,7 +79,9 @@ def _message(report: ChannelReport) -> str:
         return "no window moves, so nothing can be said of the enhanced signal"
     if enhanced >= coarse:
         return "the enhanced signal is no nearer to the telemetry than the coarse one"
-    but = "" if enhanced < report.nrmse["ridge"] else ", but no nearer than ridge regression"
+    others = {"ridge regression": report.nrmse["ridge"], "the nearest training windows": report.nrmse["nearest"]}
+    best = min(others, key=others.get)
+    but = "" if enhanced < others[best] else f", but no nearer than {best}"
     return f"the enhanced signal is {1 - enhanced / coarse:.0%} nearer to the telemetry than the coarse one{but}"
 
 

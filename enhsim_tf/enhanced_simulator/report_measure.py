@@ -12,7 +12,8 @@ import numpy as np
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
-from enhsim_tf.enhancer.training_pairs import cut_pairs, ridge, window_errors
+from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
+from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
 from enhsim_tf.realism import real_floor
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import disjoint_starts, evenly_spaced_starts
@@ -73,7 +74,8 @@ def report_on(
         min(len(pairs), sum(len(part) // window for part in held_out)),
         {
             "coarse": _nrmse(pairs.coarse_rescaled, pairs.target),
-            "ridge": _nrmse(ridge(training, pairs), pairs.target),
+            "ridge": _nrmse(ridge_windows(training, pairs, simulator.interval_s), pairs.target),
+            "nearest": _nrmse(nearest_window_means(training, pairs, simulator.interval_s), pairs.target),
             "enhanced": _nrmse(enhanced, pairs.target),
         },
         rows,

@@ -147,23 +147,6 @@ def align_to_enhanced(pairs: Pairs, coarse: np.ndarray, enhanced: np.ndarray) ->
     return Pairs(coarse[best], pairs.target, *_least_squares(enhanced[best], pairs.target), pairs.time_s)
 
 
-def ridge(training: Pairs, pairs: Pairs) -> np.ndarray:
-    """Predicts telemetry windows by ridge regression on coarse windows, the linear baseline for the enhancer.
-
-    Args:
-        training: Training pairs. Flat windows are dropped, see `Pairs.drop_flat`.
-        pairs: Pairs whose telemetry is predicted, from their coarse windows, shifts and gains.
-
-    Returns:
-        Predicted telemetry, float32 of shape `(windows, samples)`.
-    """
-    from sklearn.linear_model import Ridge
-
-    training = training.drop_flat()
-    predicted = Ridge().fit(training.coarse, training.target_in_unit).predict(pairs.coarse)
-    return apply_shift_and_gain(predicted, pairs.shift, pairs.gain)
-
-
 def window_errors(windows: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Computes the normalised root-mean-square error (NRMSE) of each window.
 

@@ -93,12 +93,14 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import figure_caption
     from enhsim_tf.reproduce.figure import save
-    from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge, ranges
+    from enhsim_tf.reproduce.paper.claims import CLAIMS, changed, judge
     from enhsim_tf.reproduce.paper.data import Source
     from enhsim_tf.reproduce.paper.figures import FIGURES
+    from enhsim_tf.reproduce.paper.over_seeds import ranges
     from enhsim_tf.reproduce.paper.pipeline import Experiment
     from enhsim_tf.reproduce.publish.page import write_page
     from enhsim_tf.reproduce.publish.results import fill_readme, results, table
+    from enhsim_tf.reproduce.publish.verdicts import BEFORE, PATH, fill_verdicts
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
 
@@ -156,6 +158,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if folder == Path("figures"):
         fill_readme(Path("README.md"), folder)
+        fill_verdicts(PATH, BEFORE, folder)
     different = changed(records)
     if different:
         tell(f"Verdicts that changed: {', '.join(different)}")

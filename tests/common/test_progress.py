@@ -276,7 +276,7 @@ def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
     assert done.returncode == 0, done.stderr
     assert spoken_in(done.stdout) == {
         "enhancer     epoch": (2, 2),
-        "noise GAN    iteration": (19, 20),  # the last iteration is reported by the end of the stage
+        "noise GAN    iteration": (39, 40),  # the last iteration is reported by the end of the stage
         "false alarms arm": (5, 5),
         "resemblance  comparison": (3, 4),
     }

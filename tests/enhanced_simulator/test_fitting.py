@@ -46,7 +46,7 @@ def test_the_fields_of_the_report(fitted):
     assert (report.channel, report.unit, report.time_unit, report.is_held_out) == ("volts", "V", "s", True)
     assert report.period_s == pytest.approx(400, rel=0.01)
     assert report.num_windows == min(200, 380 - 64 + 1) and report.num_disjoint == 380 // 64  # a fifth of 1,900 samples, in one part
-    assert set(report.nrmse) == {"coarse", "ridge", "enhanced"} and all(error > 0 for error in report.nrmse.values())
+    assert set(report.nrmse) == {"coarse", "ridge", "nearest", "enhanced"} and all(error > 0 for error in report.nrmse.values())
     assert set(report.false_alarms) == {"generated", "real"}
     assert all(tuple(rates) == DETECTORS and all(0 <= rate <= 1 for rate in rates.values()) for rates in report.false_alarms.values())
     assert tuple(report.recall) == DETECTORS and all(set(rates) == set(INJECTIONS) for rates in report.recall.values())
@@ -183,7 +183,7 @@ def made_up(**changed):
         "is_held_out": True,
         "num_windows": 200,
         "num_disjoint": 5,
-        "nrmse": {"coarse": 0.5, "ridge": 0.3, "enhanced": 0.2},
+        "nrmse": {"coarse": 0.5, "ridge": 0.3, "nearest": 0.4, "enhanced": 0.2},
         "noise": noise,
         "noise_window": 16,
         "false_alarms": {"generated": rates, "real": dict.fromkeys(rates, 0.01)},
@@ -202,22 +202,28 @@ def sentence(report, word):
 @pytest.mark.parametrize(
     ("errors", "judged"),
     [
-        ((0.5, 0.3, 0.2), "The enhancer is nearest to it."),
-        ((0.5, 0.3, 0.4), "The enhancer is no nearer than ridge regression."),
-        ((0.3, 0.5, 0.4), "The enhancer is no nearer than the coarse simulator."),
-        ((0.3, 0.2, 0.4), "The enhancer is no nearer than ridge regression."),
-        ((0.0, 0.0, 0.0), "The enhancer is no nearer than the coarse simulator."),
+        ((0.5, 0.3, 0.4, 0.2), "The enhancer is nearest to it."),
+        ((0.5, 0.3, 0.4, 0.4), "The enhancer is no nearer than ridge regression."),
+        ((0.3, 0.5, 0.6, 0.4), "The enhancer is no nearer than the coarse simulator."),
+        ((0.3, 0.2, 0.6, 0.4), "The enhancer is no nearer than ridge regression."),
+        ((0.5, 0.3, 0.1, 0.2), "The enhancer is no nearer than the mean of the nearest training windows."),
+        ((0.0, 0.0, 0.0, 0.0), "The enhancer is no nearer than the coarse simulator."),
     ],
 )
 def test_the_sentence_on_the_signal(errors, judged):
-    said = sentence(made_up(nrmse=dict(zip(("coarse", "ridge", "enhanced"), errors, strict=True))), "Signal")
-    assert said.endswith(judged) and f"error {errors[2]:.3f}" in said and f"coarse simulator {errors[0]:.3f}" in said
+    said = sentence(made_up(nrmse=dict(zip(("coarse", "ridge", "nearest", "enhanced"), errors, strict=True))), "Signal")
+    assert (
+        said.endswith(judged)
+        and f"error {errors[3]:.3f}" in said
+        and f"nearest training windows {errors[2]:.3f}" in said
+        and f"coarse simulator {errors[0]:.3f}" in said
+    )
 
 
 def test_constant_telemetry_has_no_error_and_the_report_is_valid_json():
-    report = made_up(nrmse=dict.fromkeys(("coarse", "ridge", "enhanced"), float("nan")))
+    report = made_up(nrmse=dict.fromkeys(("coarse", "ridge", "nearest", "enhanced"), float("nan")))
     assert "no window of telemetry it has not seen moves" in sentence(report, "Signal")
-    assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["nrmse"] == dict.fromkeys(("coarse", "ridge", "enhanced"))
+    assert json.loads(json.dumps(report.to_dict(), allow_nan=False))["nrmse"] == dict.fromkeys(("coarse", "ridge", "nearest", "enhanced"))
 
 
 @pytest.mark.parametrize(

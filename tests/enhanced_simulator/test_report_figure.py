@@ -27,7 +27,7 @@ def made_up(scale=1.0, offset=0.0, seed=0, **changed):
         "is_held_out": True,
         "num_windows": 200,
         "num_disjoint": 5,
-        "nrmse": {"coarse": 0.5, "ridge": 0.3, "enhanced": 0.2},
+        "nrmse": {"coarse": 0.5, "ridge": 0.3, "nearest": 0.45, "enhanced": 0.2},
         "noise": [],
         "noise_window": 16,
         "false_alarms": {"generated": dict(zip(DETECTORS, (0.0, 0.01, 0.08, 1.0), strict=True)), "real": dict.fromkeys(DETECTORS, 0.02)},
@@ -39,12 +39,12 @@ def made_up(scale=1.0, offset=0.0, seed=0, **changed):
     return ChannelReport(**fields | changed)
 
 
-NAN = dict.fromkeys(("coarse", "ridge", "enhanced"), float("nan"))
+NAN = dict.fromkeys(("coarse", "ridge", "nearest", "enhanced"), float("nan"))
 CASES = {
     "usual": made_up(),
-    "no better": made_up(nrmse={"coarse": 0.5, "ridge": 0.3, "enhanced": 0.6}),
-    "ridge": made_up(nrmse={"coarse": 0.5, "ridge": 0.1, "enhanced": 0.2}),
-    "perfect": made_up(nrmse={"coarse": 0.0, "ridge": 0.0, "enhanced": 0.0}),
+    "no better": made_up(nrmse={"coarse": 0.5, "ridge": 0.3, "nearest": 0.45, "enhanced": 0.6}),
+    "ridge": made_up(nrmse={"coarse": 0.5, "ridge": 0.1, "nearest": 0.45, "enhanced": 0.2}),
+    "perfect": made_up(nrmse={"coarse": 0.0, "ridge": 0.0, "nearest": 0.0, "enhanced": 0.0}),
     "still": made_up(nrmse=NAN, examples=dict.fromkeys(("coarse", "enhanced", "generated", "real"), np.full(200, 7.0))),
     "large": made_up(scale=1e9),
     "small": made_up(scale=1e-9),
@@ -100,13 +100,17 @@ def test_texts_do_not_overlap_other_panels(case):
 @pytest.mark.parametrize(
     ("nrmse", "message"),
     [
-        ({"coarse": 0.5, "ridge": 0.3, "enhanced": 0.2}, "60% nearer to the telemetry than the coarse one"),
+        ({"coarse": 0.5, "ridge": 0.3, "nearest": 0.45, "enhanced": 0.2}, "60% nearer to the telemetry than the coarse one"),
         (
-            {"coarse": 0.5, "ridge": 0.1, "enhanced": 0.2},
+            {"coarse": 0.5, "ridge": 0.1, "nearest": 0.45, "enhanced": 0.2},
             "60% nearer to the telemetry than the coarse one, but no nearer than ridge regression",
         ),
-        ({"coarse": 0.2, "ridge": 0.3, "enhanced": 0.2}, "no nearer to the telemetry than the coarse one"),
-        ({"coarse": 0.0, "ridge": 0.0, "enhanced": 0.0}, "no nearer to the telemetry than the coarse one"),
+        (
+            {"coarse": 0.5, "ridge": 0.3, "nearest": 0.1, "enhanced": 0.2},
+            "60% nearer to the telemetry than the coarse one, but no nearer than the nearest training windows",
+        ),
+        ({"coarse": 0.2, "ridge": 0.3, "nearest": 0.45, "enhanced": 0.2}, "no nearer to the telemetry than the coarse one"),
+        ({"coarse": 0.0, "ridge": 0.0, "nearest": 0.0, "enhanced": 0.0}, "no nearer to the telemetry than the coarse one"),
         (NAN, "nothing can be said of the enhanced signal"),
     ],
 )

@@ -6,11 +6,9 @@ import pytest
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.training_pairs import (
     MIN_GAIN,
-    Pairs,
     apply_shift_and_gain,
     cut_pairs,
     paired_windows,
-    ridge,
     split_end,
     window_errors,
 )
@@ -180,18 +178,3 @@ def test_errors_are_in_units_of_each_windows_own_deviation():
     target = np.array([[1, -1, 1, -1], [3, 7, 3, 7], [5, 5, 5, 5]], np.float32)  # deviations 1, 2, 0
     errors = window_errors(target + np.array([[3, 3, 3, 3], [0, 0, 0, 4], [1, 1, 1, 1]], np.float32), target)
     np.testing.assert_array_equal(errors, [3, 1, np.nan])
-
-
-def test_ridge_is_the_closed_form_on_windows_that_move_at_the_level_of_each():
-    rng = np.random.default_rng(0)
-    coarse, target = rng.standard_normal((2, 60, 5)).astype(np.float32)
-    shift, gain = rng.normal(size=60), np.where(np.arange(60) % 3, 2.0, 0.0)  # every third does not follow
-    learnt = Pairs(coarse, target, shift, gain, np.zeros(60))
-    new = Pairs(coarse[:4] + 1, target[:4], np.arange(4.0), np.array([1.0, 2.0, 0.5, 1.0]), np.zeros(4))
-    inputs, outputs = coarse[gain > 0].astype(float), ((target - shift[:, None]) / 2)[gain > 0]
-    centred = inputs - inputs.mean(axis=0)
-    weights = np.linalg.solve(centred.T @ centred + np.eye(5), centred.T @ (outputs - outputs.mean(axis=0)))  # penalty 1
-    expected = outputs.mean(axis=0) + (new.coarse - inputs.mean(axis=0)) @ weights
-    found = ridge(learnt, new)
-    np.testing.assert_allclose(found, new.shift[:, None] + new.gain[:, None] * expected, atol=1e-5)
-    assert found.dtype == np.float32

@@ -255,7 +255,7 @@ def pretended(tmp_path, monkeypatch):
                 "expected": claim.expected,
                 "verdict": verdicts.get(claim.id, claim.expected),
                 "value": 1.0,
-                "close_call": claim.close_call,
+                "close_calls": list(claim.close_calls),
             }
             | {key: "words" for key in ("sentence", "section", "figure", "statistic", "tolerance", "finding")}
             for claim in claims.CLAIMS

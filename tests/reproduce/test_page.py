@@ -14,8 +14,9 @@ import zlib
 
 import pytest
 
-from enhsim_tf.reproduce.paper.claims import CLAIMS, NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
+from enhsim_tf.reproduce.paper.claims import CLAIMS
 from enhsim_tf.reproduce.paper.figures import FIGURES
+from enhsim_tf.reproduce.paper.judgements import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
 from enhsim_tf.reproduce.publish import page
 from enhsim_tf.reproduce.settings import deviations
 
@@ -198,7 +199,7 @@ def test_every_setting_and_every_number_of_the_run_is_there(tree):
 
 def test_ranges_over_seeds_only_where_they_belong_to_the_run(folder):
     claims = {claim["id"]: {"values": [claim["value"]] * 2, "verdicts": [claim["verdict"]] * 2} for claim in found_of()["claims"]}
-    claims["C1"]["values"][1], claims["C2"]["verdicts"][1] = 0.0411, NOT_REPRODUCED
+    claims["C1"]["values"][1], claims["C2"]["verdicts"] = 0.0411, [PARTLY, NOT_REPRODUCED]
     spread = {"budget": "full", "seeds": [0, 1], "claims": claims}
     try:
         (folder / "spread.json").write_text(json.dumps(spread))

@@ -173,7 +173,8 @@ def _spread(value, budget="smoke", seeds=(7, 8, 9)):
 
 def test_the_readme_gives_the_range_over_seeds_where_it_is_known(filled):
     text = filled(spread=_spread(0.12345))
-    assert "0.123 (0.1 to 0.2)" in text and "seeds 7, 8, 9" in text
+    assert "0.123 (0.1 to 0.2)" in text and "the range over 3 seeds, 7 to 9, and the verdict of most of them" in text
+    assert "By the verdicts of most of 3 seeds: [Re, in part]; by those of one seed alone: [Re, in part] with 2, [¬Re] with 1." in text
     assert "| 1,234,568 | **partly**" in text, "a speed has no range over seeds"
     assert "**partly** (over seeds: 2 partly, 1 not reproduced)" in text and text.count("over seeds:") == 1
     for other in (_spread(0.15), _spread(0.12345, budget="full"), _spread(0.12345, seeds=(0, 1))):
@@ -188,7 +189,14 @@ def test_a_value_lies_in_its_range_and_a_verdict_is_counted_whatever_the_seed_ha
     spread["claims"]["C9"] |= {"range": [1, 2], "values": [1.5, 1, 2], "verdicts": ["partly"] * 3}
     found["claims"] = [*RECORDS[:2], RECORDS[2] | {"value": 3.5, "verdict": "reproduced"}]
     text = filled(spread=spread)
-    assert "| 3.5 (1 to 3.5) | **reproduced** (over seeds: 1 reproduced, 2 partly)" in text
+    assert "| 3.5 (1 to 3.5) | **partly** (over seeds: 2 partly, 1 reproduced)" in text
+
+
+def test_of_a_claim_that_the_paper_does_not_test_what_holds_is_counted(filled, found):
+    spread = _spread(0.12345)
+    spread["claims"]["C9"] |= {"verdicts": ["not tested by the paper"] * 3, "holds": [None, "holds", "does not hold"]}
+    found["claims"] = [*RECORDS[:2], RECORDS[2] | {"verdict": "not tested by the paper", "holds": "does not hold"}]
+    assert "**not tested by the paper** (over seeds: 2 does not hold, 1 holds)" in filled(spread=spread)
 
 
 def test_the_title_carries_the_verdict_of_most_seeds(filled):

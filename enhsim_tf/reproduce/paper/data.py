@@ -195,7 +195,7 @@ class Data:
 
         Returns:
             `coarse`, `target` (the telemetry) and `truth` (the noiseless signal where known, else the telemetry),
-            each of shape `(windows, samples)`.
+            each of shape `(windows, samples)`; and `start`, the first sample of each window in its part, shape `(windows,)`.
         """
         rng, found = self.draw(purpose), []
         for channel in self.channels:
@@ -206,7 +206,7 @@ class Data:
             if synchronised:
                 coarse = channel.coarse.simulate(channel.coarse.synchronise(times, target))
             truth = target if channel.truth is None else channel.truth(times).astype(np.float32)
-            found.append({"coarse": coarse, "target": target, "truth": truth})
+            found.append({"coarse": coarse, "target": target, "truth": truth, "start": starts})
         return {key: np.concatenate([windows[key] for windows in found]) for key in found[0]}
 
     def noise_windows(self, part: str, num_windows: int | None, purpose: str = "") -> np.ndarray:

@@ -10,6 +10,7 @@ from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.detection.autoencoders import DenseAutoencoder
 from enhsim_tf.detection.detectors import IsolationForestOnFeatures, PCAResidual
+from enhsim_tf.enhancer.ridge import choose_num_neighbours, fit_ridge, nearest_windows
 from enhsim_tf.realism import measures as fidelity
 from enhsim_tf.realism.two_sample import two_sample_auc
 from enhsim_tf.reproduce.settings import DetectorSettings
@@ -23,12 +24,13 @@ def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, f
 
     Args:
         enhance: From coarse to enhanced windows.
-        train: `coarse`, `target` and `truth` windows of the training part.
+        train: `coarse`, `target` and `truth` windows of the training part, and their first samples as `start`. The baselines
+            learn from the same windows as the enhancer.
         test: The same of the held-out part.
     """
-    from sklearn.linear_model import Ridge
-
-    ridge = Ridge(alpha=1.0).fit(train["coarse"], train["target"])
+    learnt = train["coarse"], train["target"], train["start"]
+    ridge, num_neighbours = fit_ridge(*learnt), choose_num_neighbours(*learnt)
+    nearest = nearest_windows(*learnt[:2], test["coarse"], num_neighbours)
     enhanced = enhance(test["coarse"])
     seen = {window.tobytes() for window in train["coarse"]}
     return {
@@ -36,6 +38,10 @@ def enhancement(enhance: Callable, train: Mapping, test: Mapping) -> dict[str, f
         "nrmse": fidelity.nrmse(enhanced, test["truth"]),
         "identity_nrmse": fidelity.nrmse(test["coarse"], test["truth"]),
         "ridge_nrmse": fidelity.nrmse(ridge.predict(test["coarse"]), test["truth"]),
+        "ridge_penalty": ridge.penalty,
+        "ridge_penalty_at_edge": float(ridge.is_at_edge),
+        "nearest_nrmse": fidelity.nrmse(nearest, test["truth"]),
+        "num_neighbours": float(num_neighbours),
         "roughness": fidelity.roughness(enhanced),
         "truth_roughness": fidelity.roughness(test["truth"]),
         "target_roughness": fidelity.roughness(test["target"]),

@@ -168,12 +168,18 @@ class Experiment:
                 )
             )
 
-        told = self.stages.progress.loop("iteration", training.num_iterations)
-        history = gan.fit(real, training.num_iterations, training.record_every, follow, bool(self.verbose), told)
-        for name in ("generator", "discriminator"):
-            getattr(gan, name).save(folder / f"{name}.keras", include_optimizer=False)
+        number, rounds = training.num_iterations, []
+        told = self.stages.progress.loop("iteration", training.num_rounds * number)
+        for done in range(training.num_rounds):  # training goes on after the paper's number, at which the networks are saved
+            rounds.append(gan.fit(real, number, training.record_every, follow, bool(self.verbose), told.within(done * number)))
+            rounds[-1]["iteration"] += done * number
+            for name in () if done else ("generator", "discriminator"):
+                getattr(gan, name).save(folder / f"{name}.keras", include_optimizer=False)
+        rows = dict(zip(("sd_ratio", "lag_one", "rank"), np.transpose(followed), strict=True))
+        rows |= {key: np.concatenate([each[key] for each in rounds]) for key in rounds[0]}
+        _, once = np.unique(rows["iteration"], return_index=True)  # a round begins with the record that the one before ended with
         of_real = {"real_lag_one": measures.autocorrelation(real, 1)[1], "real_rank": measures.effective_rank(real[:200])}
-        save_arrays(folder, history | dict(zip(("sd_ratio", "lag_one", "rank"), np.transpose(followed), strict=True)) | of_real)
+        save_arrays(folder, {key: values[once] for key, values in rows.items()} | of_real)
 
     @functools.cached_property
     def enhancer_history(self) -> dict[str, np.ndarray]:
@@ -182,7 +188,14 @@ class Experiment:
 
     @functools.cached_property
     def noise_history(self) -> dict[str, np.ndarray]:
-        """Accuracy and loss by iteration, and scale, lag-1 correlation and rank of the noise generated there."""
+        """Accuracy and loss by iteration of the paper's training, and scale, lag-1 correlation and rank of the noise generated there."""
+        longer, last = self.longer_noise_history, self.settings.adversarial.num_iterations
+        chosen = longer["iteration"] <= last
+        return {key: values[chosen] if values.ndim else values for key, values in longer.items()}
+
+    @functools.cached_property
+    def longer_noise_history(self) -> dict[str, np.ndarray]:
+        """The same for as long as the training was followed after the paper's number of iterations."""
         return load_arrays(self.noise_folder)
 
     @functools.cached_property

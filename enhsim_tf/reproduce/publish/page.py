@@ -20,10 +20,12 @@ import numpy as np
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce.figure import Figure
-from enhsim_tf.reproduce.paper.claims import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED, changed, title_verdict
+from enhsim_tf.reproduce.paper.claims import changed
 from enhsim_tf.reproduce.paper.figures import FIGURES
+from enhsim_tf.reproduce.paper.judgements import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
+from enhsim_tf.reproduce.paper.over_seeds import title_verdict, verdict_over
 from enhsim_tf.reproduce.publish import wording
-from enhsim_tf.reproduce.publish.results import PAPER, disagreement, read_spread, short
+from enhsim_tf.reproduce.publish.results import PAPER, disagreement, read_spread, short, titles_line
 from enhsim_tf.reproduce.robustness import figures as robustness_figures
 from enhsim_tf.reproduce.robustness import run
 from enhsim_tf.reproduce.settings import deviations
@@ -116,7 +118,9 @@ def write_page(folder: Path, found: Mapping[str, Any], figures: Sequence[str]) -
         verdict=title_verdict(found["claims"], spread),
         spread=spread,
         differ={claim["id"]: disagreement(spread, claim["id"]) for claim in found["claims"]},
-        tally=_tally([claim["verdict"] for claim in found["claims"]], _KINDS),
+        verdict_of={claim["id"]: verdict_over(claim, spread) for claim in found["claims"]},
+        titles=titles_line(found, spread) if spread else "",
+        tally=_tally([verdict_over(claim, spread) for claim in found["claims"]], _KINDS),
         groups={name: list(group) for name, group in itertools.groupby(rows, lambda row: row["setting"].partition(".")[0])},
         num_settings=len(rows),
         origins=_tally([_origin(row["source"]) for row in rows], _ORIGINS),

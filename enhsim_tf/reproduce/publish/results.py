@@ -13,7 +13,7 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.reproduce.paper.claims import title_verdict
+from enhsim_tf.reproduce.paper.over_seeds import title_verdict, titles_of_seeds, verdict_over
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import deviations
 from enhsim_tf.reproduce.stages import VERSIONS
@@ -73,16 +73,32 @@ def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None
         return None
     for claim in found["claims"]:
         over = spread["claims"][claim["id"]]
-        over["values"][here], over["verdicts"][here] = claim["value"], claim["verdict"]
+        over["holds"] = _holds(over)
+        over["values"][here], over["verdicts"][here], over["holds"][here] = claim["value"], claim["verdict"], claim.get("holds")
         values = [value for value in over["values"] if value is not None]
         over["range"] = [min(values), max(values)] if values and claim["id"] != _SPEED else None
     return spread
 
 
 def disagreement(spread: Mapping[str, Any] | None, claim_id: str) -> str:
-    """The number of seeds with each verdict, if seeds differ; otherwise an empty string."""
-    counted = collections.Counter(spread["claims"][claim_id]["verdicts"]) if spread is not None else {}
-    return ", ".join(f"{number} {name}" for name, number in counted.items()) if len(counted) > 1 else ""
+    """The number of seeds with each verdict, if seeds differ; otherwise an empty string.
+
+    Of a claim that the paper does not test, what holds here is counted.
+    """
+    about = spread["claims"][claim_id] if spread is not None else {"verdicts": []}
+    counted = collections.Counter(holds or name for name, holds in zip(about["verdicts"], _holds(about), strict=True))
+    return ", ".join(f"{number} {name}" for name, number in counted.most_common()) if len(counted) > 1 else ""
+
+
+def _holds(about: Mapping[str, Any]) -> list[str | None]:
+    return about.get("holds") or [None] * len(about["verdicts"])
+
+
+def titles_line(found: Mapping[str, Any], spread: Mapping[str, Any]) -> str:
+    """One sentence on the verdict in the title: by most seeds, and by each seed alone."""
+    alone = collections.Counter(titles_of_seeds(found["claims"], spread))
+    counted = ", ".join(f"{title} with {number}" for title, number in alone.most_common())
+    return f"By the verdicts of most of {len(spread['seeds'])} seeds: {title_verdict(found['claims'], spread)}; by those of one seed alone: {counted}."
 
 
 def fill_readme(path: Path, folder: Path) -> None:
@@ -133,7 +149,7 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
     """The claims as a Markdown table, with the range over seeds where it is known."""
     lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value, verdict, differ = short(claim["value"]), f"**{claim['verdict']}**", disagreement(spread, claim["id"])
+        value, verdict, differ = short(claim["value"]), f"**{verdict_over(claim, spread)}**", disagreement(spread, claim["id"])
         if spread is not None and spread["claims"][claim["id"]]["range"] is not None:
             value += " ({} to {})".format(*map(short, spread["claims"][claim["id"]]["range"]))
         verdict += f" (over seeds: {differ})" if differ else ""
@@ -141,8 +157,11 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
             f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "
             f"| {verdict} | {claim['finding']} |"
         )
-    seeds = "" if spread is None else f"; in brackets the range over seeds {', '.join(map(str, spread['seeds']))}"
-    return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget{seeds}. From `figures/results.json`."
+    about = f"Seed {found['seed']}, {found['budget']} budget"
+    if spread is not None:
+        about += f"; in brackets the range over {len(spread['seeds'])} seeds, {spread['seeds'][0]} to {spread['seeds'][-1]}, and the verdict of most of them"
+    said = [f"{about}. From `figures/results.json`."] + ([] if spread is None else [titles_line(found, spread)])
+    return "\n".join(lines) + "\n\n" + " ".join(said)
 
 
 def short(value: float | None) -> str:

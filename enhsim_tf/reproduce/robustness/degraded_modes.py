@@ -15,6 +15,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
 from enhsim_tf.detection import metrics
 from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.enhancer.ridge import choose_num_neighbours, fit_ridge, nearest_windows
 from enhsim_tf.realism import measures
 from enhsim_tf.reproduce import statistics
 from enhsim_tf.reproduce.robustness.replicate import Replicate
@@ -32,14 +33,18 @@ METHODS = {
     "moving average": "the coarse signal, smoothed",
     "ridge": "ridge regression, trained on nominal windows",
     "ridge, randomised": "ridge regression, trained on windows of all modes with their true response",
+    "nearest windows": "the mean of the nearest nominal training windows",
+    "nearest windows, randomised": "the mean of the nearest windows of all modes with their true response",
     "paper": "the paper's enhancer: 1,500 nominal windows, 40 epochs",
     "more windows": "the same network: 15,000 nominal windows, 2 epochs, decaying learning rate",
     "randomised": "trained like *more windows*, on nominal and degraded configurations with their true response",
 }
 """Methods that estimate the true windows from coarse windows."""
 SCORED = {"paper": "nominal", "more windows": "nominal", "randomised": "randomised"}
-"""Enhancers with an out-of-range score, and the windows on which they are trained."""
+"""The methods that are networks: they have an out-of-range score, of the windows on which they are trained."""
 TABLES = ("degraded", "trust", "trust_correlation")
+TRIED = (("nominal", 0.0), *((mode, severity) for mode in MODES for severity in SEVERITIES))
+"""The modes and severities of the test."""
 
 
 class DegradedModes:
@@ -63,36 +68,63 @@ class DegradedModes:
         depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.modes, chosen.second, chosen.seed)
         after, modules = ("telemetry", "enhancer", "second"), ("reproduce.robustness.degraded_modes",)
         folder = self.stages.run("degraded modes", self._make, modules, depends, after)
-        return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
+        tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
+        return tables | {"degraded": pd.concat([self.without_networks, tables["degraded"]], ignore_index=True)}
+
+    @functools.cached_property
+    def without_networks(self) -> "pd.DataFrame":
+        """The rows of `degraded` of the methods that are no networks."""
+        import pandas as pd
+
+        _ = self.data
+        chosen, modules = self.settings, ("reproduce.robustness.degraded_modes",)
+        depends = (chosen.telemetry, chosen.split, chosen.modes, chosen.second, chosen.seed)
+        folder = self.stages.run("degraded baselines", self._make_without_networks, modules, depends, ("telemetry",))
+        return pd.read_parquet(folder / "degraded.parquet")
+
+    def _make_without_networks(self, folder: Path) -> None:
+        import pandas as pd
+
+        methods = self._methods_without_networks(self._nominal_windows(), self._randomised_pairs())
+        cells, told = [], self.stages.progress.loop("mode and severity", len(TRIED))
+        for done, (mode, severity) in enumerate(TRIED, 1):
+            coarse, truth = self._test_pairs(mode, severity)
+            for method, estimate in methods.items():
+                error = float(np.sqrt(np.mean((estimate(coarse) - truth) ** 2, dtype=np.float64))) / self._unit
+                cells.append({"method": method, "mode": mode, "severity": severity, "nrmse": error})
+            told(done)
+        pd.DataFrame(cells).assign(seed=self.settings.seed).to_parquet(folder / "degraded.parquet")
 
     def _make(self, folder: Path) -> None:
         import pandas as pd
 
-        nominal, randomised = self._nominal_pairs(), self._randomised_pairs()
-        methods = self._methods(nominal, randomised)
+        from enhsim_tf.enhancer.network import enhance
+
+        nominal, randomised = self._nominal_windows(), self._randomised_pairs()
+        methods = {
+            "paper": self.replicate.experiment.simulator.enhance,
+            "more windows": self.replicate.second_simulator.enhance,
+            "randomised": functools.partial(enhance, self._train(*randomised)),
+        }
         training = {"nominal": nominal[0], "randomised": randomised[0]}
         scores = {name: OutOfRange().fit(windows) for name, windows in training.items()}
-        unit = float(np.std(self._pairs(None, self.settings.modes.num_windows, "unit")[1]))
         limits = {}
         for name, score in scores.items():
             held_out = self._pairs(None, 1_000, f"limit {name}")[0]
             limits[name] = metrics.threshold(score.score(held_out), self.settings.robustness.false_alarm_rate)
 
         cells, per_window = [], {name: [] for name in SCORED}
-        tried = [("nominal", 0.0), *((mode, severity) for mode in MODES for severity in SEVERITIES)]
-        told = self.stages.progress.loop("mode and severity", len(tried))
-        for done, (mode, severity) in enumerate(tried, 1):
-            scenario = None if mode == "nominal" else Degraded(mode, severity)
-            coarse, truth = self._pairs(scenario, self.settings.modes.num_windows, f"test {mode} {severity}")
+        told = self.stages.progress.loop("mode and severity", len(TRIED))
+        for done, (mode, severity) in enumerate(TRIED, 1):
+            coarse, truth = self._test_pairs(mode, severity)
             found = {name: score.score(coarse) for name, score in scores.items()}
             for method, estimate in methods.items():
-                errors = np.sqrt(np.mean((estimate(coarse) - truth) ** 2, axis=1, dtype=np.float64)) / unit
+                errors = np.sqrt(np.mean((estimate(coarse) - truth) ** 2, axis=1, dtype=np.float64)) / self._unit
                 about = {"method": method, "mode": mode, "severity": severity, "nrmse": float(np.sqrt(np.mean(errors**2)))}
-                if method in SCORED:
-                    score = found[SCORED[method]]
-                    about |= {"score": float(np.mean(score)), "flagged": float(np.mean(score > limits[SCORED[method]]))}
-                    cell = np.full(len(score), len(cells))
-                    per_window[method].append(pd.DataFrame({"score": score, "error": errors, "cell": cell}))
+                score = found[SCORED[method]]
+                about |= {"score": float(np.mean(score)), "flagged": float(np.mean(score > limits[SCORED[method]]))}
+                cell = np.full(len(score), len(cells))
+                per_window[method].append(pd.DataFrame({"score": score, "error": errors, "cell": cell}))
                 cells.append(about)
             told(done)
 
@@ -120,6 +152,14 @@ class DegradedModes:
         for name, rows in zip(TABLES, (cells, tenths, correlations), strict=True):
             pd.DataFrame(rows).assign(seed=self.settings.seed).to_parquet(folder / f"{name}.parquet")
 
+    @functools.cached_property
+    def _unit(self) -> float:
+        return float(np.std(self._pairs(None, self.settings.modes.num_windows, "unit")[1]))
+
+    def _test_pairs(self, mode: str, severity: float) -> tuple[np.ndarray, np.ndarray]:
+        scenario = None if mode == "nominal" else Degraded(mode, severity)
+        return self._pairs(scenario, self.settings.modes.num_windows, f"test {mode} {severity}")
+
     def _pairs(self, scenario: Degraded | None, num_windows: int, purpose: str) -> tuple[np.ndarray, np.ndarray]:
         """Coarse windows in a mode, and the true noiseless signal at the same times and with the same draws."""
         channel, chance = self.data.channels[0], int(self.data.draw(purpose).integers(2**31))
@@ -130,9 +170,10 @@ class DegradedModes:
         truth = degrade(channel.truth, times, scenario, (-size, size), shortest, np.random.default_rng(chance + 1))
         return coarse, truth.astype(np.float32)
 
-    def _nominal_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+    def _nominal_windows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coarse windows and telemetry of the training part, and the first sample of each."""
         windows = self.data.windows("train", self.settings.second.num_windows, "nominal configurations")
-        return windows["coarse"], windows["target"]
+        return windows["coarse"], windows["target"], windows["start"]
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
         """Coarse and noisy true windows of random configurations: one seventh nominal, the others degraded."""
@@ -148,29 +189,27 @@ class DegradedModes:
         noise = draws.normal(0, chosen.telemetry.noise_sd, truth.shape).astype(np.float32)
         return coarse, truth + noise
 
-    def _methods(
-        self, nominal: tuple[np.ndarray, np.ndarray], randomised: tuple[np.ndarray, np.ndarray]
+    def _methods_without_networks(
+        self, nominal: tuple[np.ndarray, np.ndarray, np.ndarray], randomised: tuple[np.ndarray, np.ndarray]
     ) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
         from scipy.ndimage import uniform_filter1d
-        from sklearn.linear_model import Ridge
-
-        from enhsim_tf.enhancer import network as enhancer
 
         def smooth(width: int) -> Callable[[np.ndarray], np.ndarray]:
             return functools.partial(uniform_filter1d, size=width, axis=1, mode="nearest")
 
+        def nearest(coarse: np.ndarray, target: np.ndarray, start: np.ndarray | None = None) -> Callable[[np.ndarray], np.ndarray]:
+            number = choose_num_neighbours(coarse, target, start)
+            return lambda windows: nearest_windows(coarse, target, windows, number)
+
         width = min(WIDTHS, key=lambda each: measures.nrmse(smooth(each)(nominal[0][:1_000]), nominal[1][:1_000]))
-        network = self._train(*randomised)
-        estimates = (
-            lambda coarse: coarse,
-            smooth(width),
-            Ridge(alpha=1.0).fit(*nominal).predict,
-            Ridge(alpha=1.0).fit(*randomised).predict,
-            self.replicate.experiment.simulator.enhance,
-            self.replicate.second_simulator.enhance,
-            functools.partial(enhancer.enhance, network),
-        )
-        return dict(zip(METHODS, estimates, strict=True))
+        return {
+            "identity": lambda coarse: coarse,
+            "moving average": smooth(width),
+            "ridge": fit_ridge(*nominal).predict,
+            "ridge, randomised": fit_ridge(*randomised).predict,
+            "nearest windows": nearest(*nominal),
+            "nearest windows, randomised": nearest(*randomised),
+        }
 
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """Trains the enhancer of the residual pipeline on other windows."""

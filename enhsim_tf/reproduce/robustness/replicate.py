@@ -86,7 +86,8 @@ class Replicate:
 
     def __init__(self, settings: Settings, stages: Stages, verbose: int = 0):
         self.settings, self.stages, self.verbose = settings, stages, verbose
-        self.experiment = Experiment(settings, stages, verbose=verbose)
+        once = dataclasses.replace(settings.adversarial, num_rounds=1)  # only claim C4 looks beyond the paper's number of iterations
+        self.experiment = Experiment(dataclasses.replace(settings, adversarial=once), stages, verbose=verbose)
 
     @functools.cached_property
     def second_simulator(self) -> "EnhancedSimulator":

@@ -15,7 +15,8 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.enhancer.training_pairs import cut_pairs, ridge, window_errors
+from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_aligned_by_its_shape, ridge_windows
+from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
 from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.reproduce.settings import Settings
@@ -234,14 +235,17 @@ class ChannelStudy:
     def enhancement(self) -> list[dict]:
         """Error over nominal test windows that share no sample, of the coarse signal, ridge regression and the enhancer: quartiles."""
         window, simulator, train, test = self.simulator.window, self.simulator, self.channel.train, self.channel.test
-        begins, learnt = disjoint_starts(len(test), window), evenly_spaced_starts([train], window, len(train))
+        begins, places = disjoint_starts(len(test), window), evenly_spaced_starts([train], window, len(train))
         begins = begins[self._is_nominal(begins)]
         by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
+        learnt, interval_s = cut_pairs([train], simulator.coarse, places, window, follow=True), simulator.interval_s
         by_shape = simulator.pairs(test, begins)  # aligned in phase and offset with the enhanced waveform
         windows = {
             "coarse": by_edges.coarse_rescaled,
-            "ridge": ridge(cut_pairs([train], simulator.coarse, learnt, window, follow=True), by_edges),
-            "ridge, same clock": ridge(simulator.pairs(train, learnt), by_shape),  # the same alignment, without the network
+            "ridge": ridge_windows(learnt, by_edges, interval_s),
+            "ridge, same clock": ridge_windows(simulator.pairs(train, places), by_shape, interval_s),  # aligned by the network
+            "ridge, own clock": ridge_aligned_by_its_shape(learnt, by_edges, simulator.coarse, interval_s),
+            "nearest windows": nearest_window_means(learnt, by_edges, interval_s),
             "enhanced": simulator.follow(by_shape),
         }
         found = []

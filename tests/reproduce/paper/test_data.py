@@ -98,9 +98,10 @@ def test_parts_are_in_order_of_time_with_a_window_between(counted):
 @pytest.mark.parametrize("num_windows", [300, None])
 def test_windows_agree_with_the_closed_form_sample_by_sample(counted, part, num_windows):
     windows = counted.windows(part, num_windows, "some purpose")
-    series = getattr(counted.channels[0], part).values
+    series, start = getattr(counted.channels[0], part).values, windows.pop("start")
     index = windows["target"].astype(np.float64)
     assert np.array_equal(np.diff(index, axis=1), np.ones((len(index), WINDOW - 1)))
+    assert np.array_equal(series[start], index[:, 0])
     assert index[:, 0].min() >= series[0] and index[:, -1].max() <= series[-1], "no window leaves its part"
     if num_windows is None:
         assert len(index) == len(series) // WINDOW and np.diff(index[:, 0]).min() >= WINDOW, "all that share no sample"

@@ -31,7 +31,7 @@ def doubled():
     def part(number, seed):
         coarse = _normal(number, seed)
         coarse -= coarse.mean()
-        return {"coarse": coarse, "target": 2 * coarse, "truth": 2 * coarse}
+        return {"coarse": coarse, "target": 2 * coarse, "truth": 2 * coarse, "start": WINDOW * np.arange(number)}
 
     return part(200, 0), part(100, 1)
 
@@ -40,7 +40,8 @@ def test_a_perfect_enhancer_has_no_error(doubled):
     found = measurements.enhancement(lambda coarse: 2 * coarse, *doubled)
     assert found["nrmse"] == found["train_nrmse"] == 0
     assert found["identity_nrmse"] == pytest.approx(0.5, abs=1e-6)  # half of the signal is missing
-    assert found["ridge_nrmse"] < 0.02, "a linear map"
+    assert found["ridge_nrmse"] < 1e-4 and found["ridge_penalty_at_edge"] == 1, "a linear map without noise needs no penalty"
+    assert found["ridge_nrmse"] < found["nearest_nrmse"] < 1.1, "random windows have no near ones"
     assert found["roughness"] == found["truth_roughness"] == found["target_roughness"] == pytest.approx(2 * found["coarse_roughness"])
 
 
@@ -57,7 +58,8 @@ def test_errors_are_against_the_truth_and_ridge_learns_from_the_noisy_target(dou
     found, noisy = measurements.enhancement(np.zeros_like, train, test), measurements.enhancement(np.zeros_like, train, test | rough)
     assert {key for key in found if found[key] != noisy[key]} == {"target_roughness"}
     worse = measurements.enhancement(np.zeros_like, train | {"target": train["target"] + _normal(200, 3, sd=3)}, test)
-    assert worse["ridge_nrmse"] > 0.3 > found["ridge_nrmse"]
+    assert worse["ridge_nrmse"] > 0.3 > found["ridge_nrmse"] and worse["ridge_penalty"] > found["ridge_penalty"]
+    assert not worse["ridge_penalty_at_edge"] and worse["nearest_nrmse"] != found["nearest_nrmse"]
 
 
 def test_windows_seen_in_training_are_counted(doubled):

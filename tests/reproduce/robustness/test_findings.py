@@ -304,7 +304,7 @@ def test_c8_by_its_criterion(found):
     blind = (recall["arm"] == "enhanced + GAN") & (recall["environment"] == "shot") & (recall["detector"] == next(iter(DETECTORS)))
     recall.loc[blind, "recall"] -= 0.06  # quiet, since it finds less: more than five points below the real-trained arm
     assert wording.share_c8(findings.summarise(quiet)) == (PAIRS - 1, PAIRS)
-    assert wording.verdict_c8(findings.summarise(quiet)) == "does not hold"  # the rule asks it of every detector
+    assert wording.verdict_c8(findings.summarise(quiet)) == "holds in part"  # by the rule of the table of claims
 
 
 def test_c8_is_counted_in_replicates_too_and_few_pairs_are_named():

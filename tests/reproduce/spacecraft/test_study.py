@@ -72,7 +72,9 @@ def test_every_table_has_every_row(out):
     assert set(tables["alarms"]["channel"]) == set(SEQUENCES)
     counts = tables["sequences"].query("arm == 'real' and detector == 'PCA residual'").groupby("channel").size()
     assert counts.to_dict() == {name: len(sequences) for name, sequences in SEQUENCES.items()}
-    assert set(tables["enhancement"]["method"]) == {"coarse", "ridge", "ridge, same clock", "enhanced"}
+    assert set(tables["enhancement"]["method"]) == {
+        *("coarse", "ridge", "ridge, same clock", "ridge, own clock", "nearest windows", "enhanced")
+    }
 
 
 def test_no_window_with_a_labelled_sample_counts_as_nominal(out, data):
