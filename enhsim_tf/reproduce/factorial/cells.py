@@ -78,19 +78,17 @@ PUBLISHED = {
 
 
 def parts() -> list[list[str]]:
-    """Names of references and cells in three parts of increasing cost.
+    """Names of references and cells in four parts, in the order in which they are computed.
 
-    The first part trains no network, the second trains the paper's networks, and the third the convolutional GAN.
+    The first part trains no network. The second trains the paper's networks and completes the main comparison, with whole windows. The
+    third fits the autoregressions, and the fourth trains the convolutional GAN, which takes as long as everything before it.
     """
-    without, paper, convolutional = list(REFERENCES), [], []
+    found: list[list[Cell]] = [[], [], [], []]
     for cell in CELLS.values():
-        if cell.generator == CONVOLUTIONAL_GAN:
-            convolutional.append(cell)
-        elif cell.enhancer == NETWORK or cell.generator == PAPER_GAN:
-            paper.append(cell)
+        if cell.generator in (AUTOREGRESSION, CONVOLUTIONAL_GAN):
+            found[2 + (cell.generator == CONVOLUTIONAL_GAN)].append(cell)
         else:
-            without.append(cell.name)
-    by_source = [
-        sorted(cells, key=lambda cell: (cell.generator == PAPER_GAN, cell.source, cell.generator)) for cells in (paper, convolutional)
-    ]
-    return [without, *([cell.name for cell in cells] for cells in by_source)]
+            found[cell.enhancer == NETWORK or cell.generator == PAPER_GAN].append(cell)
+    ordered = [sorted(cells, key=lambda cell: (cell.generator == PAPER_GAN, cell.source)) for cells in found]
+    without, *others = [[cell.name for cell in cells] for cells in ordered]
+    return [[*REFERENCES, *without], *others]

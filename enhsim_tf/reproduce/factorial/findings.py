@@ -51,6 +51,10 @@ CONTRASTS = {
         Cell(FEW, RESIDUAL, RIDGE, WHOLE_WINDOWS).name,
     ),
     "autoregression, whole windows": (Cell(MANY, RESIDUAL, RIDGE, AUTOREGRESSION).name, WITHOUT_NETWORK.name),
+    "convolutional GAN, whole windows, network": (
+        Cell(MANY, RESIDUAL, NETWORK, CONVOLUTIONAL_GAN).name,
+        Cell(MANY, RESIDUAL, NETWORK, WHOLE_WINDOWS).name,
+    ),
     "convolutional GAN, whole windows": (Cell(MANY, RESIDUAL, RIDGE, CONVOLUTIONAL_GAN).name, WITHOUT_NETWORK.name),
     "convolutional GAN, whole windows, few windows": (
         Cell(FEW, RESIDUAL, RIDGE, CONVOLUTIONAL_GAN).name,

@@ -27,7 +27,7 @@ KEYS, VALUES = ["environment", "seed", "cell", "detector"], ["alarms", "windows"
 def run(
     settings: Settings, cache: Path, out: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Computes the cells that are missing in the table, part by part and seed by seed, and writes the results after each seed.
+    """Computes the cells that are missing in the table, part by part and seed by seed, and writes the results after each part.
 
     Args:
         settings: All settings; `factorial.num_seeds` says how many seeds.
@@ -62,7 +62,7 @@ def run(
                         write_cells(done, path)
                         tell(f"  {name:55} false alarms {rows['alarms'].sum() / rows['windows'].sum():.1%}")
                 turns.end(stages)
-            found = write_findings(folder, settings.budget) or found
+        found = write_findings(folder, settings.budget) or found
     return found or {}
 
 
