@@ -16,6 +16,7 @@ from enhsim_tf.reproduce.publish.objections import objections
 from enhsim_tf.reproduce.publish.wording import (
     Findings,
     interval,
+    mean_of,
     number,
     p_value,
     per_cent,
@@ -72,6 +73,7 @@ def render(
         "reached": reached,
         "in_seeds": in_seeds,
         "share": share,
+        "mean_of": mean_of,
         "capitalise": lambda text: text[:1].upper() + text[1:],
     }
     settings, tried = make_settings(found["budget"]), [_tried(row) for row in tries]

@@ -36,6 +36,11 @@ def points(about: Mapping[str, float] | float, digits: int = 1) -> str:
     return f"{mean} ({low} to {high})"
 
 
+def mean_of(about: Mapping[str, float] | float) -> float:
+    """A rate, which is given as a number or by its mean and interval."""
+    return float(about["mean"]) if isinstance(about, Mapping) else float(about)
+
+
 def p_value(value: float) -> str:
     """A p-value with one significant digit."""
     return f"{value:.1g}" if value >= 0.0001 else "below 0.0001"
