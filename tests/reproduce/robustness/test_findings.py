@@ -182,6 +182,13 @@ def test_targets_on_recall_and_the_autoregression(found):
         assert bar["recall_difference"]["mean"] == pytest.approx(change) and bar["recall_reached"] == is_reached
 
 
+def test_missed_targets_are_named(found):
+    assert wording.targets_missed(found) == "all are reached on white, autoregressive, heteroscedastic and shot noise"
+    bars = {**found["bars"], "shot": {**found["bars"]["shot"], "recall_reached": False, "excess_reached": False}}
+    said = wording.targets_missed({**found, "bars": bars})
+    assert said == "all are reached on white, autoregressive and heteroscedastic noise; missed on shot noise: false alarms and recall"
+
+
 def test_not_inferior_within_half_a_point(found):
     assert (
         found["not_inferior"]["residual"]["difference"]["mean"] == pytest.approx(0.03 - 0.50)
