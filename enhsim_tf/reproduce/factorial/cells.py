@@ -17,6 +17,7 @@ learning rate), because the paper's 40 epochs would take ten times as long. The 
 
 import dataclasses
 import itertools
+from collections.abc import Iterable
 
 FEW, MANY = "few", "many"
 MOVING_AVERAGE, RESIDUAL = "moving average", "residual"
@@ -77,18 +78,31 @@ PUBLISHED = {
 """Arms of the experiment on robustness that are cells here, with the same windows, seeds and trainings."""
 
 
-def parts() -> list[list[str]]:
-    """Names of references and cells in four parts, in the order in which they are computed.
+def rounds() -> list[list[list[str]]]:
+    """Names of references and cells in the order in which they are computed.
 
-    The first part trains no network. The second trains the paper's networks and completes the main comparison, with whole windows. The
-    third fits the autoregressions, and the fourth trains the convolutional GAN, which takes as long as everything before it.
+    A round is computed for all seeds before the next one begins, and its parts seed by seed, each in all environments. The first round
+    trains no network. The second trains the network on many windows, then the network on few windows and the paper's GAN, and so completes
+    the main comparison of a seed. The third fits the autoregressions. The fourth trains the convolutional GAN, which takes as long as
+    everything before it.
+
+    Returns:
+        The parts of each round, and the names in each part. Cells that share a noise model follow each other.
     """
-    found: list[list[Cell]] = [[], [], [], []]
-    for cell in CELLS.values():
-        if cell.generator in (AUTOREGRESSION, CONVOLUTIONAL_GAN):
-            found[2 + (cell.generator == CONVOLUTIONAL_GAN)].append(cell)
-        else:
-            found[cell.enhancer == NETWORK or cell.generator == PAPER_GAN].append(cell)
-    ordered = [sorted(cells, key=lambda cell: (cell.generator == PAPER_GAN, cell.source)) for cells in found]
-    without, *others = [[cell.name for cell in cells] for cells in ordered]
-    return [[*REFERENCES, *without], *others]
+
+    def named(cells: Iterable[Cell]) -> list[str]:
+        return [cell.name for cell in sorted(cells, key=lambda cell: (cell.generator == PAPER_GAN, cell.source))]
+
+    by_generator = {generator: [cell for cell in CELLS.values() if cell.generator == generator] for generator in LEVELS["generator"]}
+    whole = {each: [cell for cell in by_generator[WHOLE_WINDOWS] if (cell.enhancer, cell.windows) == each] for each in _ENHANCERS}
+    without = named(whole[RIDGE, FEW] + whole[RIDGE, MANY])
+    paper = named(whole[NETWORK, FEW] + by_generator[PAPER_GAN])
+    return [
+        [[*REFERENCES, *without]],
+        [named(whole[NETWORK, MANY]), paper],
+        [named(by_generator[AUTOREGRESSION])],
+        [named(by_generator[CONVOLUTIONAL_GAN])],
+    ]
+
+
+_ENHANCERS = tuple(itertools.product(LEVELS["enhancer"], LEVELS["windows"]))

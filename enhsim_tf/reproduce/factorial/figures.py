@@ -10,6 +10,7 @@ from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, QUI
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import AUTOREGRESSION, CONVOLUTIONAL_GAN, LEVELS, WHOLE_WINDOWS
 from enhsim_tf.reproduce.figure import Figure
+from enhsim_tf.reproduce.publish.wording import in_list
 
 _SHOWN = {  # colour, marker and fill differ, so that the comparisons can be told apart in greyscale
     WHOLE_WINDOWS: (ENHANCED, "o", ENHANCED),
@@ -31,12 +32,12 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     name, main = next(iter(shares.items()))
     closed = main["gap_closed"]
     ranked = sorted(LEVELS, key=lambda factor: -closed["factors"][factor]["share"]["mean"])
-    said = ", ".join(f"{factor} {100 * closed['factors'][factor]['share']['mean']:.0f}" for factor in ranked)
+    said = in_list([f"the {factor} {100 * closed['factors'][factor]['share']['mean']:.0f} points" for factor in ranked])
     figure, down = new_sheet(
         DOUBLE,
         3.6,
         f"From the paper's pipeline, which closes {100 * closed['paper']['mean']:.0f} % of the gap in false alarms, to ridge regression, residuals and "
-        f"{name}, which close {100 * closed['switched']['mean']:.0f} %: points by {said}",
+        f"{name}, which close {100 * closed['switched']['mean']:.0f} %: {said}",
         "Change that switching a factor makes, as the mean over all orders of switching the four factors (Shapley value). Bars: 95 % intervals over "
         f"environments and seeds; faint marks: single environments; crosses: change if the factor is switched first or last. {_runs(shares)}",
     )
@@ -90,7 +91,8 @@ def _runs(shares: Mapping[str, Any]) -> str:
     said = {generator: in_seeds(about["seeds"]) for generator, about in shares.items()}
     if len(set(said.values())) == 1:
         return f"{next(iter(said.values())).capitalize()}."
-    return "; ".join(f"{generator}: {seeds}" for generator, seeds in said.items()).capitalize() + "."
+    words = "; ".join(f"{generator}: {seeds}" for generator, seeds in said.items())
+    return f"{words[:1].upper()}{words[1:]}."
 
 
 FIGURES: dict[str, Figure] = {

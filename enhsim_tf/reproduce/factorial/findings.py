@@ -18,6 +18,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.reproduce.factorial.cells import (
     AUTOREGRESSION,
@@ -65,19 +66,23 @@ CONTRASTS = {
 """Differences in false alarms and recall that the conclusions use: the first arm minus the second."""
 
 
-def summarise(table: "pd.DataFrame") -> dict[str, Any] | None:
-    """All numbers about the experiment, or None while no seed has both references in all environments.
+def summarise(table: "pd.DataFrame") -> dict[str, Any]:
+    """All numbers about the experiment, from the cells that there are.
 
     Args:
         table: As `run.read_cells` gives it.
 
     Returns:
         Plain JSON types: the seeds, the cells, the contributions of the factors and the contrasts.
+
+    Raises:
+        InputError: If no seed has both references in all environments.
     """
+    is_there = table[table["cell"].isin(REFERENCES)].groupby(REPLICATE)["cell"].nunique().unstack("environment").eq(len(REFERENCES))
+    if not is_there.all(axis=1).any() or is_there.shape[1] < table["environment"].nunique():
+        raise InputError("Expected a seed with the cells coarse and real in all environments. Received: none. Run the experiment first.")
     rate, values = averaged(table)
     seeds = complete_seeds(rate, REFERENCES)
-    if not seeds:
-        return None
     return {
         "environments": list(dict.fromkeys(table["environment"])),
         "seeds": seeds,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file, write_json
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.reproduce.factorial.cells import CELLS, PUBLISHED, parts
+from enhsim_tf.reproduce.factorial.cells import CELLS, PUBLISHED, rounds
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
 
@@ -27,7 +27,7 @@ KEYS, VALUES = ["environment", "seed", "cell", "detector"], ["alarms", "windows"
 def run(
     settings: Settings, cache: Path, out: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Computes the cells that are missing in the table, part by part and seed by seed, and writes the results after each part.
+    """Computes the cells that are missing in the table, in the order of `cells.rounds`, and writes the results.
 
     Args:
         settings: All settings; `factorial.num_seeds` says how many seeds.
@@ -47,23 +47,20 @@ def run(
     done = read_cells(path) if path.is_file() and not fresh else pd.DataFrame(columns=[*KEYS, *VALUES])
     if settings.budget == "full" and not fresh:
         done = _joined(done, published(folder.parent / "robustness"), seeds, environments)
-    turns, found = Turns("step", len(parts()) * len(seeds) * len(environments), tell), None
-    for number, names in enumerate(parts(), 1):
-        for seed in seeds:
-            for environment in environments:
-                turns.begin(f"part {number}, {environment}, seed {seed}")
-                stages = Stages(cache, fresh, tell)
-                finished = set(done[(done["environment"] == environment) & (done["seed"] == seed)]["cell"])
-                missing = [name for name in names if name not in finished]
-                if missing:
-                    one = pipelines(settings, stages, environment, seed)
-                    for name, rows in evaluated(one, missing):
-                        done = pd.concat([done, rows]) if len(done) else rows
-                        write_cells(done, path)
-                        tell(f"  {name:55} false alarms {rows['alarms'].sum() / rows['windows'].sum():.1%}")
-                turns.end(stages)
-        found = write_findings(folder, settings.budget) or found
-    return found or {}
+    order = [(part, seed, environment) for parts in rounds() for seed in seeds for part in parts for environment in environments]
+    turns = Turns("step", len(order), tell)
+    for part, seed, environment in order:
+        turns.begin(f"{environment}, seed {seed}, {len(part)} cells")
+        stages = Stages(cache, fresh, tell)
+        finished = set(done[(done["environment"] == environment) & (done["seed"] == seed)]["cell"])
+        missing = [name for name in part if name not in finished]
+        if missing:
+            for name, rows in evaluated(pipelines(settings, stages, environment, seed), missing):
+                done = pd.concat([done, rows]) if len(done) else rows
+                write_cells(done, path)
+                tell(f"  {name:55} false alarms {rows['alarms'].sum() / rows['windows'].sum():.1%}")
+        turns.end(stages)
+    return write_findings(folder, settings.budget)
 
 
 def pipelines(settings: Settings, stages: Stages, environment: str, seed: int) -> "Pipelines":
@@ -167,21 +164,21 @@ def write_cells(table: "pd.DataFrame", path: Path) -> None:
         table.sort_values(KEYS).round(4).to_csv(temporary, index=False, lineterminator="\n")
 
 
-def write_findings(folder: Path, budget: str) -> dict[str, Any] | None:
-    """Computes the findings from the table in a folder, and writes them and the figure; None while a reference is missing.
+def write_findings(folder: Path, budget: str) -> dict[str, Any]:
+    """Computes the findings from the table in a folder, and writes them; and the figure, if a comparison is complete.
 
     Args:
-        folder: Holds the table.
+        folder: Holds the table, with all cells or with those that an interrupted run has finished.
         budget: Budget of the run.
+
+    Raises:
+        InputError: If the references are missing in the table.
     """
     from enhsim_tf.reproduce.factorial.figures import FIGURES
     from enhsim_tf.reproduce.factorial.findings import summarise
     from enhsim_tf.reproduce.figure import save_all
 
-    found = summarise(read_cells(folder / TABLE))
-    if found is None:
-        return None
-    found |= {"budget": budget, "versions": VERSIONS}
+    found = summarise(read_cells(folder / TABLE)) | {"budget": budget, "versions": VERSIONS}
     write_json(folder / "findings.json", found)
     if found["shares"]:
         save_all(FIGURES, found, folder, COMMAND)

@@ -4,6 +4,8 @@ from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import CELLS, LEVELS, PAPER_CELL, WITHOUT_NETWORK
 from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, per_cent, points
 
+ALT = "Contribution of windows, extraction, enhancer and generator to the share of the gap that is closed"
+
 
 def lines(found: Findings) -> list[str]:
     """The last lines that the command prints: how many cells there are, and the contributions for each generator."""
@@ -55,8 +57,14 @@ def cells_table(found: Findings) -> str:
     return "\n".join(rows)
 
 
+def readme_part(found: Findings) -> str:
+    """The README's figure, if a comparison is complete, and its table."""
+    shown = f"![{ALT}](figures/factorial/contributions.png)\n\n" if found["shares"] else ""
+    return shown + short_table(found)
+
+
 def short_table(found: Findings) -> str:
-    """The README's table: the references, the paper's pipeline, the pipeline without networks, and the best cell of each generator."""
+    """The table of the README and the report: the references, the paper's pipeline, the pipeline without networks, and the best cell of each generator."""
     cells = found["cells"]
     chosen = ["coarse", PAPER_CELL.name, WITHOUT_NETWORK.name]
     for generator in LEVELS["generator"]:

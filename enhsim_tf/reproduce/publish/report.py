@@ -170,7 +170,7 @@ def report(found: Findings, root: Path) -> None:
     if labelled is not None:
         parts["labelled"] = run.table(labelled)
     if factorial is not None:
-        parts["factorial"] = factorial_text.short_table(factorial)
+        parts["factorial"] = factorial_text.readme_part(factorial)
     readme = root / "README.md"
     if readme.is_file():
         text = readme.read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from enhsim_tf.reproduce.factorial.cells import (
     REFERENCES,
     WITHOUT_NETWORK,
     Cell,
-    parts,
+    rounds,
 )
 from enhsim_tf.reproduce.robustness.replicate import ARMS
 
@@ -22,19 +22,23 @@ def test_every_combination_is_a_cell_once():
     assert all(levels[0] == value for levels, value in zip(LEVELS.values(), vars(PAPER_CELL).values(), strict=True))
 
 
-def test_the_parts_contain_every_cell_once_and_the_first_trains_no_network():
-    cheap, paper, autoregression, convolutional = parts()
-    assert sorted([*cheap, *paper, *autoregression, *convolutional]) == sorted([*REFERENCES, *CELLS])
+def test_the_rounds_contain_every_cell_once_and_the_first_trains_no_network():
+    (cheap,), (many, paper), (autoregression,), (convolutional,) = rounds()
+    assert sorted([*cheap, *many, *paper, *autoregression, *convolutional]) == sorted([*REFERENCES, *CELLS])
     assert WITHOUT_NETWORK.name in cheap and not any("network" in name or "GAN" in name for name in cheap)
     for names, generator in ((autoregression, "autoregression"), (convolutional, "convolutional GAN")):
         assert len(names) == 8 and all(name.endswith(generator) for name in names)
-    # the first two parts hold all cells of the main comparison
-    assert {CELLS[name].generator for name in [*cheap, *paper] if name in CELLS} == {"paper's GAN", "whole windows"}
+    # the first two rounds hold all cells of the main comparison
+    assert {CELLS[name].generator for name in [*cheap, *many, *paper] if name in CELLS} == {"paper's GAN", "whole windows"}
 
 
 def test_cells_that_share_a_noise_model_follow_each_other():
-    _, *others = parts()
-    for names, models in zip(others, (4 + 6, 6, 6), strict=True):  # two of the moving average, and two for each enhancer
+    _, (_, paper), (autoregression,), (convolutional,) = rounds()
+    for names, models in (
+        (paper, 2 + 6),
+        (autoregression, 6),
+        (convolutional, 6),
+    ):  # of a GAN: two of the moving average, two for each enhancer
         found = [(CELLS[name].source, CELLS[name].generator) for name in names]
         assert 1 + sum(before != after for before, after in itertools.pairwise(found)) == len(set(found)) == models
 

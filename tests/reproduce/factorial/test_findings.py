@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce.factorial import findings
 from enhsim_tf.reproduce.factorial.cells import CELLS, LEVELS, PAPER_CELL, WHOLE_WINDOWS, WITHOUT_NETWORK
 from enhsim_tf.reproduce.factorial.run import FOLDER, TABLE, read_cells
@@ -91,7 +92,8 @@ def test_a_comparison_uses_the_seeds_that_have_all_of_its_cells():
     assert some["contrasts"]["convolutional GAN, whole windows"]["seeds"] == [1, 3]
     none = findings.summarise(table(without={("shot", seed, one) for seed in SEEDS}))
     assert "convolutional GAN" not in none["shares"] and one not in none["cells"]
-    assert findings.summarise(table(without={("white", seed, "real") for seed in SEEDS})) is None
+    with pytest.raises(InputError, match="coarse and real in all environments"):
+        findings.summarise(table(without={("white", seed, "real") for seed in SEEDS}))
 
 
 def test_contrasts_are_the_first_arm_minus_the_second(found):
@@ -143,6 +145,6 @@ def test_committed_findings_come_from_the_committed_table(near):
     assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
     assert (KEPT / TABLE).stat().st_size < 400_000
     readme = (KEPT.parents[1] / "README.md").read_text(encoding="utf-8")
-    assert factorial_text.short_table(kept) in readme
+    assert factorial_text.readme_part(kept) in readme
     robustness, labelled = (report.findings_of(KEPT.parents[1], name) for name in ("robustness", "labelled"))
     assert practice.bullets(robustness, kept, labelled) in readme

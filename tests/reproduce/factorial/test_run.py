@@ -6,7 +6,7 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.factorial import run as runs
-from enhsim_tf.reproduce.factorial.cells import CELLS, PUBLISHED, REFERENCES, parts
+from enhsim_tf.reproduce.factorial.cells import CELLS, PUBLISHED, REFERENCES, rounds
 from enhsim_tf.reproduce.robustness.replicate import QUICK_DETECTORS
 
 FINDINGS = {"num_cells": 1, "of_cells": 1, "seeds": [2_000], "environments": ["shot"], "shares": {}}  # where only the table matters
@@ -49,10 +49,12 @@ def experiment(folder, *options):
     return command.main([*words, *options])
 
 
-def test_cheap_parts_come_first_for_every_environment_and_seed(computed, tmp_path, capsys):
+def test_cheap_rounds_come_first_for_every_environment_and_seed(computed, tmp_path, capsys):
     assert experiment(tmp_path) == 0
-    order = [(environment, seed, name) for names in parts() for seed in (2_000, 2_001) for environment in command.NOISES for name in names]
-    assert computed == order
+    (first,), (many, paper), *others = rounds()
+    order = [(first, 2_000), (first, 2_001), (many, 2_000), (paper, 2_000), (many, 2_001), (paper, 2_001)]
+    order += [(names, seed) for (names,) in others for seed in (2_000, 2_001)]
+    assert computed == [(environment, seed, name) for names, seed in order for environment in command.NOISES for name in names]
     said = capsys.readouterr().out
     assert "256 of 256 cells (2 seeds, 2000 to 2001, in 4 environments)" in said
     folder = tmp_path / "out" / runs.FOLDER
