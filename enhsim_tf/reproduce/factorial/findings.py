@@ -38,6 +38,7 @@ from enhsim_tf.reproduce.factorial.cells import (
     Cell,
 )
 from enhsim_tf.reproduce.robustness.averages import REPLICATE, interval
+from enhsim_tf.reproduce.robustness.replicate import ENVIRONMENTS, QUICK_DETECTORS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,16 +85,20 @@ def summarise(table: "pd.DataFrame") -> dict[str, Any]:
     rate, values = averaged(table)
     seeds = complete_seeds(rate, REFERENCES)
     return {
-        "environments": list(dict.fromkeys(table["environment"])),
+        "environments": _environments(table),
         "seeds": seeds,
         "num_windows": int(table["windows"].median()),
-        "detectors": list(dict.fromkeys(table["detector"])),
+        "detectors": [name for name in QUICK_DETECTORS if name in set(table["detector"])],
         "num_cells": int(table[table["cell"].isin(list(CELLS))].groupby([*REPLICATE, "cell"]).ngroups),
         "of_cells": len(CELLS) * len(seeds) * table["environment"].nunique(),
         "cells": {name: found for name in (*REFERENCES, *CELLS) if (found := _cell(table, rate, values, name)) is not None},
         "shares": {generator: found for generator in GENERATORS if (found := shares(values, generator)) is not None},
         "contrasts": {name: found for name, pair in CONTRASTS.items() if (found := _contrast(rate, values, *pair)) is not None},
     }
+
+
+def _environments(table: "pd.DataFrame") -> list[str]:
+    return [name for name in ENVIRONMENTS if name in set(table["environment"])]
 
 
 def averaged(table: "pd.DataFrame") -> "tuple[pd.DataFrame, dict[str, pd.DataFrame]]":
@@ -135,7 +140,7 @@ def _cell(table: "pd.DataFrame", rate: "pd.DataFrame", values: "Mapping[str, pd.
         "by_environment": {
             environment: {key: float(each.loc[environment].mean()) for key, each in chosen.items()}
             | {"false_alarms": interval(chosen["false_alarms"], environment)}
-            for environment in dict.fromkeys(table["environment"])
+            for environment in _environments(table)
         },
         "kept": kept,
         "pairs": pairs,
@@ -226,6 +231,6 @@ def _contrast(rate: "pd.DataFrame", values: "Mapping[str, pd.DataFrame]", first:
         **{name: interval(each) for name, each in chosen.items()},
         "by_environment": {
             environment: {name: interval(each, environment) for name, each in chosen.items()}
-            for environment in dict.fromkeys(rate.index.get_level_values("environment"))
+            for environment in _environments(rate.reset_index())
         },
     }

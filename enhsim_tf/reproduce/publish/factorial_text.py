@@ -1,5 +1,7 @@
 """Text about the factorial experiment: its tables, its summary, and the last lines of the command."""
 
+import dataclasses
+
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import CELLS, LEVELS, PAPER_CELL, WITHOUT_NETWORK
 from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, per_cent, points
@@ -41,6 +43,15 @@ def contributions(found: Findings) -> str:
     return "\n".join(rows)
 
 
+def contrasts_table(found: Findings) -> str:
+    """The differences that the conclusions use, as far as their cells exist."""
+    rows = ["| first | minus second | false alarms (points) | recall at the real rate (points) | seeds |", "|---|---|---|---|---|"]
+    for about in found["contrasts"].values():
+        differences = " | ".join(points(about[name]) for name in ("false_alarms", "recall_at_real_rate"))
+        rows.append(f"| {about['first']} | {about['second']} | {differences} | {len(about['seeds'])} |")
+    return "\n".join(rows)
+
+
 def cells_table(found: Findings) -> str:
     """All cells in Markdown: false alarms with their interval, recall and the share of the gap closed."""
     names = found["environments"]
@@ -66,18 +77,24 @@ def readme_part(found: Findings) -> str:
 def short_table(found: Findings) -> str:
     """The table of the README and the report: the references, the paper's pipeline, the pipeline without networks, and the best cell of each generator."""
     cells = found["cells"]
-    chosen = ["coarse", PAPER_CELL.name, WITHOUT_NETWORK.name]
+    without = dataclasses.replace(WITHOUT_NETWORK, windows=LEVELS["windows"][0]).name, WITHOUT_NETWORK.name
+    chosen = ["coarse", PAPER_CELL.name, *without]
     for generator in LEVELS["generator"]:
         measured = [name for name in cells if name in CELLS and CELLS[name].generator == generator]
         if measured:
             chosen.append(min(measured, key=lambda name: cells[name]["false_alarms"]["mean"]))
     chosen.append("real")
-    rows = ["| windows / extraction / enhancer / generator | false alarms | recall at the real rate | gap closed |", "|---|---|---|---|"]
+    rows = [
+        "| windows / extraction / enhancer / generator | false alarms | recall at the real rate | gap closed | seeds |",
+        "|---|---|---|---|---|",
+    ]
     for name in dict.fromkeys(chosen):
         if name in cells:
             about = cells[name]
-            closed, note = per_cent(about["gap_closed"], 0), " (no network)" if name == WITHOUT_NETWORK.name else ""
-            rows.append(f"| {name}{note} | {interval(about['false_alarms'])} | {per_cent(about['recall_at_real_rate'])} | {closed} |")
+            closed, note = per_cent(about["gap_closed"], 0), " (no network)" if name in without else ""
+            rows.append(
+                f"| {name}{note} | {interval(about['false_alarms'])} | {per_cent(about['recall_at_real_rate'])} | {closed} | {len(about['seeds'])} |"
+            )
     seeds = found["seeds"]
     return "\n".join(rows) + (
         f"\n\nThe paper's pipeline, ridge regression with whole windows of its residuals, and the cell with the fewest false alarms for each generator, of "

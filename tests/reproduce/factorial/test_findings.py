@@ -120,6 +120,7 @@ def test_tables_say_what_the_findings_hold(found):
     assert "the generator 37.5 (37.5 to 37.5), the enhancer" in factorial_text.ranking(found)
     assert f"| {WITHOUT_NETWORK.name} (no network) | 10.0 % (10.0 to 10.0) |" in factorial_text.short_table(found)
     assert len(factorial_text.cells_table(found).splitlines()) == 2 + 34
+    assert f"| {WITHOUT_NETWORK.name} | real | 0.0 (0.0 to 0.0) | 0.0 (0.0 to 0.0) | 3 |" in factorial_text.contrasts_table(found)
     assert factorial_text.coverage(found) == "192 of 192 cells (3 seeds, 1 to 3, in 2 environments)"
 
 
