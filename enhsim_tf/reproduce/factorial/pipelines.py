@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.enhancer.training_pairs import paired_windows, random_window_starts
+from enhsim_tf.enhancer.training_pairs import paired_windows
 from enhsim_tf.noise.surrogates import GaussianAutoregression, WindowBootstrap
 from enhsim_tf.reproduce.factorial.cells import (
     AUTOREGRESSION,
@@ -23,7 +23,7 @@ from enhsim_tf.reproduce.factorial.cells import (
     Cell,
 )
 from enhsim_tf.reproduce.robustness.replicate import Replicate
-from enhsim_tf.telemetry.windows import random_offsets
+from enhsim_tf.telemetry.windows import random_window_starts
 
 if TYPE_CHECKING:
     from enhsim_tf.noise.gan import NoiseGAN
@@ -81,9 +81,8 @@ class Pipelines:
 
     def training_starts(self, windows: str) -> np.ndarray:
         """Start of each training window of the enhancers: those of the paper's network, and those of the residual pipeline."""
-        if windows == FEW:
-            return random_offsets(len(self.train), self.window, self.number(FEW), self.data.draw("training windows"))
-        return random_window_starts([self.train], self.window, self.number(MANY), np.random.default_rng(self.seed))
+        rng = self.data.draw("training windows") if windows == FEW else np.random.default_rng(self.seed)
+        return random_window_starts([self.train], self.window, self.number(windows), rng)
 
     def _pairs(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return paired_windows(self.train, self.data.channels[0].coarse, starts, self.window)

@@ -56,12 +56,14 @@ def _linear(factorial: Findings | None) -> str:
         return "**A linear map and resampled residuals**: not measured yet."
     against, real = factorial["contrasts"]["no network, real"], factorial["cells"]["real"]
     within = [name for name, each in against["by_environment"].items() if each["false_alarms"]["high"] <= MARGIN]
+    beyond = {name: each["false_alarms"] for name, each in against["by_environment"].items() if name not in within}
+    others = "".join(f"; on {name} noise the difference is {points(each)} points" for name, each in beyond.items())
     everywhere = len(within) == len(against["by_environment"])
     where = "in every environment" if everywhere else f"on {in_list(within)} noise" if within else "in none of the environments"
     return (
         f"**A linear map and resampled residuals suffice** {where} here, to within {points(MARGIN)} points of false alarms: ridge regression plus whole "
         f"windows of its residuals, without any network, gives {interval(about['false_alarms'])} false alarms, against {interval(real['false_alarms'])} after "
-        f"training on real telemetry, and meets the criterion of C8 in {about['kept']} of {about['pairs']} pairs of environment and detector. "
+        f"training on real telemetry, and meets the criterion of C8 in {about['kept']} of {about['pairs']} pairs of environment and detector{others}. "
         "Start with this, and keep what beats it."
     )
 

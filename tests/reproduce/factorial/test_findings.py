@@ -134,6 +134,7 @@ def test_sentences_follow_the_numbers(found):
     worse.loc[(worse["cell"] == WITHOUT_NETWORK.name) & (worse["environment"] == "shot"), "alarms"] = 600
     said = practice.sentences(robustness, findings.summarise(worse))
     assert "suffice** on white noise here" in said["a linear map and resampled residuals"]
+    assert "; on shot noise the difference is 50.0 (50.0 to 50.0) points. Start" in said["a linear map and resampled residuals"]
     assert "not measured yet" in practice.bullets(robustness) and len(practice.bullets(robustness).splitlines()) == 5
     assert len(objections.objections(robustness, found)) == 9
 
