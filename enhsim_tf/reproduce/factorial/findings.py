@@ -202,7 +202,7 @@ def shares(values: "Mapping[str, pd.DataFrame]", generator: str) -> dict[str, An
     return found
 
 
-def contribution(worth: Mapping[frozenset[str], Any], factor: str) -> Any:  # noqa: ANN401 - numbers, arrays or series alike
+def contribution(worth: Mapping[frozenset[str], Any], factor: str) -> Any:
     """The Shapley value of a factor: the change that it makes, averaged over all orders of switching the factors.
 
     Args:
