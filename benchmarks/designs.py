@@ -3,7 +3,7 @@
 Each row of the resulting file belongs to one noise and one development seed. The noise is held-out real noise, noise of the
 final design, or noise of the design with one change. The generators are trained on the true noise, so that errors of the
 enhancer have no effect. The noise is evaluated as in the replicates of the robustness experiment, and detectors are trained on
-the true waves with this noise. Existing rows are not computed again. `docs/REPORT.md` shows all rows.
+the true waves with this noise. Existing rows are not computed again. `docs/REPORT_TABLES.md` shows all rows.
 """
 
 import argparse

@@ -17,6 +17,8 @@ examples:
   python -m enhsim_tf.reproduce --store influxdb     with the server given by INFLUXDB_V2_URL, _TOKEN and _ORG
   python -m enhsim_tf.reproduce --experiment robustness
                                                      effect of each kind of noise on detectors; takes hours, can be interrupted
+  python -m enhsim_tf.reproduce --experiment factorial
+                                                     which part of the pipeline lowers false alarms; takes hours, can be interrupted
   python -m enhsim_tf.reproduce --experiment labelled --data DIR
                                                      real telemetry with labelled anomalies; some minutes per channel
 
@@ -69,14 +71,14 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--experiment",
-        choices=("robustness", "noise", "labelled"),
-        help="instead of the paper: robustness trains detectors with each kind of noise; noise tries noise models on fourteen families; "
-        "labelled tests them on real telemetry with labelled anomalies",
+        choices=("robustness", "factorial", "noise", "labelled"),
+        help="instead of the paper: robustness trains detectors with each kind of noise; factorial combines windows, extraction, enhancer and "
+        "generator; noise tries noise models on fourteen families; labelled tests detectors on real telemetry with labelled anomalies",
     )
     parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
     parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
     parser.add_argument("--environment", choices=FAMILIES, help="run the experiment with this kind of noise only (default: all)")
-    parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds of the experiment (default: 10; smoke: 2)")
+    parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds of the experiment (default: 10, factorial: 5)")
     parser.add_argument("--rungs", metavar="A,B", help="only these noise models in the experiment on noise (default: all)")
     parser.add_argument("--arrays", action="store_true", help="also save the arrays behind each figure, as .npz")
     parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
@@ -89,7 +91,9 @@ def run(options: argparse.Namespace) -> int:
     check(options)
     folder = make_folders(options)
     if options.experiment:
-        return {"robustness": run_experiment, "noise": run_noise, "labelled": run_labelled}[options.experiment](options, folder)
+        return {"robustness": run_experiment, "factorial": run_factorial, "noise": run_noise, "labelled": run_labelled}[options.experiment](
+            options, folder
+        )
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import figure_caption
     from enhsim_tf.reproduce.figure import save
@@ -203,6 +207,26 @@ def run_noise(options: argparse.Namespace, folder: Path) -> int:
     return 0
 
 
+def run_factorial(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the factorial experiment in a subfolder of the figures' folder, and returns the exit code."""
+    from enhsim_tf.reproduce.factorial.run import FOLDER, run
+    from enhsim_tf.reproduce.publish.factorial_text import lines
+    from enhsim_tf.reproduce.publish.report import findings_of, report
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    turned = {} if options.seeds is None else {"factorial__num_seeds": options.seeds}
+    environments = NOISES if options.environment is None else (options.environment,)
+    out, settings = folder / FOLDER, make_settings(options.budget, **turned)
+    found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
+    tell("\n" + "\n".join(lines(found)))
+    kept = findings_of(Path(), "robustness")
+    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None and not is_other(options):
+        report(kept, Path())
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
 def chosen_rungs(given: str) -> tuple[str, ...]:
     """Reads `--rungs`, in the order of the ladder."""
     from enhsim_tf.common.errors import InputError
@@ -246,8 +270,8 @@ def check(options: argparse.Namespace) -> None:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)
     for name in ("environment", "seeds"):
-        if getattr(options, name) is not None and options.experiment not in ("robustness", "noise"):
-            raise InputError(f"Expected --{name} together with --experiment robustness or noise. Received: --{name} without it.")
+        if getattr(options, name) is not None and options.experiment not in ("robustness", "factorial", "noise"):
+            raise InputError(f"Expected --{name} together with --experiment robustness, factorial or noise. Received: --{name} without it.")
     if (options.experiment == "labelled") != (options.data is not None) or (options.channels and options.data is None):
         raise InputError("Expected --experiment labelled and --data DIR together, and --channels only with them. Received: one alone.")
     if options.data is not None:

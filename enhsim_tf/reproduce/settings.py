@@ -223,6 +223,13 @@ class LadderSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class FactorialSettings:
+    """The factorial experiment: `python -m enhsim_tf.reproduce --experiment factorial`. Its other settings are those of robustness."""
+
+    num_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: the first seeds of the experiment on robustness; 32 cells for each", smoke=1)
+
+
+@dataclasses.dataclass(frozen=True)
 class LabelledSettings:
     """The study of real telemetry with labelled anomalies: `python -m enhsim_tf.reproduce --experiment labelled`."""
 
@@ -250,6 +257,7 @@ class Settings:
     second: SecondSettings = SecondSettings()
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()
+    factorial: FactorialSettings = FactorialSettings()
     ladder: LadderSettings = LadderSettings()
     labelled: LabelledSettings = LabelledSettings()
     budget: str = "full"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
-from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise, WindowBootstrap
 
 
 def gain(width, frequency):
@@ -198,3 +198,19 @@ def test_surrogates_depend_on_the_seed_only(fit):
     assert (first == surrogate.generate(3, seed=5)).all() and (first != surrogate.generate(3, seed=6)).any()
     rng = np.random.default_rng(5)
     assert (first == surrogate.generate(3, rng)).all() and (first != surrogate.generate(3, rng)).any()
+
+
+def test_whole_windows_are_drawn_unchanged_and_equally_often():
+    source = np.arange(40.0).reshape(8, 5)
+    noise = WindowBootstrap.fit(source).generate(8_000, seed=3)
+    assert noise.dtype == np.float32 and noise.shape == (8_000, 5)
+    numbers, counts = np.unique(noise[:, 0] / 5, return_counts=True)
+    assert np.array_equal(numbers, np.arange(8)) and np.abs(counts - 1_000).max() < 150  # five standard deviations
+    assert np.array_equal(noise, source[(noise[:, 0] / 5).astype(int)])
+    assert np.array_equal(noise, WindowBootstrap(source).generate(8_000, seed=3))
+
+
+def test_whole_windows_need_a_window(refused):
+    for windows in (np.ones(5), np.ones((0, 5))):
+        with refused("at least one window"):
+            WindowBootstrap.fit(windows)

@@ -381,6 +381,8 @@ def test_a_part_of_an_experiment_does_not_take_the_place_of_the_whole(tmp_path, 
     for arguments, out in {
         "--experiment robustness": "figures",
         "--experiment robustness --seeds 2": "figures_part",
+        "--experiment factorial": "figures",
+        "--experiment factorial --seeds 1": "figures_part",
         "--experiment robustness --environment shot --budget smoke": "smoke_part",
         "--experiment labelled --data shown": "figures",
         "--experiment labelled --data shown --channels A": "figures_shown",

@@ -49,6 +49,7 @@ COUNTS = {
     "robustness.num_windows",
     "robustness.num_anomalous",
     "robustness.num_anomalous_varied",
+    "factorial.num_seeds",
     "robustness.num_resplits",
     "robustness.num_trace_samples",
     "robustness.max_order",

@@ -1,4 +1,4 @@
-"""Writes the report on robustness in `docs/`, the table of the README and the last lines of the command.
+"""Writes the report on robustness and its tables in `docs/`, the generated parts of the README and the last lines of the command.
 
 All numbers come from the findings. A test renders the report again from the tables and compares.
 """
@@ -11,9 +11,12 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.reproduce.caption import in_seeds
+from enhsim_tf.reproduce.publish import factorial_text, practice
+from enhsim_tf.reproduce.publish.objections import objections
 from enhsim_tf.reproduce.publish.wording import (
     Findings,
     interval,
+    mean_of,
     number,
     p_value,
     per_cent,
@@ -26,7 +29,8 @@ from enhsim_tf.reproduce.publish.wording import (
     words,
 )
 
-PATH = Path("docs") / "REPORT.md"
+PATHS = {"report.md.jinja": Path("docs") / "REPORT.md", "report_tables.md.jinja": Path("docs") / "REPORT_TABLES.md"}
+"""The files of the report by template: the text, and its tables."""
 TABLES = (Path("docs") / "designs.csv", Path("docs") / "tries.csv")  # designs tried before and after the targets were tested
 
 
@@ -36,9 +40,10 @@ def render(
     designs: Sequence[Mapping[str, str]] = (),
     tries: Sequence[Mapping[str, str]] = (),
     timing: Findings | None = None,
+    factorial: Findings | None = None,
     template: str = "report.md.jinja",
 ) -> str:
-    """The report as Markdown.
+    """The report, or the file of its tables, as Markdown.
 
     Args:
         found: The findings.
@@ -46,7 +51,8 @@ def render(
         designs: Designs that were tried during the development of the convolutional GAN, as `designs_of` reads them.
         tries: Designs that were tried where the convolutional GAN misses a target.
         timing: The benchmark of its training iteration, as `timing_of` reads it.
-        template: Name of the template in the folder of this module.
+        factorial: The findings of the factorial experiment, or None if it was not run.
+        template: One of `PATHS`.
     """
     import jinja2
 
@@ -67,11 +73,18 @@ def render(
         "reached": reached,
         "in_seeds": in_seeds,
         "share": share,
+        "mean_of": mean_of,
+        "capitalise": lambda text: text[:1].upper() + text[1:],
     }
     settings, tried = make_settings(found["budget"]), [_tried(row) for row in tries]
     return environment.get_template(template).render(
         found=found,
         labelled=labelled,
+        quietest=labelled and quietest(labelled),
+        factorial=factorial,
+        factorial_text=factorial_text,
+        practice=practice.bullets(found, factorial, labelled),
+        objections=objections(found, factorial, labelled),
         designs=designs,
         tries=tried,
         tries_found=tries_found(tried),
@@ -84,12 +97,29 @@ def render(
     )
 
 
+def quietest(labelled: Findings) -> str:
+    """The arm with generated noise that has the fewest false alarms in the study of real telemetry."""
+    arms = labelled["arms"]
+    return min((name for name in arms if " + " in name), key=lambda name: arms[name]["false_alarms"]["mean"])
+
+
+def render_all(root: Path, found: Findings) -> dict[Path, str]:
+    """The files of the report, rendered with everything that the project stores.
+
+    Args:
+        root: Folder of the project.
+        found: The findings on robustness.
+    """
+    stored = findings_of(root, "labelled"), *(designs_of(root / path) for path in TABLES), timing_of(root), findings_of(root, "factorial")
+    return {path: render(found, *stored, template=template) for template, path in PATHS.items()}
+
+
 def findings_of(root: Path, name: str) -> Findings | None:
     """The findings of an experiment that are stored in the project, or None.
 
     Args:
         root: Folder of the project.
-        name: `robustness` or `labelled`.
+        name: `robustness`, `factorial` or `labelled`.
     """
     path = root / "figures" / name / "findings.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
@@ -131,12 +161,16 @@ def report(found: Findings, root: Path) -> None:
     from enhsim_tf.reproduce.publish.results import fill_parts
     from enhsim_tf.reproduce.spacecraft import run
 
-    labelled = findings_of(root, "labelled")
-    make_folder(root / PATH.parent)
-    with replace_file(root / PATH) as temporary:
-        text = render(found, labelled, *(designs_of(root / path) for path in TABLES), timing_of(root))
-        temporary.write_text(text, encoding="utf-8")
-    parts = {"robustness": table(found)} | ({} if labelled is None else {"labelled": run.table(labelled)})
+    labelled, factorial = (findings_of(root, name) for name in ("labelled", "factorial"))
+    for path, text in render_all(root, found).items():
+        make_folder(root / path.parent)
+        with replace_file(root / path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    parts = {"practice": practice.bullets(found, factorial, labelled), "robustness": table(found)}
+    if labelled is not None:
+        parts["labelled"] = run.table(labelled)
+    if factorial is not None:
+        parts["factorial"] = factorial_text.readme_part(factorial)
     readme = root / "README.md"
     if readme.is_file():
         text = readme.read_text(encoding="utf-8")

@@ -38,6 +38,11 @@ def points(about: Mapping[str, float] | float, digits: int = 1) -> str:
     return f"{mean} ({low} to {high})"
 
 
+def mean_of(about: Mapping[str, float] | float) -> float:
+    """A rate, which is given as a number or by its mean and interval."""
+    return float(about["mean"]) if isinstance(about, Mapping) else float(about)
+
+
 def p_value(value: float) -> str:
     """A p-value with one significant digit."""
     return f"{value:.1g}" if value >= 0.0001 else "below 0.0001"
@@ -76,6 +81,16 @@ def kept_c8(found: Findings, most: int = 6) -> str:
     for environment, detector in kept if len(kept) <= most else ():
         detectors.setdefault(detector, []).append(environment)
     return "; ".join(f"{detector} on {in_list(names)} noise" for detector, names in detectors.items())
+
+
+def targets_missed(found: Findings) -> str:
+    """Says in which environments the convolutional GAN reaches its targets, and which of them it misses in the others."""
+    named = {"excess_reached": "false alarms", "recall_reached": "recall", "autoregression_reached": "comparison with the autoregression"}
+    missed = {name: [words for key, words in named.items() if not bar[key]] for name, bar in found["bars"].items()}
+    reached_on = [name for name, each in missed.items() if not each]
+    said = [f"all are reached on {in_list(reached_on)} noise"] if reached_on else []
+    said += [f"missed on {name} noise: {in_list(each)}" for name, each in missed.items() if each]
+    return "; ".join(said)
 
 
 def first_trial(found: Findings) -> str:
@@ -117,6 +132,7 @@ def words(found: Findings, settings: "Settings") -> dict[str, Any]:
         ),
         "verdict_c8": verdict_c8(found),
         "kept_c8": kept_c8(found),
+        "targets_missed": targets_missed(found),
         "first_trial": first_trial(found),
         "first_confirmed": in_list(confirmed),
         "is_realistic": all(bar["measures_within"] == bar["num_measures"] for bar in asked),

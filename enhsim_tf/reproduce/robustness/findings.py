@@ -97,7 +97,7 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
     recall = trained(tables["recall"]).groupby(cells)["recall"].mean()
     per_replicate = rate.set_index(cells)["rate"]
     per_detector, recalls = (table.groupby(["arm", "environment", "detector"]).mean() for table in (per_replicate, recall))
-    keeps = [_keeps_the_rule(*each) for each in ((per_detector, recalls), (per_replicate, recall))]
+    keeps = [keeps_the_rule(*each) for each in ((per_detector, recalls), (per_replicate, recall))]
     arms = {}
     for arm in (name for name in ARMS if name in mean_rate):
         arms[arm] = {
@@ -131,7 +131,7 @@ def _share(found: Mapping[str, float]) -> dict[str, float]:
     return {name: min(value, 1.0) for name, value in found.items()}
 
 
-def _keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
+def keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
     """Whether each row meets the criterion of claim C8; one column per arm.
 
     The false-alarm rate has to be at most twice that of training on real telemetry plus one percentage point, and recall at most

@@ -1,0 +1,119 @@
+"""Text about the factorial experiment: its tables, its summary, and the last lines of the command."""
+
+import dataclasses
+
+from enhsim_tf.reproduce.caption import in_seeds
+from enhsim_tf.reproduce.factorial.cells import CELLS, LEVELS, PAPER_CELL, WITHOUT_NETWORK
+from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, per_cent, points
+
+ALT = "Contribution of windows, extraction, enhancer and generator to the share of the gap that is closed"
+
+
+def lines(found: Findings) -> list[str]:
+    """The last lines that the command prints: how many cells there are, and the contributions for each generator."""
+    said = [coverage(found)]
+    for generator, about in found["shares"].items():
+        closed = about["gap_closed"]
+        parts_of = ", ".join(f"{factor} {points(each['share'])}" for factor, each in closed["factors"].items())
+        said.append(f"{generator}: gap closed from {interval(closed['paper'])} to {interval(closed['switched'])}; points by {parts_of}")
+    return said
+
+
+def coverage(found: Findings) -> str:
+    """How many cells were computed, and what the others are."""
+    seeds = found["seeds"]
+    said = f"{found['num_cells']} of {found['of_cells']} cells ({in_seeds(seeds)}, {seeds[0]} to {seeds[-1]}, in {len(found['environments'])} environments)"
+    return said if found["num_cells"] == found["of_cells"] else f"{said}; the command continues with the others"
+
+
+def contributions(found: Findings) -> str:
+    """The contribution of each factor, in a table with one column for each generator that replaces the paper's GAN."""
+    shares = found["shares"]
+    if not shares:
+        return "No seed has all cells of a comparison yet."
+    rows = [f"| points of the gap in false alarms closed by | {' | '.join(shares)} |", f"|---|{'---|' * len(shares)}"]
+    ends = {"paper": "*the paper's pipeline*", "switched": "*all four switched*"}
+    rows.append(f"| {ends['paper']} | {' | '.join(points(about['gap_closed']['paper']) for about in shares.values())} |")
+    for factor, levels in LEVELS.items():
+        change = f"{levels[0]} to {levels[1]}" if factor != "generator" else f"{levels[0]} to the column's"
+        cells = [points(about["gap_closed"]["factors"][factor]["share"]) for about in shares.values()]
+        rows.append(f"| {factor}: {change} | {' | '.join(cells)} |")
+    rows.append(f"| {ends['switched']} | {' | '.join(points(about['gap_closed']['switched']) for about in shares.values())} |")
+    rows.append(f"| seeds | {' | '.join(str(len(about['seeds'])) for about in shares.values())} |")
+    return "\n".join(rows)
+
+
+def contrasts_table(found: Findings) -> str:
+    """The differences that the conclusions use, as far as their cells exist."""
+    rows = ["| first | minus second | false alarms (points) | recall at the real rate (points) | seeds |", "|---|---|---|---|---|"]
+    for about in found["contrasts"].values():
+        differences = " | ".join(points(about[name]) for name in ("false_alarms", "recall_at_real_rate"))
+        rows.append(f"| {about['first']} | {about['second']} | {differences} | {len(about['seeds'])} |")
+    return "\n".join(rows)
+
+
+def cells_table(found: Findings) -> str:
+    """All cells in Markdown: false alarms with their interval, recall and the share of the gap closed."""
+    names = found["environments"]
+    rows = [
+        f"| windows / extraction / enhancer / generator | false alarms | {' | '.join(names)} | recall | recall at the real rate | gap closed | C8's criterion met | seeds |",
+        "|---|---|" + "---|" * len(names) + "---|---|---|---|---|",
+    ]
+    for name, about in found["cells"].items():
+        each = " | ".join(per_cent(about["by_environment"][environment]["false_alarms"]["mean"]) for environment in names)
+        rows.append(
+            f"| {name} | {interval(about['false_alarms'])} | {each} | {per_cent(about['recall'])} | {per_cent(about['recall_at_real_rate'])} "
+            f"| {per_cent(about['gap_closed'], 0)} | {about['kept']} of {about['pairs']} | {len(about['seeds'])} |"
+        )
+    return "\n".join(rows)
+
+
+def readme_part(found: Findings) -> str:
+    """The README's figure, if a comparison is complete, and its table."""
+    shown = f"![{ALT}](figures/factorial/contributions.png)\n\n" if found["shares"] else ""
+    return shown + short_table(found)
+
+
+def short_table(found: Findings) -> str:
+    """The table of the README and the report: the references, the paper's pipeline, the pipeline without networks, and the best cell of each generator."""
+    cells = found["cells"]
+    without = dataclasses.replace(WITHOUT_NETWORK, windows=LEVELS["windows"][0]).name, WITHOUT_NETWORK.name
+    chosen = ["coarse", PAPER_CELL.name, *without]
+    for generator in LEVELS["generator"]:
+        measured = [name for name in cells if name in CELLS and CELLS[name].generator == generator]
+        if measured:
+            chosen.append(min(measured, key=lambda name: cells[name]["false_alarms"]["mean"]))
+    chosen.append("real")
+    rows = [
+        "| windows / extraction / enhancer / generator | false alarms | recall at the real rate | gap closed | seeds |",
+        "|---|---|---|---|---|",
+    ]
+    for name in dict.fromkeys(chosen):
+        if name in cells:
+            about = cells[name]
+            closed, note = per_cent(about["gap_closed"], 0), " (no network)" if name in without else ""
+            rows.append(
+                f"| {name}{note} | {interval(about['false_alarms'])} | {per_cent(about['recall_at_real_rate'])} | {closed} | {len(about['seeds'])} |"
+            )
+    seeds = found["seeds"]
+    return "\n".join(rows) + (
+        f"\n\nThe paper's pipeline, ridge regression with whole windows of its residuals, and the cell with the fewest false alarms for each generator, of "
+        f"{coverage(found)}. Means over {len(found['detectors'])} detectors ({in_list(found['detectors'])}), with 95 % intervals over environments and seeds "
+        f"{seeds[0]} to {seeds[-1]}. From `figures/factorial/findings.json`."
+    )
+
+
+def ranking(found: Findings) -> str:
+    """Says which factor contributes how much in the main comparison; empty while no comparison is complete."""
+    if not found["shares"]:
+        return ""
+    generator, about = next(iter(found["shares"].items()))
+    closed = about["gap_closed"]
+    ranked = sorted(closed["factors"].items(), key=lambda each: -each[1]["share"]["mean"])
+    said = in_list([f"the {factor} {points(each['share'])}" for factor, each in ranked])
+    ends = [f"the {factor} {points(each['first']['mean'], 0)} first and {points(each['last']['mean'], 0)} last" for factor, each in ranked]
+    return (
+        f"With {generator} in place of the paper's GAN ({in_seeds(about['seeds'])}), the share of the gap that is closed rises from "
+        f"{per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of the difference, {said} points. The factors interact: switched "
+        f"first or last, {in_list(ends)}."
+    )

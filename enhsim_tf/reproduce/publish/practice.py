@@ -1,0 +1,126 @@
+"""What a practitioner should do: five sentences, each with its number, for the README and the report.
+
+All numbers come from the findings of the experiments. Where a number is missing, the sentence says so.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from enhsim_tf.reproduce.factorial.cells import WITHOUT_NETWORK
+from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, mean_of, per_cent, points
+from enhsim_tf.reproduce.robustness.targets import MARGIN
+
+
+def sentences(found: Findings, factorial: Findings | None = None, labelled: Findings | None = None) -> dict[str, str]:
+    """The five sentences by question.
+
+    Args:
+        found: The findings on robustness.
+        factorial: The findings of the factorial experiment, or None.
+        labelled: The findings of the study of real telemetry, or None.
+    """
+    return {
+        "a clean simulator": _clean(found),
+        "a linear map and resampled residuals": _linear(factorial),
+        "a network": _network(found, factorial),
+        "generated noise": _noise(factorial),
+        "nothing here": _nothing(labelled),
+    }
+
+
+def bullets(found: Findings, factorial: Findings | None = None, labelled: Findings | None = None) -> str:
+    """The five sentences as a Markdown list."""
+    return "\n".join(f"- {sentence}" for sentence in sentences(found, factorial, labelled).values())
+
+
+def _clean(found: Findings) -> str:
+    arms = found["arms"]
+    coarse, truth, real = (arms[name] for name in ("coarse", "truth", "real"))
+    kept = len(coarse["c8"]["kept"]) + len(truth["c8"]["kept"])
+    where = (
+        "It sufficed in none of the environments here"
+        if not kept
+        else f"It met the criterion of C8 in {kept} of {2 * truth['c8']['of']} pairs here"
+    )
+    return (
+        f"**A clean simulator suffices**, if at all, where noise is negligible. {where}: detectors trained on a perfect but noiseless signal alarm on "
+        f"{per_cent(truth['false_alarms']['mean'])} of real nominal windows and those trained on the coarse simulator on "
+        f"{per_cent(coarse['false_alarms']['mean'])}; even with thresholds set on real windows, they find {per_cent(truth['recall_at_real_rate'])} and "
+        f"{per_cent(coarse['recall_at_real_rate'])} of the anomalies, against {per_cent(real['recall_at_real_rate'])} after training on real telemetry."
+    )
+
+
+def _linear(factorial: Findings | None) -> str:
+    about = (factorial or {}).get("cells", {}).get(WITHOUT_NETWORK.name)
+    if about is None:
+        return "**A linear map and resampled residuals**: not measured yet."
+    against, real = factorial["contrasts"]["no network, real"], factorial["cells"]["real"]
+    within = [name for name, each in against["by_environment"].items() if each["false_alarms"]["high"] <= MARGIN]
+    beyond = {name: each["false_alarms"] for name, each in against["by_environment"].items() if name not in within}
+    others = "".join(f"; on {name} noise the difference is {points(each)} points" for name, each in beyond.items())
+    everywhere = len(within) == len(against["by_environment"])
+    where = "in every environment" if everywhere else f"on {in_list(within)} noise" if within else "in none of the environments"
+    return (
+        f"**A linear map and resampled residuals suffice** {where} here, to within {points(MARGIN)} points of false alarms: ridge regression plus whole "
+        f"windows of its residuals, without any network, gives {interval(about['false_alarms'])} false alarms, against {interval(real['false_alarms'])} after "
+        f"training on real telemetry, and meets the criterion of C8 in {about['kept']} of {about['pairs']} pairs of environment and detector{others}. "
+        "Start with this, and keep what beats it."
+    )
+
+
+def _network(found: Findings, factorial: Findings | None) -> str:
+    errors = found["modes"]["nrmse"]
+    network, ridge = errors["randomised"], errors["ridge, randomised"]
+    degraded = (
+        f"in degraded modes, with training on randomised configurations and their true response, its error is {network['inside']:.2f} within the trained "
+        f"severities and {network['outside']:.2f} beyond, against {ridge['inside']:.2f} and {ridge['outside']:.2f} for ridge regression"
+    )
+    nominal = _difference(factorial, "network, ridge")
+    if nominal is None:
+        return f"**A network pays**, as far as is known, where the map is not linear: {degraded}; on nominal telemetry the comparison is not measured yet."
+    pays = nominal["high"] < 0
+    said = "It lowers" if pays else "It does not lower"
+    return (
+        f"**A network pays** where the map is not linear: {degraded}. {said} false alarms on nominal telemetry: with the same windows and resampled residuals, "
+        f"replacing ridge regression by the network changes them by {points(nominal)} points."
+    )
+
+
+def _noise(factorial: Findings | None) -> str:
+    known = (("convolutional GAN, whole windows", "ridge regression"), ("convolutional GAN, whole windows, network", "the network"))
+    chosen = next(((name, enhancer) for name, enhancer in known if _difference(factorial, name) is not None), None)
+    if chosen is None:
+        return (
+            "**Generated noise pays**, as far as is known, where more or longer stretches of noise are needed than were recorded: resampled residuals "
+            "never contain anything new. The comparison of its false alarms with those of whole residual windows is not measured yet."
+        )
+    name, enhancer = chosen
+    difference = _difference(factorial, name)
+    number = len(factorial["contrasts"][name]["seeds"])
+    verdict = "lowers" if difference["high"] < 0 else "raises" if difference["low"] > 0 else "does not detectably change"
+    return (
+        f"**Generated noise pays** where more or longer stretches of noise are needed than were recorded, because resampled residuals never contain anything "
+        f"new. It {verdict} false alarms here: with {enhancer} and the same residuals, replacing whole windows by the convolutional GAN changes them by "
+        f"{points(difference)} points ({number} {'seed' if number == 1 else 'seeds'})."
+    )
+
+
+def _nothing(labelled: Findings | None) -> str:
+    if labelled is None:
+        return "**Nothing here helps enough** where telemetry changes after training; this is not measured yet."
+    arms = labelled["arms"]
+    controls = {name: about for name, about in labelled["controls"].items() if "found" in about}
+    best = max(controls, key=lambda name: controls[name]["auc_pr"])
+    rates = {name: mean_of(about["false_alarms"]) for name, about in (arms | controls).items()}
+    quiet = min((name for name in arms if " + " in name), key=rates.__getitem__)
+    return (
+        f"**Nothing here helps enough** where nominal telemetry itself changes after training: on {len(labelled['channels'])} channels of a spacecraft, detectors "
+        f"trained on the real past alarm on {per_cent(rates['real'])} of later nominal windows, and with the best generated telemetry (*{quiet}*) on "
+        f"{per_cent(rates[quiet])}, against {per_cent(rates[best])} for a score of one line ({best}), which ranks labelled samples with an AUC-PR of "
+        f"{controls[best]['auc_pr']:.2f}, against {max(about['auc_pr'] for about in arms.values()):.2f} for the best arm."
+    )
+
+
+def _difference(factorial: Findings | None, name: str) -> Mapping[str, Any] | None:
+    contrast = (factorial or {}).get("contrasts", {}).get(name)
+    return None if contrast is None else contrast["false_alarms"]

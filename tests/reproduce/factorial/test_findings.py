@@ -1,0 +1,152 @@
+"""Tests the findings of the factorial experiment with hand-made cells, and the committed files against each other."""
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.reproduce.factorial import findings
+from enhsim_tf.reproduce.factorial.cells import CELLS, LEVELS, PAPER_CELL, WHOLE_WINDOWS, WITHOUT_NETWORK
+from enhsim_tf.reproduce.factorial.run import FOLDER, TABLE, read_cells
+from enhsim_tf.reproduce.publish import factorial_text, objections, practice, report
+
+KEPT = Path(__file__).parents[3] / "figures" / FOLDER
+ENVIRONMENTS, SEEDS, DETECTORS = ("white", "shot"), (1, 2, 3), ("PCA residual", "isolation forest")
+EFFECTS = {"windows": 50, "extraction": 100, "enhancer": 150, "generator": 300}  # alarms of 1,000 windows that switching a factor avoids
+
+
+def alarms_of(name):
+    """Coarse telemetry gives 900 alarms, real telemetry 100, and the paper's pipeline 700; every switched factor avoids some."""
+    if name not in CELLS:
+        return {"coarse": 900, "real": 100}[name]
+    cell = CELLS[name]
+    return 700 - sum(EFFECTS[factor] for factor, levels in LEVELS.items() if getattr(cell, factor) != levels[0])
+
+
+def table(without=()):
+    rows = [
+        {"environment": environment, "seed": seed, "cell": name, "detector": detector}
+        | {"alarms": alarms_of(name), "windows": 1_000, "recall": 0.5, "recall_at_real_rate": 0.3}
+        for environment, seed, name, detector in itertools.product(ENVIRONMENTS, SEEDS, ["coarse", "real", *CELLS], DETECTORS)
+        if (environment, seed, name) not in without
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return findings.summarise(table())
+
+
+def test_cells_are_means_over_detectors_and_replicates(found):
+    paper = found["cells"][PAPER_CELL.name]
+    assert paper["false_alarms"] == pytest.approx({"mean": 0.7, "low": 0.7, "high": 0.7})
+    assert paper["gap_closed"] == pytest.approx((0.9 - 0.7) / (0.9 - 0.1)) and paper["seeds"] == list(SEEDS)
+    assert found["cells"][WITHOUT_NETWORK.name]["gap_closed"] == pytest.approx(1.0)
+    assert found["cells"]["coarse"]["gap_closed"] == 0 and found["cells"]["real"]["gap_closed"] == 1
+    assert (found["num_cells"], found["of_cells"]) == (32 * 6, 32 * 6) and found["num_windows"] == 1_000
+
+
+def test_without_interactions_each_factor_contributes_its_own_effect(found):
+    for about in found["shares"].values():
+        closed = about["gap_closed"]
+        for factor, effect in EFFECTS.items():
+            for when in ("share", "first", "last"):
+                assert closed["factors"][factor][when]["mean"] == pytest.approx(effect / 800), (factor, when)
+        assert closed["paper"]["mean"] == pytest.approx(0.25) and closed["switched"]["mean"] == pytest.approx(1.0)
+        assert about["recall_at_real_rate"]["factors"]["generator"]["share"]["mean"] == pytest.approx(0.0)
+
+
+def test_an_interaction_is_split_between_its_factors():
+    worth = {frozenset(each): float(set(each) >= {"a", "b"}) for size in range(4) for each in itertools.combinations("abc", size)}
+    assert [findings.contribution(worth, factor) for factor in "abc"] == pytest.approx([0.5, 0.5, 0.0])
+
+
+def test_contributions_add_up_and_agree_with_the_orders():
+    rng = np.random.default_rng(0)
+    worth = {frozenset(each): rng.standard_normal() for size in range(5) for each in itertools.combinations(LEVELS, size)}
+    for factor in LEVELS:  # the definition: the mean change over all orders of switching
+        changes = []
+        for order in itertools.permutations(LEVELS):
+            before = frozenset(order[: order.index(factor)])
+            changes.append(worth[before | {factor}] - worth[before])
+        assert findings.contribution(worth, factor) == pytest.approx(np.mean(changes))
+    total = sum(findings.contribution(worth, factor) for factor in LEVELS)
+    assert total == pytest.approx(worth[frozenset(LEVELS)] - worth[frozenset()])
+
+
+def test_corners_switch_the_named_factors():
+    assert findings.corner([], WHOLE_WINDOWS) == PAPER_CELL.name and findings.corner(LEVELS, WHOLE_WINDOWS) == WITHOUT_NETWORK.name
+    assert findings.corner(["extraction"], WHOLE_WINDOWS) == "few / residual / network / paper's GAN"
+
+
+def test_a_comparison_uses_the_seeds_that_have_all_of_its_cells():
+    one = "many / residual / ridge / convolutional GAN"
+    some = findings.summarise(table(without={("shot", 2, one)}))
+    assert some["shares"]["convolutional GAN"]["seeds"] == [1, 3] and some["shares"][WHOLE_WINDOWS]["seeds"] == [1, 2, 3]
+    assert some["cells"][one]["seeds"] == [1, 3] and some["num_cells"] == 32 * 6 - 1
+    assert some["contrasts"]["convolutional GAN, whole windows"]["seeds"] == [1, 3]
+    none = findings.summarise(table(without={("shot", seed, one) for seed in SEEDS}))
+    assert "convolutional GAN" not in none["shares"] and one not in none["cells"]
+    with pytest.raises(InputError, match="coarse and real in all environments"):
+        findings.summarise(table(without={("white", seed, "real") for seed in SEEDS}))
+
+
+def test_contrasts_are_the_first_arm_minus_the_second(found):
+    assert found["contrasts"]["no network, real"]["false_alarms"]["mean"] == pytest.approx(0.0)
+    assert found["contrasts"]["no network, paper"]["false_alarms"]["mean"] == pytest.approx(-0.6)
+    assert found["contrasts"]["network, ridge"]["by_environment"]["shot"]["false_alarms"]["mean"] == pytest.approx(0.15)
+
+
+def test_the_criterion_of_c8_is_counted_in_pairs(found):
+    assert (found["cells"]["real"]["kept"], found["cells"]["real"]["pairs"]) == (4, 4)
+    assert found["cells"][PAPER_CELL.name]["kept"] == 0
+    assert found["cells"]["many / residual / network / whole windows"]["kept"] == 0  # 25 % against at most 21 %
+    assert found["cells"]["few / residual / ridge / whole windows"]["kept"] == 4  # 15 %
+
+
+def test_findings_are_plain_json(found):
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+
+
+def test_tables_say_what_the_findings_hold(found):
+    text = factorial_text.contributions(found)
+    assert "| extraction: moving average to residual | 12.5 (12.5 to 12.5) |" in text and "| seeds | 3 | 3 | 3 |" in text
+    assert factorial_text.ranking(found).startswith("With whole windows in place of the paper's GAN (3 seeds), the share")
+    assert "the generator 37.5 (37.5 to 37.5), the enhancer" in factorial_text.ranking(found)
+    assert f"| {WITHOUT_NETWORK.name} (no network) | 10.0 % (10.0 to 10.0) |" in factorial_text.short_table(found)
+    assert len(factorial_text.cells_table(found).splitlines()) == 2 + 34
+    assert f"| {WITHOUT_NETWORK.name} | real | 0.0 (0.0 to 0.0) | 0.0 (0.0 to 0.0) | 3 |" in factorial_text.contrasts_table(found)
+    assert factorial_text.coverage(found) == "192 of 192 cells (3 seeds, 1 to 3, in 2 environments)"
+
+
+def test_sentences_follow_the_numbers(found):
+    robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
+    said = practice.sentences(robustness, found)
+    assert "suffice** in every environment here" in said["a linear map and resampled residuals"]
+    assert "It does not lower false alarms on nominal telemetry" in said["a network"]
+    assert "It does not detectably change false alarms here" in said["generated noise"]
+    worse = table()
+    worse.loc[(worse["cell"] == WITHOUT_NETWORK.name) & (worse["environment"] == "shot"), "alarms"] = 600
+    said = practice.sentences(robustness, findings.summarise(worse))
+    assert "suffice** on white noise here" in said["a linear map and resampled residuals"]
+    assert "; on shot noise the difference is 50.0 (50.0 to 50.0) points. Start" in said["a linear map and resampled residuals"]
+    assert "not measured yet" in practice.bullets(robustness) and len(practice.bullets(robustness).splitlines()) == 5
+    assert len(objections.objections(robustness, found)) == 9
+
+
+def test_committed_findings_come_from_the_committed_table(near):
+    if not (KEPT / TABLE).is_file():
+        pytest.skip("the experiment has not been run: no figures/factorial")
+    kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
+    again = findings.summarise(read_cells(KEPT / TABLE))
+    assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
+    assert (KEPT / TABLE).stat().st_size < 400_000
+    readme = (KEPT.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert factorial_text.readme_part(kept) in readme
+    robustness, labelled = (report.findings_of(KEPT.parents[1], name) for name in ("robustness", "labelled"))
+    assert practice.bullets(robustness, kept, labelled) in readme
