@@ -129,7 +129,7 @@ def train(
         noise_windows, _ = cut_windows_from_parts(
             averaged, random_window_starts(averaged, settings.window, settings.num_windows, rng), settings.window
         )
-    simulator.noise = _train_noise(noise_windows, settings, verbose, progress)
+    simulator.noise = train_noise(noise_windows, settings, verbose, progress)
     return simulator
 
 
@@ -177,7 +177,7 @@ def _train_round(
     fit_windows(simulator.enhancer, source, target, epochs, _BATCH_SIZE, seed, rate, callbacks=callbacks, verbose=verbose)
 
 
-def _train_noise(noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseGAN:
+def train_noise(noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseGAN:
     """Builds the noise networks and trains them on windows of extracted noise, shape `(windows, samples)`."""
     if settings.noise == "convolutional":
         gan = convolutional_noise_gan(noise_windows, settings.num_iterations, settings.seed)

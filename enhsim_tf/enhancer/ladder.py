@@ -96,12 +96,16 @@ class Ladder:
         judged: The held-out error of each rung, in the order of `RUNGS`.
         chosen: Name of the simplest rung within one standard error of the best one.
         num_stretches: Number of disjoint held-out stretches of one window each.
+        edges: Edges of the blocks of time; the blocks of fold 0 were held out, see `held_out_blocks`.
+        before_refit: The rungs as they were judged, fitted without the held-out blocks.
     """
 
     rungs: Mapping[str, Rung]
     judged: tuple[Judged, ...]
     chosen: str
     num_stretches: int
+    edges: np.ndarray
+    before_refit: Mapping[str, Rung]
 
     @property
     def errors(self) -> dict[str, float]:
@@ -126,6 +130,7 @@ def fit_ladder(
     seed: int = 0,
     epochs: int = 6,
     refit: str = "all",
+    wanted: str | None = None,
     on_rung: Callable[[str], None] | None = None,
 ) -> Ladder:
     """Judges rungs on held-out time and fits them to all windows.
@@ -141,6 +146,7 @@ def fit_ladder(
         seed: Random seed of the networks.
         epochs: Passes of the networks over the training windows.
         refit: Which rungs are fitted again to all windows: `all` or `chosen`.
+        wanted: Name of a rung to choose whatever the errors are. None: the simplest within one standard error of the best.
         on_rung: Called with the name of each rung before it is judged.
 
     Returns:
@@ -151,7 +157,7 @@ def fit_ladder(
     """
     inputs, targets, starts = check_windows(inputs, targets, starts)
     chosen_rungs = [name for name in RUNGS if name in rungs]
-    if not chosen_rungs or set(rungs) - set(RUNGS) or refit not in ("all", "chosen"):
+    if not chosen_rungs or set(rungs) - set(RUNGS) or refit not in ("all", "chosen") or wanted not in (None, *chosen_rungs):
         raise InputError(f"Expected rungs among {', '.join(RUNGS)}, refit all or chosen. Received: {tuple(rungs)}, {refit!r}.")
     window = inputs.shape[1]
     edges = block_edges(int(starts.min()), int(starts.max()) + window, window)
@@ -163,18 +169,18 @@ def fit_ladder(
         )
     stretches = np.unique(starts[held_out] // window, return_inverse=True)[1]
     variance = float(np.var(targets[held_out], dtype=np.float64)) or 1.0
-    squared = {}
+    squared, before_refit = {}, {}
     for name in chosen_rungs:
         if on_rung is not None:
             on_rung(name)
-        rung = fit_rung(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs)
+        before_refit[name] = rung = fit_rung(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs)
         errors = np.mean((rung.predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64)
         squared[name] = np.bincount(stretches, errors) / np.bincount(stretches) / variance
     judged = judge(squared)
-    chosen = next(each.name for each in judged if each.is_within)
+    chosen = wanted or next(each.name for each in judged if each.is_within)
     refitted = chosen_rungs if refit == "all" else [chosen]
     fitted = {name: fit_rung(name, inputs, targets, starts, seed, epochs) for name in refitted}
-    return Ladder(fitted, judged, chosen, int(stretches.max()) + 1)
+    return Ladder(fitted, judged, chosen, int(stretches.max()) + 1, edges, before_refit)
 
 
 def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
