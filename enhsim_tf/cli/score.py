@@ -4,6 +4,7 @@ import argparse
 import os
 
 from enhsim_tf.cli.options import cleaning_options, counted, for_each, load, output_paths
+from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -38,6 +39,12 @@ def run_score(options: argparse.Namespace) -> int:
     for path in paths.values():
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
             raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
+
+    if options.coarse is not None:
+        from enhsim_tf.cli.runs import score_runs
+
+        return score_runs(options, series, models, paths, chosen, cleaning)
+    refuse_without_coarse(options, "coarse_time")
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)

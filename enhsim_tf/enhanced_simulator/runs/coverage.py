@@ -3,7 +3,7 @@
 import numpy as np
 
 from enhsim_tf.detection import metrics
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
+from enhsim_tf.enhancer.held_out_blocks import NUM_FOLDS, block_edges, split_fold
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.overlapping import average_windows, cut_run, run_starts
 from enhsim_tf.enhancer.scaling import Scaling
@@ -42,8 +42,8 @@ class Coverage:
         window, starts = inputs.shape[1], np.asarray(starts)[chosen]
         rows = scaling.scale_inputs(inputs[chosen])
         edges = block_edges(int(starts.min()), int(starts.max()) + window, window)
-        learnt, held_out = split_fold(starts, window, edges, fold=0)
-        scores = OutOfRange().fit(rows[learnt]).score(rows[held_out])
+        folds = [split_fold(starts, window, edges, fold) for fold in range(NUM_FOLDS)]
+        scores = np.concatenate([OutOfRange().fit(rows[learnt]).score(rows[held_out]) for learnt, held_out in folds])
         limit = metrics.threshold(scores, rate)
         limit = float(scores.max()) if np.isinf(limit) else limit  # with fewer than 99 windows, the largest of them
         return cls(OutOfRange().fit(rows), max(limit, _LEAST_LIMIT), scaling, window)
