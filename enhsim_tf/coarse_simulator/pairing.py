@@ -140,7 +140,9 @@ def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples
     found = np.stack([_correlation(telemetry, coarse[:, column], delays) for column in range(coarse.shape[1])])
     near = np.abs(delays) <= max_samples
     column = int(np.argmax(np.max(found[:, near] ** 2, axis=1)))
-    squared = found[column] ** 2
+    signed = found[column]
+    is_positive = max(signed[near].max(), 0.0) ** 2 >= (1 - _EQUALLY_GOOD) * np.max(signed[near] ** 2)
+    squared = np.maximum(signed if is_positive else -signed, 0.0) ** 2  # half a period away, a sine is the same upside down
     undelayed = float(found[column, longest])
     if squared[near].max() < _LEAST_CORRELATION**2:
         return Delay(0.0, None, undelayed, undelayed)

@@ -51,12 +51,13 @@ def read_recording(
         InputError: If the source cannot be read, a column is missing, or the columns have no time in common.
     """
     cleaning, name = cleaning or Cleaning(), printable(Path(os.fspath(source)).name)
-    raw = read_source(source, None if columns is None else _known(source, columns, name), time, cleaning)
+    repaired = [] if columns is None else _compare_columns(source, columns, name)
+    raw = read_source(source, columns, time, cleaning)
     names = list(raw)
     cleaned = {each: clean(raw[each], cleaning) for each in names}
     own_s = cleaned[names[0]].report.interval_s
     has_time = cleaned[names[0]].longest.has_time
-    notes = [
+    notes = repaired + [
         f"{name}, {each}: {finding.text}"
         for each in names
         for finding in cleaned[each].report.findings
@@ -94,18 +95,20 @@ def read_recording(
     return Recording(parts, tuple(names), grid_s, start, name, tuple(printable(note) for note in notes))
 
 
-def _known(source: str | os.PathLike, columns: Sequence[str], name: str) -> list[str]:
-    """Returns the names of the wanted columns, or refuses a table that lacks one."""
+def _compare_columns(source: str | os.PathLike, columns: Sequence[str], name: str) -> list[str]:
+    """Refuses a table that lacks a wanted column, and says if the columns are in another order."""
     path = Path(os.fspath(source))
-    if path.suffix.lower() in _TABLES and path.is_file():
-        there = list(read_table(path)[0].columns)
-        missing = [column for column in columns if column not in there]
-        if missing:
-            raise InputError(
-                f"Expected the coarse columns {', '.join(columns)[:120]}. Received: {name} without {missing[0]!r} "
-                f"(it has {', '.join(there)[:120]}). Record that column, or rename it."
-            )
-    return list(columns)
+    if path.suffix.lower() not in _TABLES or not path.is_file():
+        return []
+    there = list(read_table(path)[0].columns)
+    missing = [column for column in columns if column not in there]
+    if missing:
+        raise InputError(
+            f"Expected the coarse columns {', '.join(columns)[:120]}. Received: {name} without {missing[0]!r} "
+            f"(it has {', '.join(there)[:120]}). Record that column, or rename it."
+        )
+    places = [there.index(column) for column in columns]
+    return [f"{name}: columns in another order than in the fit, matched by their names"] if places != sorted(places) else []
 
 
 def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float, name: str) -> tuple[int, np.ndarray]:

@@ -12,7 +12,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import complete_batch
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
@@ -379,7 +379,7 @@ class EnhancedSimulator:
             InputError: If the folder contains something other than a saved simulator; it is left unchanged.
         """
         settings = {
-            "coarse": self.coarse.get_config(),
+            "coarse": config_of(self.coarse),
             "noise": self.noise.get_config(),
             "interval_s": self.interval_s,
             "offset": self.offset,

@@ -14,7 +14,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
+from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
 from enhsim_tf.keras_tools.backend import keras
@@ -138,6 +138,7 @@ def _build(
 ) -> "EnhancedSimulator":
     """Builds a simulator whose enhancer is untrained and whose noise networks are missing."""
     coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
+    check_coarse(coarse, settings.follow)
     network = enhancer_network.build_enhancer(settings.window, seed=settings.seed)
     offset, scale = level_offset_and_scale(coarse) if settings.normalise else (0.0, 1.0)
     levels = [[0.0, 1.0]] if settings.follow else None  # replaced once the enhancer is trained

@@ -97,5 +97,11 @@ def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str
     coverage = Coverage(OutOfRange.load(folder / "range.npz"), settings["limit"], scaling, window)
     kept = settings["trained"].get("coarse", {})
     coarse = SquareWaveSimulator.from_config(kept["config"]) if kept.get("kind") == "square waves" else None
-    rung = Rung(settings["rung"], networks["enhancer"], scaling)
+    rung = Rung(str(settings["rung"]), networks["enhancer"], scaling)
+    columns = len(nominal.columns)
+    shapes = rung.network.input_shape[1:], rung.network.output_shape[1:], np.shape(scaling.input_scale)
+    if shapes != ((window * columns,), (window,), (columns,)) or not (np.isfinite(coverage.limit) and coverage.limit > 0):
+        raise ValueError("an enhancer of another shape than the settings say")
+    if not all(np.isfinite(part.values).all() for part in parts) or not nominal.interval_s > 0:
+        raise ValueError("a nominal run that no simulator records")
     return RunModel(rung, noise, coverage, nominal, window, settings["delay_s"], coarse, settings["trained"])
