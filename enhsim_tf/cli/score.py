@@ -48,9 +48,14 @@ def run_score(options: argparse.Namespace) -> int:
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
-        frame = score_channel(load(models[channel]), cleaned.parts, chosen)
+        simulator = load(models[channel])
+        frame = score_channel(simulator, cleaned.parts, chosen)
         write_scores(paths[channel], frame)
         tell("\n".join(cleaned.report.lines()))
+        if hasattr(simulator, "nominal"):
+            tell(
+                f"{printable(channel)}: without --coarse, the values are judged, not their difference from an enhanced run of the same time"
+            )
         left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
         scored = len(frame) - left
         tell(
