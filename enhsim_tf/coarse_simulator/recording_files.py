@@ -18,12 +18,13 @@ from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import iso_time
 from enhsim_tf.telemetry.cleaning.times import localize_times
+from enhsim_tf.telemetry.registry import FILES
 from enhsim_tf.telemetry.series import nanoseconds
 from enhsim_tf.telemetry.sources import read_source
 from enhsim_tf.telemetry.tables import read_table
 
 _SAME_RATE = 1e-3  # relative difference of two intervals that count as the same
-_TABLES = (".csv", ".txt", ".tsv", ".parquet")
+_TABLES = tuple(ending for ending, reader in FILES.items() if reader.endswith(":read_table_channels"))
 _QUIET = ("columns left out", "time column", "time zone", "constant", "stuck", "quantised", "changing level", "time unit")
 
 

@@ -23,9 +23,9 @@ from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train_noise
 from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, fit_ladder, fit_rung
 from enhsim_tf.enhancer.overlapping import enhance_run
-from enhsim_tf.enhancer.training_pairs import cut_windows_from_parts, random_window_starts
 from enhsim_tf.noise.resampled import ResampledNoise
 from enhsim_tf.telemetry.series import Telemetry, check_values
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, random_window_starts
 
 _LEAST_WINDOW, _MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
 _WINDOWS_IN_TRAINING = 20  # the default window is this share of the training telemetry

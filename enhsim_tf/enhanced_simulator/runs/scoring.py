@@ -12,8 +12,8 @@ from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
+from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.sources import to_series
 
 if TYPE_CHECKING:
     import pandas as pd
