@@ -15,6 +15,7 @@ _PLACES = {
     "Degraded": "coarse_simulator.degraded",
     "EnhancedSimulator": "enhanced_simulator.simulator",
     "FitOptions": "enhanced_simulator.fit_options",
+    "FmuSimulator": "coarse_simulator.fmu",
     "FunctionSimulator": "coarse_simulator.interface",
     "InputError": "common.errors",
     "NoiseGAN": "noise.gan",

@@ -46,3 +46,16 @@ def test_the_example_with_a_function_runs(folder):
     truth = 20 + 1.2 * made["heater"](made["times"][:2_000], 0.5)[:, 1]
     assert np.sqrt(np.mean((made["copy"] - truth) ** 2)) < 0.5 * truth.std()
     assert made["model"].coarse is made["simulator"]
+
+
+def test_the_example_with_an_fmu_runs(folder):
+    pytest.importorskip("fmpy", reason="the extra fmi is not installed")
+    builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu is not installed")
+    builder.FmuBuilder.build_FMU(Path(__file__).parents[2] / "coarse_simulator" / "heater_fmu.py", dest=folder)
+    command = (np.sin(np.arange(300) / 15) > 0).astype(int)
+    pd.DataFrame({"time": pd.date_range("2024-01-01", periods=300, freq="10s"), "command": command}).to_csv("commands.csv", index=False)
+    made = {}
+    exec(BLOCKS[2], made)
+    nominal, weak = (made[name].parts[0].values for name in ("nominal", "weak"))
+    np.testing.assert_allclose(weak[:, 0], 0.5 * nominal[:, 0])
+    assert nominal[:, 1].max() > weak[:, 1].max() + 5
