@@ -65,6 +65,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500)",
     )
     fit.add_argument(
+        "--enhancer",
+        choices=tuple(name.replace(" ", "-") for name in RUNGS),
+        help="enhancer (default: the simplest that is not measurably worse than the best on held-out time; network is the paper's)",
+    )
+    fit.add_argument(
         "--noise",
         choices=NOISES,
         default="convolutional",
@@ -93,11 +98,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         type=float,
         metavar="SECONDS",
         help="how much later the telemetry is than the coarse run, in samples without times (default: estimated)",
-    )
-    coarse.add_argument(
-        "--enhancer",
-        choices=tuple(name.replace(" ", "-") for name in RUNGS),
-        help="enhancer (default: the simplest that is not measurably worse than the best on held-out time)",
     )
     _add_seed(fit)
 

@@ -18,18 +18,18 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 
     counts = (options.num_windows, options.epochs, options.iterations)
+    enhancer = None if options.enhancer is None else options.enhancer.replace("-", " ")
     if options.coarse is None:
-        refuse_without_coarse(options, "coarse_time", "coarse_column", "delay", "enhancer")
+        refuse_without_coarse(options, "coarse_time", "coarse_column", "delay")
         if options.noise == "resampled":
             raise InputError(
                 "Expected --noise resampled only together with --coarse. Received: no --coarse. Choose convolutional or paper."
             )
-        chosen, run = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed), None
+        chosen, run = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed, enhancer or "best"), None
     else:
         from enhsim_tf.enhanced_simulator.fit_many import CoarseRun
         from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 
-        enhancer = None if options.enhancer is None else options.enhancer.replace("-", " ")
         chosen = RunOptions(options.window, *counts, options.noise, enhancer, options.delay, options.held_out, options.seed)
         run = CoarseRun(options.coarse, options.coarse_column, options.coarse_time)
     from enhsim_tf.common.parallel.engines import parse_workers

@@ -93,6 +93,7 @@ class EnhancedSimulator:
         held_out: float = TrainingSettings.held_out,
         decay: bool = TrainingSettings.decay,
         follow: bool = TrainingSettings.follow,
+        enhancer: str = TrainingSettings.enhancer,
         verbose: int | str = "auto",
         progress: Progress = SILENT,
     ) -> "EnhancedSimulator":
@@ -129,6 +130,8 @@ class EnhancedSimulator:
                 learns from that window. This is for telemetry that drifts away from a fixed simulator. The epochs are
                 split into up to three rounds; from the second round on, windows are aligned using the enhanced waveform.
                 Offsets and gains are stored, and generated windows sample from them.
+            enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than
+                the best one on held-out time; or the name of a rung.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
             progress: Reports the progress of both trainings as lines of text.
 
@@ -151,6 +154,7 @@ class EnhancedSimulator:
             held_out=held_out,
             decay=decay,
             follow=follow,
+            enhancer=enhancer,
         )
         return train(cls, telemetry, coarse, settings, verbose, progress)
 

@@ -131,6 +131,7 @@ def fit_ladder(
     epochs: int = 6,
     refit: str = "all",
     wanted: str | None = None,
+    scaling: Scaling | None = None,
     on_rung: Callable[[str], None] | None = None,
 ) -> Ladder:
     """Judges rungs on held-out time and fits them to all windows.
@@ -147,6 +148,7 @@ def fit_ladder(
         epochs: Passes of the networks over the training windows.
         refit: Which rungs are fitted again to all windows: `all` or `chosen`.
         wanted: Name of a rung to choose whatever the errors are. None: the simplest within one standard error of the best.
+        scaling: Units of the networks. None: the mean and the standard deviation of each column.
         on_rung: Called with the name of each rung before it is judged.
 
     Returns:
@@ -173,13 +175,13 @@ def fit_ladder(
     for name in chosen_rungs:
         if on_rung is not None:
             on_rung(name)
-        before_refit[name] = rung = fit_rung(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs)
+        before_refit[name] = rung = fit_rung(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs, scaling)
         errors = np.mean((rung.predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64)
         squared[name] = np.bincount(stretches, errors) / np.bincount(stretches) / variance
     judged = judge(squared)
     chosen = wanted or next(each.name for each in judged if each.is_within)
     refitted = chosen_rungs if refit == "all" else [chosen]
-    fitted = {name: fit_rung(name, inputs, targets, starts, seed, epochs) for name in refitted}
+    fitted = {name: fit_rung(name, inputs, targets, starts, seed, epochs, scaling) for name in refitted}
     return Ladder(fitted, judged, chosen, int(stretches.max()) + 1, edges, before_refit)
 
 
@@ -205,7 +207,15 @@ def _standard_error(values: np.ndarray) -> float:
     return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
-def fit_rung(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray, seed: int = 0, epochs: int = 6) -> Rung:
+def fit_rung(
+    name: str,
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    starts: np.ndarray,
+    seed: int = 0,
+    epochs: int = 6,
+    scaling: Scaling | None = None,
+) -> Rung:
     """Fits one rung to all of the given windows.
 
     Args:
@@ -215,12 +225,13 @@ def fit_rung(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.ndar
         starts: First sample of each window, shape `(windows,)`.
         seed: Random seed of the networks.
         epochs: Passes of the networks over the windows.
+        scaling: Units of the networks. None: the mean and the standard deviation of each column.
 
     Returns:
         The fitted rung.
     """
     inputs, targets, starts = check_windows(inputs, targets, starts)
-    scaling = Scaling.fit(inputs, targets)
+    scaling = Scaling.fit(inputs, targets) if scaling is None else scaling
     rows, wanted = scaling.scale_inputs(inputs), scaling.scale_target(targets)
     window, columns = inputs.shape[1:]
     if name in (COARSE, LEVEL_AND_GAIN):

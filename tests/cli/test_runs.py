@@ -207,7 +207,7 @@ def test_a_failed_fit_is_one_line_and_exit_code_2(world, tmp_path, capsys):
     ("arguments", "words"),
     [
         (["fit", "telemetry.csv", "--delay", "3"], ["--delay", "--coarse"]),
-        (["fit", "telemetry.csv", "--enhancer", "ridge"], ["--enhancer", "--coarse"]),
+        (["fit", "telemetry.csv", "--enhancer", "level-and-gain"], ["enhancer", "ridge and network"]),
         (["fit", "telemetry.csv", "--noise", "resampled"], ["resampled", "--coarse"]),
         (["generate", "models", "--copies", "3", "--windows", "2"], ["--copies", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--windows", "2"], ["--windows", "--coarse"]),
