@@ -8,6 +8,7 @@ from enhsim_tf.common.console import Parser
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.registry import option_name
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
+from enhsim_tf.enhanced_simulator.runs.options import NOISES, RUNGS
 from enhsim_tf.telemetry.registry import SOURCES
 
 EXAMPLES = """\
@@ -15,6 +16,10 @@ from telemetry to scores:
   python -m enhsim_tf fit telemetry.csv --out models
   python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   python -m enhsim_tf score models new.csv --out scores.parquet
+
+with a simulator of your own, which recorded simulator.csv beside the telemetry (docs/own_simulator.md):
+  python -m enhsim_tf fit telemetry.csv --coarse simulator.csv --out models
+  python -m enhsim_tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
 python -m enhsim_tf fit --help shows the options of fit; generate, verify and score have help texts too. The reproduction of the
 paper is a separate command: python -m enhsim_tf.reproduce.
@@ -60,10 +65,15 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500)",
     )
     fit.add_argument(
+        "--enhancer",
+        choices=tuple(name.replace(" ", "-") for name in RUNGS),
+        help="enhancer (default: the simplest that is not measurably worse than the best on held-out time; network is the paper's)",
+    )
+    fit.add_argument(
         "--noise",
-        choices=("convolutional", "paper"),
+        choices=NOISES,
         default="convolutional",
-        help="networks that generate the noise (default: %(default)s)",
+        help="what generates the noise (default: %(default)s); resampled, only with --coarse, draws residual windows again",
     )
     fit.add_argument(
         "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"
@@ -77,6 +87,17 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         choices=("local", "ray"),
         default="local",
         help="run workers on this machine (default) or with Ray (docs/large_data_sets.md)",
+    )
+    coarse = fit.add_argument_group("your own simulator", "a recorded run of it, at the time of the telemetry (docs/own_simulator.md)")
+    _add_coarse(coarse)
+    coarse.add_argument(
+        "--coarse-column", action="append", metavar="NAME", help="only this coarse column; may be repeated (default: all numeric columns)"
+    )
+    coarse.add_argument(
+        "--delay",
+        type=float,
+        metavar="SECONDS",
+        help="how much later the telemetry is than the coarse run, in samples without times (default: estimated)",
     )
     _add_seed(fit)
 
@@ -106,6 +127,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
     generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
     generate.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet file, or a folder for several channels")
+    coarse = generate.add_argument_group("your own simulator", "for models that were fitted with --coarse (docs/own_simulator.md)")
+    _add_coarse(coarse)
+    coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with another draw of noise (default: 1)")
+    _add_cleaning(coarse)
     large = generate.add_argument_group(
         "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
     )
@@ -138,6 +163,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     score.add_argument(
         "--false-alarm-rate", type=float, default=0.01, metavar="SHARE", help="share of generated nominal samples to flag (default: 0.01)"
     )
+    coarse = score.add_argument_group("your own simulator", "judges the difference between the telemetry and the enhanced run")
+    _add_coarse(coarse)
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(score)
     return parser.parse_args(arguments)
@@ -154,6 +181,15 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--time", metavar="NAME", help="the time column (default: detected; none: time is the sample number)")
     parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the most frequent one)")
+    _add_cleaning(parser)
+
+
+def _add_coarse(parser: argparse._ArgumentGroup) -> None:
+    parser.add_argument("--coarse", metavar="SOURCE", help="recorded run of the simulator: " + SOURCES)
+    parser.add_argument("--coarse-time", metavar="NAME", help="the time column of that run (default: detected)")
+
+
+def _add_cleaning(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     parser.add_argument("--timezone", metavar="ZONE", help="time zone of times that name none, such as Europe/Berlin (default: UTC)")
     parser.add_argument("--max-fill", type=int, default=5, metavar="N", help="longest gap that is interpolated (default: 5 samples)")
     parser.add_argument("--drop-bad", action="store_true", help="drop and count values and times that cannot be read, instead of stopping")

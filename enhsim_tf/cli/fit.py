@@ -4,7 +4,9 @@ import argparse
 import sys
 
 from enhsim_tf.cli.options import cleaning_options, tell_failed
+from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
+from enhsim_tf.common.errors import InputError
 
 
 def run_fit(options: argparse.Namespace) -> int:
@@ -16,7 +18,20 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 
     counts = (options.num_windows, options.epochs, options.iterations)
-    chosen = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed)
+    enhancer = None if options.enhancer is None else options.enhancer.replace("-", " ")
+    if options.coarse is None:
+        refuse_without_coarse(options, "coarse_time", "coarse_column", "delay")
+        if options.noise == "resampled":
+            raise InputError(
+                "Expected --noise resampled only together with --coarse. Received: no --coarse. Choose convolutional or paper."
+            )
+        chosen, run = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed, enhancer or "best"), None
+    else:
+        from enhsim_tf.enhanced_simulator.fit_many import CoarseRun
+        from enhsim_tf.enhanced_simulator.runs.options import RunOptions
+
+        chosen = RunOptions(options.window, *counts, options.noise, enhancer, options.delay, options.held_out, options.seed)
+        run = CoarseRun(options.coarse, options.coarse_column, options.coarse_time)
     from enhsim_tf.common.parallel.engines import parse_workers
 
     workers = parse_workers(options.workers)
@@ -26,5 +41,7 @@ def run_fit(options: argparse.Namespace) -> int:
     cleaning = cleaning_options(options, options.window or 64)
     series = read_source(options.source, options.column, options.time, cleaning)
     is_terminal = sys.stdout.isatty()
-    failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, speaks=not is_terminal)
+    failed = fit_channels(
+        series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, speaks=not is_terminal, run=run
+    )
     return tell_failed(failed)

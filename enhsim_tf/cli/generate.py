@@ -3,6 +3,7 @@
 import argparse
 
 from enhsim_tf.cli.options import counted, for_each, load, output_paths
+from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -13,6 +14,11 @@ def run_generate(options: argparse.Namespace) -> int:
     Args:
         options: Parsed options of `generate`.
     """
+    if options.coarse is not None:
+        from enhsim_tf.cli.runs import generate_copies
+
+        return generate_copies(options)
+    refuse_without_coarse(options, "coarse_time", "copies", "timezone")
     if options.nominal_share is not None and not options.scenarios and (options.continuous is not None or not options.scenario):
         raise InputError(
             "Expected --nominal-share only together with --windows and --scenario. Received: --nominal-share without them. Leave it out."

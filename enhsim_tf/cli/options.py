@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from enhsim_tf.common.errors import InputError, printable
 
 if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.runs.model import RunModel
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
@@ -62,7 +63,7 @@ def cleaning_options(options: argparse.Namespace, min_part: int) -> "Cleaning":
 
     bad = "drop" if options.drop_bad else "refuse"
     return Cleaning(
-        interval_s=options.interval,
+        interval_s=getattr(options, "interval", None),
         timezone=options.timezone,
         on_bad_times=bad,
         on_bad_values=bad,
@@ -101,8 +102,14 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     return paths
 
 
-def load(folder: Path) -> "EnhancedSimulator":
-    """Loads the simulator saved in a folder; TensorFlow is imported only here."""
+def load(folder: Path) -> "EnhancedSimulator | RunModel":
+    """Loads the simulator or run model saved in a folder; TensorFlow is imported only here."""
+    from enhsim_tf.enhanced_simulator.saving import is_run_model
+
+    if is_run_model(folder):
+        from enhsim_tf.enhanced_simulator.runs.model import RunModel
+
+        return RunModel.load(folder)
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
     return EnhancedSimulator.load(folder)

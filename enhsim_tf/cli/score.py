@@ -4,6 +4,7 @@ import argparse
 import os
 
 from enhsim_tf.cli.options import cleaning_options, counted, for_each, load, output_paths
+from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -39,11 +40,22 @@ def run_score(options: argparse.Namespace) -> int:
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
             raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
 
+    if options.coarse is not None:
+        from enhsim_tf.cli.runs import score_runs
+
+        return score_runs(options, series, models, paths, chosen, cleaning)
+    refuse_without_coarse(options, "coarse_time")
+
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
-        frame = score_channel(load(models[channel]), cleaned.parts, chosen)
+        simulator = load(models[channel])
+        frame = score_channel(simulator, cleaned.parts, chosen)
         write_scores(paths[channel], frame)
         tell("\n".join(cleaned.report.lines()))
+        if hasattr(simulator, "nominal"):
+            tell(
+                f"{printable(channel)}: without --coarse, the values are judged, not their difference from an enhanced run of the same time"
+            )
         left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
         scored = len(frame) - left
         tell(

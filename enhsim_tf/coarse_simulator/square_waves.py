@@ -74,6 +74,8 @@ class SquareWaveSimulator:
     (1, 500)
     """
 
+    columns = ("square waves",)
+
     def __init__(self, waves: Sequence[SquareWave]):
         if not waves:
             raise InputError("Expected at least one SquareWave. Received: waves=[].")
@@ -106,6 +108,10 @@ class SquareWaveSimulator:
         """
         rng = np.random.default_rng(0) if rng is None else rng
         return degrade(self, np.asarray(time_s, np.float64), scenario, self.levels, self.shortest_period_s, rng).astype(np.float32)
+
+    def run(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Simulates one run, see `interface.CoarseSimulator.run`; returns a float32 array of shape `(samples, 1)`."""
+        return self.simulate(np.asarray(time_s, np.float64)[None], scenario, rng)[0][:, None]
 
     @classmethod
     def fit(cls, telemetry: Telemetry, max_waves: int = 1, min_explained: float = 0.05, num_levels: int = 2) -> "SquareWaveSimulator":

@@ -45,3 +45,39 @@ def check_parts(telemetry: Telemetry | Sequence[Telemetry]) -> list[Telemetry]:
     if len(intervals) != 1:
         raise InputError(f"Expected all parts to have the same sampling interval. Received: {sorted(intervals)}.")
     return parts
+
+
+def check_coarse(coarse: Any, follow: bool) -> None:
+    """Checks that a coarse simulator has what `EnhancedSimulator` needs. Simulators of other kinds get a run model.
+
+    Args:
+        coarse: The coarse simulator.
+        follow: Whether it is aligned with each window of telemetry.
+
+    Raises:
+        InputError: If it lacks a method.
+    """
+    needed = ("simulate", "levels", *(("synchronise",) if follow else ()))
+    missing = [name for name in needed if not hasattr(coarse, name)]
+    if missing:
+        raise InputError(
+            f"Expected square waves, or a simulator with `{missing[0]}`. Received: {type(coarse).__name__}. "
+            "Fit another simulator with fit_run_model, which needs only `columns` and `run`."
+        )
+
+
+def config_of(coarse: Any) -> dict[str, Any]:
+    """Returns the configuration of a coarse simulator for saving.
+
+    Args:
+        coarse: The coarse simulator.
+
+    Raises:
+        InputError: If it has no configuration, as a user's own class.
+    """
+    if not hasattr(coarse, "get_config"):
+        raise InputError(
+            f"Expected square waves, which can be saved. Received: {type(coarse).__name__}, whose code is not saved. "
+            "Fit it with fit_run_model, whose models can be saved without it."
+        )
+    return coarse.get_config()

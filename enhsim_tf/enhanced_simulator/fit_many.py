@@ -1,7 +1,7 @@
 """Fits simulators to many channels in parallel worker processes.
 
 Each channel gets a folder of its own, for example `MODEL_DIR/volts/`. It contains the files of `EnhancedSimulator.save`,
-`report.json` and `report.png`.
+`report.json` and `report.png`. With a recorded run of a coarse simulator, each channel gets a run model instead.
 """
 
 import contextlib
@@ -19,6 +19,7 @@ from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError, num_cpus
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.model_folder import folder_of, refuse_foreign
+from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 
@@ -26,6 +27,21 @@ if TYPE_CHECKING:
     import pandas as pd
 
 THREADS = 2  # per channel; fixed, because the rounding of sums depends on the number of threads and must not depend on the workers
+
+
+@dataclasses.dataclass(frozen=True)
+class CoarseRun:
+    """Where the recorded run of a coarse simulator is.
+
+    Args:
+        source: A source of telemetry, see `sources.read_source`.
+        columns: Names of the columns that are inputs; None: all numeric columns.
+        time: Name of the time column; None: it is detected.
+    """
+
+    source: str
+    columns: Sequence[str] | None = None
+    time: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,27 +56,30 @@ class Job:
         cleaning: Settings of the cleaning.
         verbose: Whether to show progress bars.
         speaks: Whether to print lines of progress that begin with the channel's name.
+        run: The recorded run of a coarse simulator, for a run model; None for a simulator of square waves.
     """
 
     channel: str
     series: "pd.Series"
     folder: Path
-    options: FitOptions
+    options: FitOptions | RunOptions
     cleaning: Cleaning
     verbose: bool = False
     speaks: bool = False
+    run: CoarseRun | None = None
 
 
 def fit_channels(
     series: Mapping[str, "pd.Series"],
     out: str | os.PathLike,
-    options: FitOptions,
+    options: FitOptions | RunOptions,
     cleaning: Cleaning,
     workers: int | None,
     tell: Callable[[str], None],
     verbose: bool = False,
     engine: str = "local",
     speaks: bool = False,
+    run: CoarseRun | None = None,
 ) -> dict[str, str]:
     """Fits a simulator to each channel, saves it together with its report, and prints the report.
 
@@ -75,6 +94,7 @@ def fit_channels(
         verbose: Whether to show progress bars; they are shown only when channels are fitted one at a time.
         engine: How worker processes are run: `local` or `ray`. The engine does not change the results.
         speaks: Whether each local worker prints a line of progress about every fifteen seconds.
+        run: The recorded run of a coarse simulator, for run models; None for simulators of square waves.
 
     Returns:
         A dictionary from the name of each channel that could not be fitted to the reason.
@@ -91,7 +111,8 @@ def fit_channels(
     verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
     here = Path(os.path.abspath(out))
     jobs = [
-        Job(name, each, folder_of(here, name), options, cleaning, verbose, speaks and engine == "local") for name, each in series.items()
+        Job(name, each, folder_of(here, name), options, cleaning, verbose, speaks and engine == "local", run)
+        for name, each in series.items()
     ]
     for job in jobs:
         refuse_foreign(job.folder)
@@ -196,16 +217,28 @@ def fit_job(job: Job) -> list[str]:
     """
     progress = Progress(_tell_if_heard, f"{printable(job.channel)}: ") if job.speaks else SILENT
     cleaned = clean(job.series, job.cleaning)
-    from enhsim_tf.enhanced_simulator.fitting import fit_channel
-    from enhsim_tf.enhanced_simulator.report_figure import channel_figure
-
     parts = [dataclasses.replace(part, name=job.channel) for part in cleaned.parts]
-    simulator, report = fit_channel(parts, job.options, "auto" if job.verbose else 0, progress)
+    verbose = "auto" if job.verbose else 0
+    if job.run is None:
+        from enhsim_tf.enhanced_simulator.fitting import fit_channel
+        from enhsim_tf.enhanced_simulator.report_figure import channel_figure
+
+        simulator, report = fit_channel(parts, job.options, verbose, progress)
+        figure = channel_figure(report)
+    else:
+        from enhsim_tf.coarse_simulator.recording_files import read_recording
+        from enhsim_tf.enhanced_simulator.runs.figure import run_figure
+        from enhsim_tf.enhanced_simulator.runs.fitting import fit_run_model
+
+        cleaning = dataclasses.replace(job.cleaning, min_part=2)
+        run = read_recording(job.run.source, job.run.columns, job.run.time, cleaning, parts[0].interval_s if parts[0].has_time else None)
+        simulator, report = fit_run_model(parts, run, job.options, verbose, progress)
+        figure = run_figure(report)
     refuse_foreign(job.folder)  # checked again, because the fit took minutes
     with replace_folder(job.folder) as temporary:
         simulator.save(temporary)
         write_json(temporary / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
-        channel_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
+        figure.savefig(temporary / "report.png", dpi=200, format="png")
     return [*cleaned.report.lines(), *report.lines()]
 
 

@@ -4,6 +4,7 @@ import dataclasses
 
 from enhsim_tf.common.errors import InputError
 
+ENHANCERS = ("coarse", "ridge", "ridge and network", "network")  # rungs of `enhancer.ladder` for windows at their own level and gain
 FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
 
 
@@ -20,6 +21,8 @@ class FitOptions:
         held_out: Share of the telemetry, taken from its end, that is reserved for the report. 0 trains and reports on all
             telemetry.
         seed: Random seed of training and report.
+        enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than the
+            best one on held-out time, which the command `fit` uses; or one of `ENHANCERS`.
 
     Raises:
         InputError: If a value is out of range.
@@ -32,10 +35,13 @@ class FitOptions:
     noise: str = "convolutional"
     held_out: float = 0.2
     seed: int = 0
+    enhancer: str = "network"
 
     def __post_init__(self):
         if not 0 <= self.held_out <= 0.5:
             raise InputError(f"Expected held_out from 0 to 0.5. Received: held_out={self.held_out}.")
+        if self.enhancer not in (*ENHANCERS, "best"):
+            raise InputError(f"Expected enhancer, one of: best, {', '.join(ENHANCERS)}. Received: enhancer={self.enhancer!r}.")
         if self.window is not None and self.window < FEWEST_SAMPLES:
             raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
         for name, least in (("num_windows", 1), ("epochs", 1), ("num_iterations", 0)):

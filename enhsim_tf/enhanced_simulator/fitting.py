@@ -98,6 +98,7 @@ def fit_simulator(
         held_out=0.0,
         decay=True,
         follow=True,
+        enhancer=options.enhancer,
         verbose=verbose,
         progress=progress,
     )

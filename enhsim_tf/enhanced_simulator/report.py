@@ -41,6 +41,8 @@ class ChannelReport:
         unit: Unit of the values.
         time_unit: Unit of the period: `s` or `samples`.
         levels: For quantised telemetry, the `count` of its levels and the `step` between them; otherwise empty.
+        ladder: For each enhancer that was judged on held-out time, its `name`, `error`, `standard_error`, `is_within` (one
+            standard error of the best) and `is_chosen`. Empty if the paper's network was used without a choice.
     """
 
     channel: str
@@ -59,12 +61,18 @@ class ChannelReport:
     unit: str = "1"
     time_unit: str = "s"
     levels: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    ladder: Sequence[Mapping[str, Any]] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all fields except the examples, and the verdict, in plain JSON types."""
         plain = {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "examples"}
         nrmse = {name: None if np.isnan(error) else error for name, error in self.nrmse.items()}  # NaN is not valid JSON
-        return plain | {"nrmse": nrmse, "noise": [dict(row) for row in self.noise], "verdict": self.verdict}
+        return plain | {
+            "nrmse": nrmse,
+            "noise": [dict(row) for row in self.noise],
+            "ladder": [dict(each) for each in self.ladder],
+            "verdict": self.verdict,
+        }
 
     @property
     def usable(self) -> list[str]:
@@ -81,13 +89,22 @@ class ChannelReport:
     @property
     def verdict(self) -> list[str]:
         """Sentences on the accuracy of the simulator, and on which anomalies a detector trained on its output finds."""
-        said = [self._of_the_signal(), self._of_the_noise(), self._of_false_alarms(), self._of_anomalies()]
+        said = [*self._of_the_enhancers(), self._of_the_signal(), self._of_the_noise(), self._of_false_alarms(), self._of_anomalies()]
         if self.levels:
             said.append(
                 f"Levels: the telemetry has {self.levels['count']:,.0f} values, {self.levels['step']:.4g} apart; generated values are not "
                 "rounded to them, which a detector can tell. Round them to that step before training."
             )
         return said
+
+    def _of_the_enhancers(self) -> list[str]:
+        if not self.ladder:
+            return []
+        errors = _listed([f"{each['name']} {each['error']:.3f} ± {each['standard_error']:.3f}" for each in self.ladder])
+        (chosen,) = [each["name"] for each in self.ladder if each["is_chosen"]]
+        return [
+            f"Enhancers: error on held-out blocks of the training time (NRMSE), aligned with ridge regression: {errors}. Used: {chosen}."
+        ]
 
     def _of_the_signal(self) -> str:
         errors = self.nrmse

@@ -92,6 +92,7 @@ def report_on(
         learnt[0].unit,
         learnt[0].time_unit,
         levels_of(np.concatenate([part.values for part in learnt])),
+        simulator.trained.get("ladder", ()),
     )
 
 

@@ -1,4 +1,8 @@
-"""Saves and loads a trained simulator: three `.keras` files, `settings.json`, and `manifest.json` with their checksums."""
+"""Saves and loads trained models: `.keras` files, arrays, `settings.json`, and `manifest.json` with their checksums.
+
+There are two formats. A simulator of square waves consists of three networks. A run model (`runs`) consists of its enhancer, its
+noise as two networks or as an array, the nominal run and the range of the training runs.
+"""
 
 import os
 import warnings
@@ -18,16 +22,32 @@ MANIFEST, SETTINGS = "manifest.json", "settings.json"
 MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
 _OURS = b'"enhsim_tf.EnhancedSimulator/'  # near the beginning of every manifest, in all versions of the format
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
-_NETWORKS = ("enhancer", "generator", "discriminator")
+RUNS_FORMAT = "enhsim_tf.EnhancedSimulator/runs-1"
+_NETWORKS = ("enhancer.keras", "generator.keras", "discriminator.keras")
+_FILES = {  # the possible files of each format, beside the settings
+    _FORMAT: (set(_NETWORKS),),
+    RUNS_FORMAT: (
+        {"enhancer.keras", "range.npz", "nominal.npz", "generator.keras", "discriminator.keras"},
+        {"enhancer.keras", "range.npz", "nominal.npz", "noise.npz"},
+    ),
+}
 
 
-def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"], settings: Mapping[str, Any]) -> None:
-    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged.
+def write_saved(
+    folder: str | os.PathLike,
+    networks: Mapping[str, "keras.Model"],
+    settings: Mapping[str, Any],
+    others: Mapping[str, Callable[[Path], None]] | None = None,
+    form: str = _FORMAT,
+) -> None:
+    """Writes a model to a folder atomically: if a step fails, the folder is left unchanged.
 
     Args:
-        folder: The folder. A simulator that was saved there before is replaced.
-        networks: The networks `enhancer`, `generator` and `discriminator`.
+        folder: The folder. A model that was saved there before is replaced.
+        networks: The networks by name: `enhancer`, `generator` and `discriminator`.
         settings: All other settings, in plain JSON types.
+        others: Further files by name, each with the function that writes it.
+        form: The format.
 
     Raises:
         InputError: If the folder contains something other than a saved simulator; it is left unchanged.
@@ -36,11 +56,13 @@ def write_saved(folder: str | os.PathLike, networks: Mapping[str, "keras.Model"]
     if is_foreign(folder):
         raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which contains something else.")
     with replace_folder(folder) as temporary:
-        for name in _NETWORKS:
-            networks[name].save(temporary / f"{name}.keras", include_optimizer=False)
+        for name, network in networks.items():
+            network.save(temporary / f"{name}.keras", include_optimizer=False)
+        for name, write in (others or {}).items():
+            write(temporary / name)
         write_json(temporary / SETTINGS, settings)
         checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
-        write_json(temporary / MANIFEST, {"format": _FORMAT, "sha256": checksums})
+        write_json(temporary / MANIFEST, {"format": form, "sha256": checksums})
 
 
 def is_foreign(folder: Path) -> bool:
@@ -56,20 +78,32 @@ def _beginning_of(path: Path) -> bytes:
         return file.read(1_000)
 
 
-def check_saved(folder: str | os.PathLike) -> None:
-    """Verifies the checksums of a saved simulator without loading its networks.
+def is_run_model(folder: str | os.PathLike) -> bool:
+    """Whether a folder holds a run model, by the format in its manifest."""
+    return _json_of(Path(folder), MANIFEST).get("format") == RUNS_FORMAT
+
+
+def check_saved(folder: str | os.PathLike, form: str = _FORMAT) -> None:
+    """Verifies the checksums of a saved model without loading its networks.
 
     Args:
         folder: The folder.
+        form: The expected format.
 
     Raises:
         InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
     """
     folder = Path(folder)
     manifest = _json_of(folder, MANIFEST)
-    if manifest.get("format") != _FORMAT or set(manifest) != {"format", "sha256"} or not _is_complete(manifest["sha256"]):
+    if manifest.get("format") in _FILES and manifest["format"] != form:
+        kinds = {
+            _FORMAT: "a simulator of square waves, for --windows or --continuous",
+            RUNS_FORMAT: "a model of recorded runs, for --coarse",
+        }
+        raise InputError(f"Expected {kinds[form]}. Received: {folder}, which is {kinds[manifest['format']]}. Give the other kind of model.")
+    if manifest.get("format") != form or set(manifest) != {"format", "sha256"} or not _is_complete(manifest["sha256"], form):
         raise InputError(
-            f"Expected the format {_FORMAT}. Received: {str(manifest.get('format'))[:80]!r} in {folder}. Save the simulator with this version."
+            f"Expected the format {form}. Received: {str(manifest.get('format'))[:80]!r} in {folder}. Save the simulator with this version."
         )
     for name, expected in manifest["sha256"].items():
         if not (folder / name).is_file() or sha256(folder / name) != expected:
@@ -78,8 +112,8 @@ def check_saved(folder: str | os.PathLike) -> None:
             )
 
 
-def _is_complete(checksums: Any) -> bool:
-    return isinstance(checksums, dict) and set(checksums) == {SETTINGS, *(f"{name}.keras" for name in _NETWORKS)}
+def _is_complete(checksums: Any, form: str) -> bool:
+    return isinstance(checksums, dict) and any(set(checksums) == {SETTINGS, *files} for files in _FILES[form])
 
 
 def settings_of(folder: str | os.PathLike) -> dict[str, Any]:
@@ -106,12 +140,15 @@ def _json_of(folder: Path, name: str) -> dict[str, Any]:
     return content
 
 
-def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Model"], Mapping[str, Any]], Any]) -> Any:
-    """Loads a saved simulator, in Keras' safe mode.
+def read_saved(
+    folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Model"], Mapping[str, Any]], Any], form: str = _FORMAT
+) -> Any:
+    """Loads a saved model, in Keras' safe mode.
 
     Args:
         folder: A folder written by `write_saved`.
-        make: Function that creates the simulator from the networks and the settings.
+        make: Function that creates the model from the networks and the settings.
+        form: The expected format.
 
     Returns:
         The simulator, as returned by `make`.
@@ -122,14 +159,15 @@ def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Mo
     from enhsim_tf.keras_tools.backend import keras, tf  # imported here, because checking a folder does not need TensorFlow
 
     folder = Path(folder)
-    check_saved(folder)
+    check_saved(folder, form)
     settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
     try:
-        for name in _NETWORKS:
-            check_network(folder / f"{name}.keras")
+        saved = [folder / name for name in _NETWORKS if (folder / name).is_file()]
+        for path in saved:
+            check_network(path)
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)  # Keras only warns about layers without weights in the file
-            networks = {name: keras.saving.load_model(folder / f"{name}.keras", compile=False, safe_mode=True) for name in _NETWORKS}
+            networks = {path.stem: keras.saving.load_model(path, compile=False, safe_mode=True) for path in saved}
         if sha256(folder / MANIFEST) != as_checked:  # another process replaced the simulator, so the networks may be mixed
             raise ValueError("the simulator was replaced while it was read; try again")
         return make(networks, settings)

@@ -12,7 +12,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import complete_batch
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
@@ -93,6 +93,7 @@ class EnhancedSimulator:
         held_out: float = TrainingSettings.held_out,
         decay: bool = TrainingSettings.decay,
         follow: bool = TrainingSettings.follow,
+        enhancer: str = TrainingSettings.enhancer,
         verbose: int | str = "auto",
         progress: Progress = SILENT,
     ) -> "EnhancedSimulator":
@@ -129,6 +130,8 @@ class EnhancedSimulator:
                 learns from that window. This is for telemetry that drifts away from a fixed simulator. The epochs are
                 split into up to three rounds; from the second round on, windows are aligned using the enhanced waveform.
                 Offsets and gains are stored, and generated windows sample from them.
+            enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than
+                the best one on held-out time; or the name of a rung.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
             progress: Reports the progress of both trainings as lines of text.
 
@@ -151,6 +154,7 @@ class EnhancedSimulator:
             held_out=held_out,
             decay=decay,
             follow=follow,
+            enhancer=enhancer,
         )
         return train(cls, telemetry, coarse, settings, verbose, progress)
 
@@ -379,7 +383,7 @@ class EnhancedSimulator:
             InputError: If the folder contains something other than a saved simulator; it is left unchanged.
         """
         settings = {
-            "coarse": self.coarse.get_config(),
+            "coarse": config_of(self.coarse),
             "noise": self.noise.get_config(),
             "interval_s": self.interval_s,
             "offset": self.offset,

@@ -14,7 +14,8 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
+from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts
+from enhsim_tf.enhanced_simulator.choosing import choose_enhancer
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
 from enhsim_tf.keras_tools.backend import keras
@@ -57,6 +58,8 @@ class TrainingSettings:
         decay: Whether the enhancer's learning rate falls to zero along a cosine; False keeps it constant, as in the paper.
         follow: Whether the coarse simulator is aligned in time, offset and gain with each window before the enhancer
             learns from that window. This is for telemetry that drifts away from a fixed simulator.
+        enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than the
+            best one on held-out time; or the name of a rung.
 
     Raises:
         InputError: If a count is too small, a choice is unknown or `held_out` is out of range.
@@ -74,6 +77,7 @@ class TrainingSettings:
     held_out: float = 0.0
     decay: bool = True
     follow: bool = False
+    enhancer: str = "network"
 
     def __post_init__(self):
         check_counts(
@@ -117,11 +121,17 @@ def train(
     averaged = [] if by_enhancer else _subtract_moving_average(parts, settings)  # before training, so that a wrong width fails early
     simulator = _build(create, parts, coarse, settings)
     learnt, rest = split_end(parts, settings.held_out if by_enhancer else 0.0)
-    _train_enhancer(simulator, learnt, settings, verbose, progress)
+    ladder = None
+    if settings.enhancer == "network":
+        _train_enhancer(simulator, learnt, settings, verbose, progress)
+    else:
+        ladder = choose_enhancer(simulator, learnt, settings)
     if settings.follow:
         seen = simulator.pairs(parts, evenly_spaced_starts(parts, settings.window, _NUM_LEVELS)).drop_flat()
         simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
     simulator.trained = _training_record(parts[0].name, len(values), settings)
+    if ladder is not None:
+        simulator.trained |= {"enhancer": settings.enhancer, "ladder": ladder}
     rng = np.random.default_rng([settings.seed, 1])
     if by_enhancer:
         noise_windows = simulator.residual_windows(rest, settings.num_windows, rng)
@@ -129,7 +139,7 @@ def train(
         noise_windows, _ = cut_windows_from_parts(
             averaged, random_window_starts(averaged, settings.window, settings.num_windows, rng), settings.window
         )
-    simulator.noise = _train_noise(noise_windows, settings, verbose, progress)
+    simulator.noise = train_noise(noise_windows, settings, verbose, progress)
     return simulator
 
 
@@ -138,6 +148,7 @@ def _build(
 ) -> "EnhancedSimulator":
     """Builds a simulator whose enhancer is untrained and whose noise networks are missing."""
     coarse = SquareWaveSimulator.fit(max(parts, key=len)) if coarse is None else coarse
+    check_coarse(coarse, settings.follow)
     network = enhancer_network.build_enhancer(settings.window, seed=settings.seed)
     offset, scale = level_offset_and_scale(coarse) if settings.normalise else (0.0, 1.0)
     levels = [[0.0, 1.0]] if settings.follow else None  # replaced once the enhancer is trained
@@ -177,7 +188,7 @@ def _train_round(
     fit_windows(simulator.enhancer, source, target, epochs, _BATCH_SIZE, seed, rate, callbacks=callbacks, verbose=verbose)
 
 
-def _train_noise(noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseGAN:
+def train_noise(noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseGAN:
     """Builds the noise networks and trains them on windows of extracted noise, shape `(windows, samples)`."""
     if settings.noise == "convolutional":
         gan = convolutional_noise_gan(noise_windows, settings.num_iterations, settings.seed)
@@ -205,5 +216,5 @@ def _subtract_moving_average(parts: Sequence[Telemetry], settings: TrainingSetti
 
 def _training_record(name: str, num_samples: int, settings: TrainingSettings) -> dict[str, object]:
     """Returns what is saved with the model about its training. The networks and their units show the window and `normalise`."""
-    chosen = {key: value for key, value in dataclasses.asdict(settings).items() if key not in ("window", "normalise")}
+    chosen = {key: value for key, value in dataclasses.asdict(settings).items() if key not in ("window", "normalise", "enhancer")}
     return {"telemetry": name, "num_samples": num_samples} | chosen

@@ -1,0 +1,120 @@
+"""Coarse simulators from other tools by the Functional Mock-up Interface (FMI); needs the optional extra `fmi` (FMPy).
+
+An FMU contains compiled code of the tool that exported it, which runs in this process: use only FMUs that you trust.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.interface import check_columns
+from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.common.errors import InputError
+
+
+class FmuSimulator:
+    """A coarse simulator that runs an FMU. A scenario sets parameters of the FMU to other values.
+
+    Args:
+        path: The `.fmu` file.
+        columns: Names of the variables that are recorded.
+        parameters: Values of parameters in nominal operation. Others keep the values of the FMU.
+        commands: A recorded run of inputs, whose columns have the names of input variables, on the clock of the simulation.
+            The values are held from one sample to the next. None: inputs keep their start values.
+
+    Raises:
+        InputError: If FMPy is missing, the file is no FMU, or a variable does not exist.
+
+    Example:
+    >>> simulator = FmuSimulator("heater.fmu", ["power", "celsius"], commands=read_recording("commands.csv", ["command"]))
+    >>> weak = record(simulator, 10.0 * np.arange(1_000), scenario={"efficiency": 0.5})
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike,
+        columns: Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+        commands: Recording | None = None,
+    ):
+        self.path, self.columns, self.name = Path(path), check_columns(columns), Path(path).name
+        self.parameters, self.commands = dict(parameters or {}), commands
+        try:
+            import fmpy
+        except ImportError:
+            raise InputError("Expected FMPy for an FMU. Received: no such package. Install it: pip install 'enhsim_tf[fmi]'.") from None
+        try:
+            description = fmpy.read_model_description(str(path))
+        except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions, and those of zip and XML
+            reason = (str(error).splitlines() or [type(error).__name__])[0][:120]
+            raise InputError(f"Expected an FMU. Received: {self.name}, which cannot be read ({reason}). Export it again.") from None
+        self._variables = {variable.name: variable.causality for variable in description.modelVariables}
+        self._check_names(self.columns, "output", None)
+        self._check_names(self.parameters, "parameter", "parameter")
+        self._check_names(() if commands is None else commands.columns, "input", "input")
+
+    def run(self, time_s: np.ndarray, scenario: Mapping[str, float] | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Simulates one run from the first to the last time, see `interface.CoarseSimulator.run`.
+
+        Args:
+            time_s: Times in seconds at a regular interval, shape `(samples,)`.
+            scenario: Values of parameters that differ from nominal operation, by name.
+            rng: Not used.
+
+        Returns:
+            float64 array of shape `(samples, columns)`.
+
+        Raises:
+            InputError: If a parameter does not exist, the commands do not cover the times, or the simulation fails.
+        """
+        import fmpy
+
+        if scenario is not None and not isinstance(scenario, Mapping):
+            raise InputError(
+                f"Expected a scenario as a dictionary of parameters. Received: {str(scenario)[:80]!r}. Write {{'name': value}}."
+            )
+        self._check_names(scenario or {}, "parameter", "parameter")
+        time_s = np.asarray(time_s, np.float64)
+        step_s = float(np.mean(np.diff(time_s)))
+        try:
+            found = fmpy.simulate_fmu(
+                str(self.path),
+                start_time=time_s[0],
+                stop_time=time_s[-1],
+                output_interval=step_s,
+                start_values=self.parameters | dict(scenario or {}),
+                input=self._inputs(time_s),
+                output=list(self.columns),
+            )
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions for whatever goes wrong in the tool's code
+            reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
+            raise InputError(
+                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {reason}. Correct the model."
+            ) from None
+        places = np.searchsorted(found["time"], time_s + 1e-6 * step_s, "right") - 1  # an FMU may report events in between
+        if len(found) < 2 or np.abs(found["time"][places] - time_s).max() > 1e-3 * step_s:
+            raise InputError(
+                f"Expected results of {self.name} at all {len(time_s)} times. Received: {len(found)}. Choose another interval."
+            )
+        return np.stack([found[name][places] for name in self.columns], axis=1).astype(np.float64)
+
+    def _inputs(self, time_s: np.ndarray) -> np.ndarray | None:
+        if self.commands is None:
+            return None
+        values = self.commands.run(time_s)
+        inputs = np.zeros(len(time_s), [("time", np.float64), *((name, np.float64) for name in self.commands.columns)])
+        inputs["time"] = time_s
+        for number, name in enumerate(self.commands.columns):
+            inputs[name] = values[:, number]
+        return inputs
+
+    def _check_names(self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None) -> None:
+        for name in names:
+            if name not in self._variables or causality not in (None, self._variables[name]):
+                known = [each for each, what in self._variables.items() if causality in (None, what)]
+                raise InputError(f"Expected the name of a variable ({kind}) of {self.name}: {', '.join(known)[:160]}. Received: {name!r}.")

@@ -1,0 +1,168 @@
+"""What a coarse simulator is to this package: anything that simulates named columns at given times (steps 1 and 2 of the pipeline).
+
+The square waves of `square_waves` have this interface, and so has a recorded run of a user's simulator, see `recording`. A
+function becomes a simulator with `FunctionSimulator`; an object of any class is one if it has the attribute and the method.
+"""
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+
+
+@runtime_checkable
+class CoarseSimulator(Protocol):
+    """The interface of a coarse simulator.
+
+    A simulator must apply the scenario or refuse it with an error. One that ignores a scenario would give nominal data under
+    the label of a fault; `simulate` checks this.
+
+    Args:
+        columns: Names of the outputs, for example `("voltage", "current")`.
+    """
+
+    columns: tuple[str, ...]
+
+    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Simulates one run.
+
+        Args:
+            time_s: Times in seconds at a regular interval, ascending, shape `(samples,)`.
+            scenario: What differs from nominal operation, in the form that this simulator understands; None is nominal.
+            rng: Random number generator for what is random in the scenario.
+
+        Returns:
+            Array of shape `(samples, columns)`.
+        """
+
+
+class FunctionSimulator:
+    """A coarse simulator made from a function.
+
+    Args:
+        function: Called with the times in seconds, shape `(samples,)`. If it has a parameter `scenario` or `rng`, it receives
+            that too. It returns an array of shape `(samples,)` or `(samples, columns)`.
+        columns: Names of the outputs.
+        name: Name of the simulator in messages. None uses the name of the function.
+
+    Raises:
+        InputError: If the function cannot be called.
+
+    Example:
+    >>> def heater(time_s, scenario=None):
+    ...     power = 0.5 if scenario == "weak heater" else 1.0
+    ...     return power * (np.sin(time_s / 600) > 0)
+    >>> coarse = FunctionSimulator(heater, columns=["heater"])
+    """
+
+    def __init__(self, function: Callable[..., Any], columns: Sequence[str], name: str | None = None):
+        if not callable(function):
+            raise InputError(f"Expected a function of the times. Received: {type(function).__name__}. Give a function.")
+        self.function, self.columns = function, check_columns(columns)
+        self.name = name or getattr(function, "__name__", type(function).__name__)
+        parameters = inspect.signature(function).parameters
+        takes_all = any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values())
+        self._takes = {word for word in ("scenario", "rng") if word in parameters or takes_all}
+
+    def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Calls the function, see `CoarseSimulator.run`.
+
+        Raises:
+            InputError: If a scenario is given, but the function has no parameter for it.
+        """
+        if scenario is not None and "scenario" not in self._takes:
+            raise InputError(
+                f"Expected no scenario for {self.name}, which has no parameter `scenario`. Received: {scenario!r}. Add the parameter, or leave it out."
+            )
+        given = {"scenario": scenario, "rng": rng}
+        return self.function(time_s, **{word: given[word] for word in self._takes})
+
+
+def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
+    """Checks the names of a simulator's outputs.
+
+    Args:
+        columns: The names.
+
+    Returns:
+        The names as a tuple.
+
+    Raises:
+        InputError: If there is none, one is not text, or one occurs twice.
+    """
+    names = (columns,) if isinstance(columns, str) else tuple(columns)
+    if not names or any(not isinstance(name, str) or not name for name in names) or len(set(names)) < len(names):
+        raise InputError(f"Expected names of columns, each different. Received: {names!r}. Name every output once.")
+    return names
+
+
+def simulate(
+    simulator: CoarseSimulator,
+    time_s: np.ndarray,
+    scenario: Any = None,
+    rng: np.random.Generator | None = None,
+    compare: bool = True,
+) -> np.ndarray:
+    """Runs a simulator and checks what it returns.
+
+    Args:
+        simulator: The simulator.
+        time_s: Times in seconds, shape `(samples,)`.
+        scenario: What differs from nominal operation, or None.
+        rng: Random number generator. None: one with seed 0.
+        compare: Whether a run with a scenario is compared with the nominal run, which takes a second run.
+
+    Returns:
+        float32 array of shape `(samples, columns)`.
+
+    Raises:
+        InputError: If the object is no simulator, if it returns another shape, numbers that are not finite, or if the run with
+            a scenario equals the nominal run. A scenario whose attribute `severity` is 0 may equal it.
+    """
+    name = name_of(simulator)
+    if not isinstance(simulator, CoarseSimulator):
+        raise InputError(
+            f"Expected a simulator with the attribute `columns` and the method `run`. Received: {name}. Wrap it in FunctionSimulator."
+        )
+    columns, time_s = check_columns(simulator.columns), np.asarray(time_s, np.float64)
+    rng = np.random.default_rng(0) if rng is None else rng
+    before = rng.bit_generator.state
+    values = _checked(simulator.run(time_s, scenario, rng), name, columns, time_s)
+    if scenario is None or not compare or getattr(scenario, "severity", 1) == 0:
+        return values
+    after, rng.bit_generator.state = rng.bit_generator.state, before
+    nominal = _checked(simulator.run(time_s, None, rng), name, columns, time_s)
+    rng.bit_generator.state = after
+    if np.array_equal(values, nominal):
+        raise InputError(
+            f"Expected a scenario that changes the run of {name}. Received: {str(scenario)[:80]}, with which every value equals the nominal one. "
+            "Let the simulator apply it, or leave the scenario out."
+        )
+    return values
+
+
+def _checked(found: Any, name: str, columns: tuple[str, ...], time_s: np.ndarray) -> np.ndarray:
+    found = np.asarray(found)
+    values = found[:, None] if found.ndim == 1 else found
+    if values.shape != (len(time_s), len(columns)) or values.dtype.kind not in "fiub":
+        raise InputError(
+            f"Expected numbers of shape ({len(time_s)}, {len(columns)}) from {name}, one column each for {', '.join(columns)[:80]}. "
+            f"Received: {found.dtype} of shape {found.shape}. Correct the simulator."
+        )
+    values = values.astype(np.float32)
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        sample, column = bad[0]
+        raise InputError(
+            f"Expected finite values from {name}. Received: {values[sample, column]} in {columns[column]!r} at {time_s[sample]:g} s. "
+            "Correct the simulator or its inputs."
+        )
+    return values
+
+
+def name_of(simulator: Any) -> str:
+    """Returns the name of a simulator for messages: its attribute `name`, or the name of its class."""
+    return str(getattr(simulator, "name", None) or type(simulator).__name__)

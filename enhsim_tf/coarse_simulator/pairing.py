@@ -1,0 +1,184 @@
+"""Brings telemetry and a recorded run of the coarse simulator to one clock (steps 3 and 4 of the pipeline).
+
+Both are cut to the time that they share. A constant delay between them is estimated by cross-correlation, unless it is given.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.recording import Recording, seconds_between
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.series import Telemetry
+
+_EQUALLY_GOOD = 0.02  # a maximum with at least 1 - 0.02 of the largest squared correlation is as good; the nearest to 0 is taken
+_LEAST_CORRELATION = 0.1  # below this correlation at every delay, no delay is estimated
+_LEAST_SHARE = 0.5  # a delay is considered only if at least this share of the samples remains
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pair:
+    """A contiguous stretch of telemetry with the coarse run of the same time.
+
+    Args:
+        telemetry: The telemetry.
+        coarse: The coarse run, delayed, float32 of shape `(samples, columns)`.
+    """
+
+    telemetry: Telemetry
+    coarse: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.telemetry)
+
+    @property
+    def first(self) -> int:
+        """Number of the first sample on the common clock of all pairs."""
+        return round(self.telemetry.offset_s / self.telemetry.interval_s)
+
+    def part(self, start: int, stop: int) -> "Pair":
+        """The samples from `start` up to, but not including, `stop`."""
+        return Pair(self.telemetry.part(start, stop), self.coarse[start:stop])
+
+
+@dataclasses.dataclass(frozen=True)
+class Delay:
+    """A constant delay between the coarse run and the telemetry.
+
+    Args:
+        seconds: How much later the telemetry is, in seconds, or in samples if there are no times.
+        column: The coarse column that it was estimated from; None if it was not estimated.
+        correlation: Correlation of that column with the telemetry at this delay.
+        undelayed: The same without a delay.
+    """
+
+    seconds: float
+    column: str | None = None
+    correlation: float = float("nan")
+    undelayed: float = float("nan")
+
+
+def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_s: float = 0.0, least_samples: int = 2) -> list[Pair]:
+    """Pairs telemetry with the recorded run of the same time.
+
+    Args:
+        parts: Contiguous parts of telemetry on one clock.
+        recording: The recorded run.
+        delay_s: How much later the telemetry is than the recorded run, in seconds.
+        least_samples: Shortest pair that is kept, in samples.
+
+    Returns:
+        The pairs in chronological order.
+
+    Raises:
+        InputError: If the two share no time, or no stretch is long enough.
+    """
+    shift_s = seconds_between(parts[0], recording.clock()) + delay_s
+    pairs, longest = [], 0
+    for part in parts:
+        values = recording.at(part.time_s - shift_s)
+        for first, stop in stretches(np.isfinite(values).all(axis=1)):
+            longest = max(longest, stop - first)
+            if stop - first >= least_samples:
+                pairs.append(Pair(part.part(first, stop), values[first:stop]))
+    if not longest:
+        raise InputError(
+            f"Expected a coarse run that overlaps the telemetry in time. Received: {_span(parts, 0.0)} for {parts[0].name}, "
+            f"{_span_of(recording, shift_s)} for {recording.name}, in seconds after the telemetry's start. Record the same time, or give --delay."
+        )
+    if not pairs:
+        raise InputError(
+            f"Expected at least {least_samples} samples that telemetry and coarse run share without a gap. Received: {longest}. "
+            "Record a longer run, or choose a smaller window."
+        )
+    return pairs
+
+
+def _span(parts: Sequence[Telemetry], shift_s: float) -> str:
+    return f"{parts[0].offset_s + shift_s:.6g} to {parts[-1].time_s[-1] + shift_s:.6g}"
+
+
+def _span_of(recording: Recording, shift_s: float) -> str:
+    return _span([recording.clock(part) for part in recording.parts], shift_s)
+
+
+def stretches(marks: np.ndarray) -> list[tuple[int, int]]:
+    """Returns the start and the end (exclusive) of each run of True in an array."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(marks, np.int8), [0]])))
+    return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
+
+
+def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples: int) -> Delay:
+    """Estimates a constant delay by cross-correlation.
+
+    Each coarse column is correlated with the telemetry at all delays, and the column with the largest squared correlation is
+    used. Among local maxima that are about as high as the highest, the one nearest to no delay is taken, because a periodic
+    signal has a maximum in every period.
+
+    Args:
+        parts: Contiguous parts of telemetry on one clock.
+        recording: The recorded run.
+        max_samples: Largest delay in samples, in both directions: usually the length of a window.
+
+    Returns:
+        The delay, a whole number of samples. It is 0 if no coarse column is correlated with the telemetry.
+
+    Raises:
+        InputError: If the two share no time, or if the telemetry agrees clearly better at a longer delay.
+    """
+    pair_with_recording(parts, recording)  # refuses recordings of another time
+    interval_s = parts[0].interval_s
+    places = [round((part.offset_s - parts[0].offset_s) / interval_s) for part in parts]
+    telemetry = np.full(places[-1] + len(parts[-1]), np.nan)
+    for place, part in zip(places, parts, strict=True):
+        telemetry[place : place + len(part)] = part.values
+    time_s = parts[0].offset_s + interval_s * np.arange(len(telemetry))
+    coarse = recording.at(time_s - seconds_between(parts[0], recording.clock())).astype(np.float64)
+    longest = max(max_samples, len(telemetry) // 4)
+    delays = np.arange(-longest, longest + 1)
+    found = np.stack([_correlation(telemetry, coarse[:, column], delays) for column in range(coarse.shape[1])])
+    near = np.abs(delays) <= max_samples
+    column = int(np.argmax(np.max(found[:, near] ** 2, axis=1)))
+    signed = found[column]
+    is_positive = max(signed[near].max(), 0.0) ** 2 >= (1 - _EQUALLY_GOOD) * np.max(signed[near] ** 2)
+    squared = np.maximum(signed if is_positive else -signed, 0.0) ** 2  # half a period away, a sine is the same upside down
+    undelayed = float(found[column, longest])
+    if squared[near].max() < _LEAST_CORRELATION**2:
+        return Delay(0.0, None, undelayed, undelayed)
+    if squared.max() > squared[near].max() + 0.1:
+        far = int(delays[np.argmax(squared)])
+        raise InputError(
+            f"Expected a delay of at most a window, {max_samples} samples. Received: {parts[0].name}, which agrees best with {recording.columns[column]!r} "
+            f"{abs(far):,} samples {'earlier' if far > 0 else 'later'}. Give --delay {far * interval_s:g} if this is right, or correct the clocks."
+        )
+    best = _nearest_maximum(np.where(near, squared, -1.0), longest, max(3, max_samples // 20))
+    return Delay(float(delays[best] * interval_s), recording.columns[column], float(found[column, best]), undelayed)
+
+
+def _nearest_maximum(squared: np.ndarray, centre: int, reach: int) -> int:
+    """Returns the index, nearest to the centre, of a local maximum that is about as high as the highest value."""
+    padded = np.pad(squared, reach, constant_values=-1.0)
+    highest_near = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+    good = np.flatnonzero((squared >= highest_near) & (squared >= (1 - _EQUALLY_GOOD) * squared.max()))
+    return int(good[np.argmin(np.abs(good - centre))])
+
+
+def _correlation(telemetry: np.ndarray, coarse: np.ndarray, delays: np.ndarray) -> np.ndarray:
+    """Computes the correlation of the telemetry with the delayed coarse column, over the samples that both have at each delay."""
+    size = 1 << int(np.ceil(np.log2(2 * len(telemetry))))
+    have = [np.isfinite(each).astype(np.float64) for each in (coarse, telemetry)]
+    values = [np.where(mask > 0, each - np.nanmean(each), 0.0) for each, mask in zip((coarse, telemetry), have, strict=True)]
+
+    def shifted(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        product = np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size)
+        return np.fft.irfft(product, size)[delays]  # negative delays are at the end of the circle
+
+    (x, y), (x_there, y_there) = values, have
+    number = np.maximum(shifted(x_there, y_there), 1e-9)
+    sum_x, sum_y = shifted(x, y_there), shifted(x_there, y)
+    covariance = shifted(x, y) - sum_x * sum_y / number
+    power = (shifted(x**2, y_there) - sum_x**2 / number) * (shifted(x_there, y**2) - sum_y**2 / number)
+    enough = number >= _LEAST_SHARE * number.max()
+    is_known = enough & (power > 1e-12 * max(float(power.max()), 1e-300))
+    return np.where(is_known, covariance / np.sqrt(np.where(power > 0, power, 1.0)), 0.0)

@@ -1,0 +1,122 @@
+"""Labelled training data from recorded runs: copies of a run, with the columns that label it carried to every row."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.common.atomic_files import make_folder, replace_file
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from enhsim_tf.enhanced_simulator.runs.model import RunModel
+
+_MOST_ROWS = 10**9
+_OWN = ("copy", "time", "sample", "value", "out_of_range")
+
+
+def write_copies(path: str | os.PathLike, model: "RunModel", run: Recording, num_copies: int, seed: int = 0) -> int:
+    """Writes copies of a run to one Parquet file, copy by copy. The file appears only when it is complete.
+
+    The columns are `copy` (from 0), `time` (of the telemetry, that is with the delay of the model; `sample` if the run has no
+    times), `value`, `out_of_range` (above 1, the coarse run is outside the training range), and the carried columns of the run.
+
+    Args:
+        path: Path of the file.
+        model: The run model.
+        run: The run, for example of a fault.
+        num_copies: Number of copies, each with another draw of noise.
+        seed: Random seed of the noise.
+
+    Returns:
+        The number of rows.
+
+    Raises:
+        InputError: If the run cannot be enhanced, a carried column has the name of another column, or there are too many rows.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    usable = model.usable(run)
+    num_rows = num_copies * len(usable)
+    if num_copies < 1 or num_rows > _MOST_ROWS:
+        raise InputError(f"Expected 1 copy or more, and at most {_MOST_ROWS:,} rows. Received: {num_copies:,} copies, {num_rows:,} rows.")
+    shared = _shared_columns(model, usable)
+    metadata = {"interval_s": repr(model.interval_s), "channel": str(model.trained.get("telemetry", ""))}
+    order = ["copy", *(name for name in ("time", "sample") if name in shared), "value"]
+    order += [name for name in shared if name not in order]
+    make_folder(Path(path).parent)
+    types = {"copy": pa.int32(), "value": pa.float32()} | {name: column.type for name, column in shared.items()}
+    schema = pa.schema([(name, types[name]) for name in order]).with_metadata(metadata)
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
+        for number, parts in enumerate(model.generate_copies(usable, num_copies, seed)):
+            values = np.concatenate(parts)
+            columns: Mapping[str, Any] = {"copy": pa.array(np.full(len(values), number, np.int32)), "value": pa.array(values)} | shared
+            writer.write_table(pa.table([columns[name] for name in order], schema=schema))
+    return num_rows
+
+
+def _shared_columns(model: "RunModel", usable: Recording) -> dict[str, "pa.Array"]:
+    """Returns the columns that are the same in every copy: times, score of the range, and what is carried."""
+    import pandas as pd
+    import pyarrow as pa
+
+    taken = [name for name in usable.parts[0].carried if name in _OWN]
+    if taken:
+        raise InputError(
+            f"Expected other names than {', '.join(_OWN)} for the columns to be carried. Received: {taken[0]!r} in {usable.name}. Rename it."
+        )
+    times = np.concatenate([nanoseconds(_clock(usable, number, model.delay_s)) for number in range(len(usable.parts))])
+    has_time = usable.start is not None
+    columns = {"time": pa.array(times, pa.timestamp("ns", tz="UTC"))} if has_time else {"sample": pa.array(times // 10**9)}
+    columns["out_of_range"] = pa.array(np.concatenate([model.coverage.score(part.values) for part in usable.parts]))
+    for name in usable.parts[0].carried:
+        cells = pd.concat([pd.Series(part.carried[name]).reset_index(drop=True) for part in usable.parts], ignore_index=True)
+        try:
+            column = pa.array(cells, from_pandas=True)
+        except (pa.ArrowException, TypeError, ValueError):  # cells of several types, such as numbers and words
+            column = pa.array([None if pd.isna(cell) else str(cell) for cell in cells.astype(object)], pa.string())
+        columns[name] = column
+    return columns
+
+
+def _clock(usable: Recording, number: int, delay_s: float) -> Telemetry:
+    part = usable.clock(usable.parts[number])
+    return Telemetry(part.values, part.interval_s, part.offset_s + delay_s, part.start, part.name)
+
+
+def coverage_lines(model: "RunModel", run: Recording) -> list[str]:
+    """Says which share of a run the training range covers, as a whole and for each of its scenarios.
+
+    Args:
+        model: The run model.
+        run: The run.
+
+    Returns:
+        Lines of text. The shares of scenarios are given if the run has a column `scenario` of at most 20 different values.
+    """
+    import pandas as pd
+
+    usable = model.usable(run)
+    covered = np.concatenate([model.coverage.score(part.values) <= 1 for part in usable.parts])
+    lines = [f"the training range covers {np.mean(covered):.1%} of the run"]
+    if "scenario" in usable.parts[0].carried:
+        names = pd.concat([pd.Series(part.carried["scenario"]) for part in usable.parts], ignore_index=True).astype(str).to_numpy()
+        kinds = list(dict.fromkeys(names))
+        if 1 < len(kinds) <= 20:
+            lines[0] += f" ({', '.join(f'{kind} {np.mean(covered[names == kind]):.1%}' for kind in kinds)})"
+    if np.mean(covered) < 0.5:
+        lines[0] += "; outside it, the enhanced run is an extrapolation, see the column out_of_range"
+    constant = [name for number, name in enumerate(usable.columns) if all(np.ptp(part.values[:, number]) == 0 for part in usable.parts)]
+    if constant:
+        lines.append(f"coarse columns that are constant in this run, though they varied in the fit: {', '.join(constant)}")
+    left = len(run) - len(usable)
+    if left:
+        lines.append(f"left out, in parts shorter than a window of {model.window} samples: {left:,} of {len(run):,} samples")
+    return lines

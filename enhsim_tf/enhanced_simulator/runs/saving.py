@@ -1,0 +1,107 @@
+"""Saves and loads run models. Code of a user's simulator is not saved; everything else is."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.common.size_limits import load_npz
+from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
+from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, read_saved, write_saved
+from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.enhancer.scaling import Scaling
+from enhsim_tf.noise.resampled import ResampledNoise
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.runs.model import RunModel
+
+_MOST_BYTES = 2**31  # maximum size of the nominal run, and of residual windows
+
+
+def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
+    """Writes a run model to a folder atomically.
+
+    Args:
+        model: The model.
+        folder: The folder. A model that was saved there before is replaced.
+
+    Raises:
+        InputError: If the folder contains something other than a saved model; it is left unchanged.
+    """
+    networks = {"enhancer": model.rung.network}
+    others = {
+        "range.npz": model.coverage.out_of_range.save,
+        "nominal.npz": lambda path: _write_arrays(path, {f"part_{number}": part.values for number, part in enumerate(model.nominal.parts)}),
+    }
+    noise: Mapping[str, Any]
+    if isinstance(model.noise, ResampledNoise):
+        noise = {"kind": "resampled"}
+        others["noise.npz"] = lambda path: _write_arrays(path, {"windows": model.noise.windows})
+    else:
+        noise = {"kind": "networks"} | model.noise.get_config()
+        networks |= {"generator": model.noise.generator, "discriminator": model.noise.discriminator}
+    settings = {
+        "rung": model.rung.name,
+        "scaling": model.rung.scaling.get_config(),
+        "noise": noise,
+        "limit": model.coverage.limit,
+        "window": model.window,
+        "interval_s": model.interval_s,
+        "delay_s": model.delay_s,
+        "columns": list(model.columns),
+        "nominal": {"start": model.nominal.start, "offsets_s": [part.offset_s for part in model.nominal.parts]},
+        "trained": model.trained,
+    }
+    write_saved(folder, networks, settings, others, RUNS_FORMAT)
+
+
+def _write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    with open(path, "wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def load_run_model(folder: str | os.PathLike) -> "RunModel":
+    """Loads a saved run model, in Keras' safe mode.
+
+    Args:
+        folder: A folder written by `save_run_model`.
+
+    Returns:
+        The model. Square waves are restored; any other simulator has to be given again.
+
+    Raises:
+        InputError: If the folder was not written by `save_run_model`, or if a file in it has changed since.
+    """
+    folder = Path(folder)
+    return read_saved(folder, lambda networks, settings: _model_from(folder, networks, settings), RUNS_FORMAT)
+
+
+def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str, Any]) -> "RunModel":
+    from enhsim_tf.enhanced_simulator.runs.model import RunModel
+    from enhsim_tf.enhancer.ladder import Rung
+    from enhsim_tf.noise.gan import NoiseGAN
+
+    scaling, window = Scaling.from_config(settings["scaling"]), int(settings["window"])
+    if settings["noise"]["kind"] == "resampled":
+        noise = ResampledNoise(load_npz(folder / "noise.npz", _MOST_BYTES)["windows"])
+    else:
+        config = {name: value for name, value in settings["noise"].items() if name != "kind"}
+        noise = NoiseGAN(networks["generator"], networks["discriminator"], **config)
+    arrays, offsets = load_npz(folder / "nominal.npz", _MOST_BYTES), settings["nominal"]["offsets_s"]
+    parts = tuple(Run(arrays[f"part_{number}"], float(offset_s)) for number, offset_s in enumerate(offsets))
+    nominal = Recording(parts, tuple(settings["columns"]), float(settings["interval_s"]), settings["nominal"]["start"], "the nominal run")
+    coverage = Coverage(OutOfRange.load(folder / "range.npz"), settings["limit"], scaling, window)
+    kept = settings["trained"].get("coarse", {})
+    coarse = SquareWaveSimulator.from_config(kept["config"]) if kept.get("kind") == "square waves" else None
+    rung = Rung(str(settings["rung"]), networks["enhancer"], scaling)
+    columns = len(nominal.columns)
+    shapes = rung.network.input_shape[1:], rung.network.output_shape[1:], np.shape(scaling.input_scale)
+    if shapes != ((window * columns,), (window,), (columns,)) or not (np.isfinite(coverage.limit) and coverage.limit > 0):
+        raise ValueError("an enhancer of another shape than the settings say")
+    if not all(np.isfinite(part.values).all() for part in parts) or not nominal.interval_s > 0:
+        raise ValueError("a nominal run that no simulator records")
+    return RunModel(rung, noise, coverage, nominal, window, settings["delay_s"], coarse, settings["trained"])

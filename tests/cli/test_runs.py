@@ -1,0 +1,261 @@
+"""The option `--coarse` from end to end, and the line of text for each kind of bad input."""
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.__main__ import main
+from enhsim_tf.cli.options import load
+from enhsim_tf.coarse_simulator.recording_files import read_recording
+from enhsim_tf.enhanced_simulator.fit_many import CoarseRun, fit_channels
+from enhsim_tf.enhanced_simulator.runs import fitting
+from enhsim_tf.enhanced_simulator.runs.options import RunOptions
+from enhsim_tf.enhancer.ladder import COARSE, RIDGE
+from enhsim_tf.telemetry.cleaning.clean import Cleaning
+from enhsim_tf.telemetry.sources import read_source
+
+TINY = ["--window", "32", "--num-windows", "60", "--epochs", "1", "--noise", "resampled"]
+
+
+def coarse(num_samples=1_500, seed=0):
+    rng = np.random.default_rng(seed)
+    volts, watts = (np.convolve(each, np.hanning(12), "same") for each in rng.standard_normal((2, num_samples)))
+    times = pd.date_range("2024-01-01", periods=num_samples, freq="10s")
+    return pd.DataFrame({"utc": times, "volts": volts.round(4), "watts": (100 * watts).round(2)})
+
+
+def telemetry(run, seed=1):
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(len(run))
+    celsius = 20 + 2 * run["volts"] + 0.01 * np.roll(run["watts"], 1) + noise
+    return pd.DataFrame({"utc": run["utc"], "celsius": celsius.round(4)})
+
+
+def fault(num_samples=300):
+    run = coarse(num_samples, seed=5)
+    late = np.arange(num_samples) >= 100
+    run.loc[late, "watts"] *= 0.5
+    return run.assign(scenario=np.where(late, "weak", "nominal"), severity=0.5 * late, mask=late)
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """A read-only folder with telemetry, coarse runs and a fitted run model."""
+    folder = tmp_path_factory.mktemp("world")
+    run = coarse()
+    frames = {
+        "simulator": run,
+        "telemetry": telemetry(run),
+        "fault": fault(),
+        "new": telemetry(fault(), seed=9),
+        "later": run.assign(utc=run["utc"] + pd.Timedelta("400d")),
+        "untimed": run.drop(columns="utc"),
+        "still": run.assign(volts=1.0, watts=2.0),
+        "short": run.iloc[:20],
+        "delayed": telemetry(run).assign(utc=run["utc"] + pd.Timedelta("1000s")),
+    }
+    for name, frame in frames.items():
+        frame.to_csv(folder / f"{name}.csv", index=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fitting, "RUNGS", (COARSE, RIDGE))
+        said = []
+        failed = fit_channels(
+            read_source(folder / "telemetry.csv"),
+            folder / "models",
+            RunOptions(window=32, num_windows=300, noise="resampled"),
+            Cleaning(),
+            0,
+            said.append,
+            run=CoarseRun(str(folder / "simulator.csv")),
+        )
+    assert not failed
+    (folder / "said.txt").write_text("\n".join(said))
+    return folder
+
+
+def run_command(arguments, capsys):
+    code = main([str(each) for each in arguments])
+    told = capsys.readouterr()
+    return code, told.out.strip().splitlines(), told.err.strip().splitlines()
+
+
+# from end to end
+
+
+def test_the_fit_reports_the_pairing_and_the_ladder(world):
+    said = (world / "said.txt").read_text()
+    assert "delay: none found" in said and "Enhancers, error on held-out blocks" in said and "Chosen: ridge" in said
+    assert {path.name for path in (world / "models" / "celsius").iterdir()} >= {"manifest.json", "report.json", "report.png", "nominal.npz"}
+
+
+def test_fit_as_a_command(world, tmp_path, capsys):
+    arguments = [
+        "fit",
+        world / "telemetry.csv",
+        "--coarse",
+        world / "simulator.csv",
+        "--out",
+        tmp_path / "m",
+        "--enhancer",
+        "level-and-gain",
+    ]
+    code, out, errors = run_command([*arguments, "--coarse-column", "volts", "--delay", "10", *TINY], capsys)
+    assert code == 0 and not errors
+    assert any("delay: 10 s as given" in line for line in out) and any("Chosen: level and gain, as asked for" in line for line in out)
+    assert load(tmp_path / "m" / "celsius").columns == ("volts",)
+
+
+def test_two_commands_give_labelled_training_data(world, tmp_path, capsys):
+    path = tmp_path / "training.parquet"
+    code, out, _ = run_command(["generate", world / "models", "--coarse", world / "fault.csv", "--copies", "4", "--out", path], capsys)
+    assert code == 0 and "the training range covers" in out[0] and "(nominal " in out[0] and "4 copies of 300 samples" in out[-1]
+    frame = pd.read_parquet(path)
+    assert len(frame) == 1_200 and list(frame.columns) == ["copy", "time", "value", "out_of_range", "scenario", "severity", "mask"]
+    run = fault()
+    expected = 20 + 2 * run["volts"] + 0.01 * np.roll(run["watts"], 1)
+    for _, copy in frame.groupby("copy"):
+        assert np.sqrt(np.mean((copy["value"].to_numpy() - expected)[5:-5] ** 2)) < 0.2
+        assert copy["scenario"].tolist() == run["scenario"].tolist() and copy["mask"].tolist() == run["mask"].tolist()
+
+
+def test_scores_are_those_of_the_difference(world, tmp_path, capsys):
+    path = tmp_path / "scores.csv"
+    code, out, _ = run_command(
+        ["score", world / "models", world / "new.csv", "--coarse", world / "fault.csv", "--windows", 300, "--out", path], capsys
+    )
+    assert code == 0 and "on the difference from the enhanced run" in out[-1]
+    frame = pd.read_csv(path)
+    assert list(frame.columns)[1:] == ["value", "enhanced", "score", "flag", "out_of_range"] and len(frame) == 300
+    assert np.corrcoef(frame["value"], frame["enhanced"])[0, 1] > 0.98
+
+
+def test_without_a_run_a_model_generates_and_scores_as_before(world, tmp_path, capsys):
+    assert run_command(["generate", world / "models", "--windows", "5", "--out", tmp_path / "w.parquet"], capsys)[0] == 0
+    assert np.stack(pd.read_parquet(tmp_path / "w.parquet")["window"]).shape == (5, 32)
+    code, out, _ = run_command(["score", world / "models", world / "new.csv", "--windows", 100, "--out", tmp_path / "s.csv"], capsys)
+    assert code == 0 and any("without --coarse, the values are judged, not their difference" in line for line in out)
+
+
+def test_the_wide_table_may_hold_the_columns_in_another_order_and_rate(world, tmp_path, capsys):
+    run = fault(600)
+    run["utc"] = pd.date_range("2024-01-01", periods=600, freq="5s")
+    run[["scenario", "watts", "utc", "volts"]].to_csv(tmp_path / "other.csv", index=False)
+    code, out, _ = run_command(["generate", world / "models", "--coarse", tmp_path / "other.csv", "--out", tmp_path / "t.parquet"], capsys)
+    assert (
+        code == 0 and any("another order" in line for line in out) and any("every 5 s, averaged to one every 10 s" in line for line in out)
+    )
+    assert len(pd.read_parquet(tmp_path / "t.parquet")) in (300, 301)
+
+
+# bad input: one line, exit code 2, nothing written
+
+
+def spoiled(world, tmp_path, **change):
+    frame = fault().assign(**change)
+    frame.drop(columns=[name for name, value in change.items() if value is None]).to_csv(tmp_path / "bad.csv", index=False)
+    return tmp_path / "bad.csv"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"watts": None}, ["without 'watts'", "volts"]),
+        ({"volts": "n/a"}, ["volts"]),
+        ({"watts": np.nan}, ["watts"]),
+        ({"value": 1.0}, ["'value'", "Rename"]),
+        ({"utc": np.repeat(pd.Timestamp("2024-01-01"), 300)}, ["at least 2 rows", "volts"]),
+    ],
+)
+def test_bad_fault_runs(world, tmp_path, capsys, change, words):
+    path = spoiled(world, tmp_path, **change)
+    code, out, errors = run_command(["generate", world / "models", "--coarse", path, "--out", tmp_path / "out" / "t.parquet"], capsys)
+    assert code == 2 and len(errors) == 1 and errors[0].startswith("error: Expected ") and not out
+    assert all(word in errors[0] for word in words), errors
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("source", "run", "words"),
+    [
+        ("telemetry.csv", CoarseRun("later.csv"), ["overlaps the telemetry in time", "--delay"]),
+        ("telemetry.csv", CoarseRun("untimed.csv"), ["without times"]),
+        ("telemetry.csv", CoarseRun("still.csv"), ["coarse column that varies"]),
+        ("telemetry.csv", CoarseRun("short.csv"), ["samples"]),
+        ("delayed.csv", CoarseRun("simulator.csv"), ["at most a window, 32 samples", "--delay 1000"]),
+        ("telemetry.csv", CoarseRun("nothing.csv"), ["nothing.csv"]),
+        ("telemetry.csv", CoarseRun("simulator.csv", ["amps"]), ["without 'amps'"]),
+    ],
+)
+def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
+    run = dataclasses.replace(run, source=str(world / run.source))
+    options = RunOptions(window=32, num_windows=60, noise="resampled")
+    failed = fit_channels(read_source(world / source), tmp_path / "models", options, Cleaning(), 0, print, run=run)
+    (line,) = failed.values()
+    assert line.startswith("Expected ") and "Received: " in line and all(word in line for word in words)
+    assert not list((tmp_path / "models").iterdir())
+
+
+def test_a_failed_fit_is_one_line_and_exit_code_2(world, tmp_path, capsys):
+    arguments = ["fit", world / "telemetry.csv", "--coarse", world / "later.csv", "--out", tmp_path / "models", *TINY]
+    code, out, errors = run_command(arguments, capsys)
+    assert code == 2 and len(errors) == 1 and errors[0].startswith("error: celsius: Expected ") and not out
+    assert not list((tmp_path / "models").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fit", "telemetry.csv", "--delay", "3"], ["--delay", "--coarse"]),
+        (["fit", "telemetry.csv", "--enhancer", "level-and-gain"], ["enhancer", "ridge and network"]),
+        (["fit", "telemetry.csv", "--noise", "resampled"], ["resampled", "--coarse"]),
+        (["generate", "models", "--copies", "3", "--windows", "2"], ["--copies", "--coarse"]),
+        (["generate", "models", "--coarse", "fault.csv", "--windows", "2"], ["--windows", "--coarse"]),
+        (["generate", "models", "--coarse", "fault.csv", "--scenario", "stuck:0.5"], ["--scenario", "--coarse"]),
+        (["generate", "models", "--coarse", "fault.csv", "--copies", "0"], ["at least one copy"]),
+        (["generate", "models", "--windows", "4", "--scenario", "stuck:0.5"], ["generate MODEL_DIR --coarse"]),
+        (["generate", "models", "--windows", "4", "--workers", "1"], ["a model of recorded runs"]),
+        (["generate", "models", "--coarse", "short.csv"], ["at least one window of 32 samples"]),
+        (["score", "models", "new.csv", "--coarse-time", "utc"], ["--coarse-time", "--coarse"]),
+        (["score", "models", "new.csv", "--coarse", "later.csv"], ["overlaps the telemetry in time"]),
+    ],
+)
+def test_options_and_models_that_do_not_fit_together(world, tmp_path, capsys, arguments, words, monkeypatch):
+    monkeypatch.chdir(world)
+    code, _, errors = run_command([*arguments, "--out", tmp_path / "out.parquet"], capsys)
+    assert code == 2 and len(errors) == 1 and "Expected " in errors[0] and all(word in errors[0] for word in words)
+    assert not (tmp_path / "out.parquet").exists()
+
+
+def test_a_coarse_run_is_not_overwritten(world, tmp_path, capsys):
+    frame = fault()
+    frame.to_parquet(tmp_path / "fault.parquet")
+    before = (tmp_path / "fault.parquet").read_bytes()
+    code, _, errors = run_command(
+        ["generate", world / "models", "--coarse", tmp_path / "fault.parquet", "--out", tmp_path / "fault.parquet"], capsys
+    )
+    assert code == 2 and "differ" in errors[0] and (tmp_path / "fault.parquet").read_bytes() == before
+
+
+def test_a_run_far_outside_the_training_range_is_named(world, tmp_path, capsys):
+    frame = fault()
+    frame["watts"] += 5_000
+    frame.to_csv(tmp_path / "far.csv", index=False)
+    code, out, _ = run_command(["generate", world / "models", "--coarse", tmp_path / "far.csv", "--out", tmp_path / "t.parquet"], capsys)
+    assert code == 0 and "covers 0.0% of the run" in out[0] and "extrapolation" in out[0]
+
+
+def test_text_among_the_numbers_may_be_dropped(world, tmp_path, capsys):
+    frame = fault().astype({"volts": object})
+    frame.loc[50, "volts"] = "offline"
+    frame.to_csv(tmp_path / "words.csv", index=False)
+    arguments = ["generate", world / "models", "--coarse", tmp_path / "words.csv", "--out", tmp_path / "t.parquet"]
+    assert run_command(arguments, capsys)[0] == 2
+    code, out, _ = run_command([*arguments, "--drop-bad"], capsys)
+    assert code == 0 and any("words.csv, volts:" in line for line in out)
+
+
+def test_a_recording_of_the_fit_is_read_as_it_was_written(world):
+    found = read_recording(world / "simulator.csv")
+    expected = coarse()[["volts", "watts"]].to_numpy(np.float32)
+    np.testing.assert_allclose(dataclasses.replace(found).parts[0].values, expected, rtol=1e-6)

@@ -1,0 +1,107 @@
+"""Pairing: known delays are recovered, both series are cut to the time they share, and other clocks are refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from enhsim_tf.coarse_simulator.pairing import _correlation, estimate_delay, pair_with_recording, stretches
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.telemetry.series import Telemetry
+
+START = "2024-01-01T00:00:00+00:00"
+
+
+def drive(num_samples=2_000, seed=0):
+    """A smooth signal that does not repeat."""
+    return np.convolve(np.random.default_rng(seed).standard_normal(num_samples), np.hanning(15), "same")
+
+
+def pair_of(values, delay, others=(), interval_s=10.0, noise=0.3):
+    """A recording of the values, and telemetry that follows it `delay` samples later."""
+    rng = np.random.default_rng(1)
+    telemetry = np.roll(values, delay) + noise * values.std() * rng.standard_normal(len(values))
+    columns = np.stack([*others, values], axis=1).astype(np.float32)
+    recording = Recording((Run(columns),), tuple(f"c{number}" for number in range(columns.shape[1])), interval_s, START)
+    return Telemetry(telemetry.astype(np.float32), interval_s, 0.0, START, "volts"), recording
+
+
+@pytest.mark.parametrize("delay", [0, 1, -3, 40, -64])
+def test_a_known_delay_is_recovered(delay):
+    telemetry, recording = pair_of(drive(), delay, others=[drive(seed=5)])
+    found = estimate_delay([telemetry], recording, 64)
+    assert found.seconds == 10 * delay and found.column == "c1" and found.correlation > 0.9
+
+
+def test_a_delay_is_recovered_across_gaps_and_a_negative_correlation():
+    telemetry, recording = pair_of(-drive(), 7)
+    telemetry = dataclasses.replace(telemetry, values=-telemetry.values)
+    parts = [telemetry.part(0, 700), telemetry.part(760, 1_500), telemetry.part(1_530, 2_000)]
+    recording = dataclasses.replace(recording, parts=(Run(recording.parts[0].values[:900]), Run(recording.parts[0].values[950:], 9_500.0)))
+    found = estimate_delay(parts, recording, 64)
+    assert found.seconds == 70 and found.correlation < -0.9
+
+
+def test_of_the_equal_maxima_of_a_periodic_signal_the_nearest_is_taken():
+    telemetry, recording = pair_of(np.sin(2 * np.pi * np.arange(2_000) / 50), 13, noise=0.1)
+    assert estimate_delay([telemetry], recording, 200).seconds == pytest.approx(130, abs=10)
+
+
+def test_the_correlation_at_every_delay_is_that_of_the_shared_samples():
+    rng = np.random.default_rng(0)
+    telemetry, coarse = rng.standard_normal((2, 60))
+    telemetry[20:25], coarse[40:43] = np.nan, np.nan
+    delays = np.arange(-10, 11)
+    for delay, found in zip(delays, _correlation(telemetry, coarse, delays), strict=True):
+        pairs = [(coarse[place], telemetry[place + delay]) for place in range(60) if 0 <= place + delay < 60]
+        one, other = np.array([pair for pair in pairs if np.isfinite(pair).all()]).T
+        assert found == pytest.approx(np.corrcoef(one, other)[0, 1], abs=1e-9)
+
+
+def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused):
+    telemetry, recording = pair_of(drive(), 200)
+    with refused("at most a window, 64 samples", "--delay 2000"):
+        estimate_delay([telemetry], recording, 64)
+    (pair,) = pair_with_recording([telemetry], recording, 2_000.0)
+    assert len(pair) == 1_800 and np.corrcoef(pair.telemetry.values, pair.coarse[:, 0])[0, 1] > 0.9
+
+
+def test_no_delay_is_estimated_without_correlation():
+    telemetry, recording = pair_of(drive(6_000), 0)
+    unrelated = dataclasses.replace(telemetry, values=np.random.default_rng(3).standard_normal(6_000).astype(np.float32))
+    found = estimate_delay([unrelated], recording, 20)
+    assert found.seconds == 0 and found.column is None
+
+
+def test_both_are_cut_to_the_time_they_share():
+    telemetry, recording = pair_of(drive(), 0, noise=0)
+    recording = dataclasses.replace(recording, start="2024-01-01T00:10:00+00:00", parts=(Run(recording.parts[0].values[60:1_000]),))
+    parts = [telemetry.part(0, 500), telemetry.part(520, 2_000)]
+    pairs = pair_with_recording(parts, recording)
+    assert [(pair.first, len(pair)) for pair in pairs] == [(60, 440), (520, 480)]
+    for pair in pairs:
+        np.testing.assert_allclose(pair.telemetry.values, pair.coarse[:, 0], atol=1e-5)
+
+
+def test_samples_between_those_of_the_run_are_interpolated():
+    ramp = np.arange(100.0)
+    recording = Recording((Run(ramp[:, None].astype(np.float32)),), ("ramp",), 10.0, START)
+    telemetry = Telemetry(np.zeros(50, np.float32), 10.0, 4.0, START, "volts")
+    (pair,) = pair_with_recording([telemetry], recording, 1.0)
+    np.testing.assert_allclose(pair.coarse[:, 0], np.arange(50) + 0.3, rtol=1e-5)
+
+
+def test_runs_of_another_time_are_refused(refused):
+    telemetry, recording = pair_of(drive(), 0)
+    elsewhere = dataclasses.replace(recording, start="2025-01-01T00:00:00+00:00")
+    for work in (lambda: pair_with_recording([telemetry], elsewhere), lambda: estimate_delay([telemetry], elsewhere, 64)):
+        with refused("overlaps the telemetry in time", "--delay"):
+            work()
+    with refused("in both the telemetry and the coarse run, or in neither"):
+        pair_with_recording([telemetry], dataclasses.replace(recording, start=None))
+    with refused("at least 3000 samples"):
+        pair_with_recording([telemetry], recording, least_samples=3_000)
+
+
+def test_stretches_hand_worked():
+    assert stretches(np.array([1, 1, 0, 1, 0, 0, 1], bool)) == [(0, 2), (3, 4), (6, 7)] and stretches(np.zeros(3, bool)) == []

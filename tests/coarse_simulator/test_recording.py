@@ -1,0 +1,131 @@
+"""Recorded runs: what was recorded is returned, files are cleaned like telemetry, and labels stay with their samples."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording_files import read_recording
+from enhsim_tf.telemetry.cleaning.clean import Cleaning
+
+
+def recording():
+    parts = Run(np.array([[0.0, 10], [1, 20], [4, 30]], np.float32)), Run(np.array([[7.0, 0], [9, 2]], np.float32), offset_s=50.0)
+    return Recording(parts, ("a", "b"), 10.0, name="run.csv")
+
+
+def table(num_samples=60, step_s=10):
+    rows = np.arange(num_samples)
+    stamps = pd.Timestamp("2024-01-01") + pd.to_timedelta(rows * step_s, unit="s")
+    return pd.DataFrame(
+        {"time": stamps, "volts": 0.5 * rows, "amps": 7.0 - rows, "scenario": np.where(rows < 20, "nominal", "leak"), "mask": rows // 20}
+    )
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(frame, name="run.csv"):
+        frame.to_csv(tmp_path / name, index=False)
+        return tmp_path / name
+
+    return write
+
+
+# in memory
+
+
+def test_times_between_samples_are_interpolated_and_gaps_are_nan():
+    values = recording().at(np.array([0.0, 5.0, 20.0, 25.0, 50.0, 55.0, 60.0, 61.0]))
+    np.testing.assert_array_equal(values[:, 0], [0, 0.5, 4, np.nan, 7, 8, 9, np.nan])
+    np.testing.assert_array_equal(values[:, 1], [10, 15, 30, np.nan, 0, 1, 2, np.nan])
+
+
+def test_a_recording_refuses_what_it_does_not_hold(refused):
+    with refused("from 0 s to 60 s", "30 s"):
+        recording().run(np.array([20.0, 30.0]))
+    with refused("Record a run of it"):
+        recording().run(np.array([0.0]), scenario="leak")
+    with refused("without 'c'"):
+        recording().select(["a", "c"])
+
+
+def test_columns_are_selected_by_name_in_any_order():
+    swapped = recording().select(["b", "a"])
+    np.testing.assert_array_equal(swapped.parts[0].values, recording().parts[0].values[:, ::-1])
+
+
+# from files
+
+
+def test_a_table_is_read_with_its_labels(written):
+    found = read_recording(written(table()), ["volts", "amps"])
+    (part,) = found.parts
+    assert (found.columns, found.interval_s, found.start) == (("volts", "amps"), 10.0, "2024-01-01T00:00:00+00:00")
+    np.testing.assert_array_equal(part.values, np.stack([0.5 * np.arange(60), 7.0 - np.arange(60)], 1).astype(np.float32))
+    assert list(part.carried["scenario"]) == ["nominal"] * 20 + ["leak"] * 40
+    assert list(part.carried["mask"]) == [0] * 20 + [1] * 20 + [2] * 20 and found.notes == ()
+
+
+def test_without_names_all_numbers_are_inputs(written):
+    assert read_recording(written(table())).columns == ("volts", "amps", "mask")
+
+
+def test_labels_follow_the_repairs_of_the_rows(written):
+    frame = table()
+    frame = pd.concat([frame.iloc[30:], frame.iloc[:30].drop(index=[5, 6])])  # unsorted, with a short gap
+    frame = pd.concat([frame, frame.iloc[[3]]])  # one row twice
+    found = read_recording(written(frame), ["volts", "amps"])
+    (part,) = found.parts
+    np.testing.assert_allclose(part.values[:, 0], 0.5 * np.arange(60))
+    assert list(part.carried["scenario"]) == ["nominal"] * 20 + ["leak"] * 40
+    assert len(found.notes) >= 2 and all("run.csv" in note for note in found.notes)
+
+
+def test_another_rate_is_brought_to_the_wanted_one(written):
+    finer, coarser = (read_recording(written(table(), f"{step}.csv"), ["volts"], interval_s=step) for step in (30, 5))
+    np.testing.assert_allclose(finer.parts[0].values[1:-1, 0], 0.5 * 3 * np.arange(1, 20))  # means of three rows around each grid point
+    np.testing.assert_allclose(coarser.parts[0].values[:, 0], 0.25 * np.arange(119))
+    assert "averaged to one every 30 s" in finer.notes[0] and "interpolated to one every 5 s" in coarser.notes[0]
+    assert list(coarser.parts[0].carried["scenario"]).count("nominal") == 40  # up to 195 s, half-way between two rows
+
+
+def test_columns_in_another_order_are_matched_by_name_and_reported(written):
+    found = read_recording(written(table()[["amps", "time", "volts"]]), ["volts", "amps"])
+    np.testing.assert_array_equal(found.parts[0].values[:, 1], 7.0 - np.arange(60))
+    assert "another order" in found.notes[0]
+
+
+def test_missing_values_split_the_run_or_are_filled(written):
+    frame = table()
+    frame.loc[10:11, "volts"] = np.nan
+    frame.loc[30:44, "amps"] = np.nan
+    found = read_recording(written(frame), ["volts", "amps"])
+    assert [len(part) for part in found.parts] == [30, 15]
+    np.testing.assert_allclose(found.parts[0].values[:, 0], 0.5 * np.arange(30))
+    assert list(found.parts[1].carried["mask"]) == [2] * 15 and any("2 parts" in note for note in found.notes)
+
+
+def test_a_run_without_times_counts_its_samples(written):
+    found = read_recording(written(table().drop(columns="time")), ["volts"])
+    assert found.start is None and found.interval_s == 1.0 and found.parts[0].offset_s == 0
+    assert list(found.parts[0].carried["scenario"])[18:22] == ["nominal", "nominal", "leak", "leak"]
+
+
+def test_local_times_are_converted_as_those_of_telemetry(written):
+    found = read_recording(written(table()), ["volts"], cleaning=Cleaning(timezone="Europe/Berlin"))
+    assert found.start == "2023-12-31T23:00:00+00:00" and list(found.parts[0].carried["scenario"])[19:21] == ["nominal", "leak"]
+
+
+def test_unusable_runs_are_refused(refused, written):
+    with refused("without 'watts'", "volts"):
+        read_recording(written(table()), ["volts", "watts"])
+    frame = table()
+    frame.loc[:29, "volts"], frame.loc[30:, "amps"] = np.nan, np.nan
+    with refused("share some time"):
+        read_recording(written(frame), ["volts", "amps"])
+    frame = table().astype({"volts": object})
+    frame.loc[3, "volts"] = "offline"
+    with refused("offline"):
+        read_recording(written(frame), ["volts"])
+    with refused("without times"):
+        read_recording(written(table().drop(columns="time")), ["volts"], interval_s=10.0)
