@@ -10,7 +10,7 @@ from enhsim_tf.keras_tools.training import dense_stack, predict_windows
 
 
 def build_enhancer(
-    window: int = 500, hidden_units: int = 3_200, num_hidden: int = 2, seed: int = 0, initialiser: str = "he_uniform"
+    window: int = 500, hidden_units: int = 3_200, num_hidden: int = 2, seed: int = 0, initialiser: str = "he_uniform", columns: int = 1
 ) -> keras.Sequential:
     """Builds the paper's enhancing network, Figure 3: Dense layers of 500, 3,200, 3,200 and 500 units.
 
@@ -20,12 +20,14 @@ def build_enhancer(
         num_hidden: Number of hidden layers.
         seed: Seed for the initial weights.
         initialiser: Keras name of the weight initialiser.
+        columns: Number of coarse columns; the paper has one. The columns of one sample are adjacent in the input.
 
     Returns:
-        An uncompiled Keras model whose input and output have the shape `(windows, window)`. With the default arguments it
+        An uncompiled Keras model whose input has the shape `(windows, window * columns)` and whose output has the shape
+        `(windows, window)`. With the default arguments it
         has 13,697,400 parameters.
     """
-    return dense_stack(window, (window, *[hidden_units] * num_hidden, window), seed, "enhancer", initialiser)
+    return dense_stack(window * columns, (window, *[hidden_units] * num_hidden, window), seed, "enhancer", initialiser)
 
 
 def enhance(model: keras.Model, coarse: np.ndarray, batch_size: int = 1_024) -> np.ndarray:

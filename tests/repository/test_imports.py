@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
 WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_adam keras_tools.blockwise_training keras_tools.convolution_maximum
-    enhancer.network noise.generator noise.discriminator noise.gan noise.latent noise.convolutional_gan
+    enhancer.network enhancer.ladder enhancer.rung_networks noise.generator noise.discriminator noise.gan noise.latent noise.convolutional_gan
     enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting""".split()
 NOT_TRIED = ("reproduce", "__main__")  # the reproduction's own modules may be slow to import; its settings may not
 
