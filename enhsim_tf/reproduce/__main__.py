@@ -19,6 +19,8 @@ examples:
                                                      effect of each kind of noise on detectors; takes hours, can be interrupted
   python -m enhsim_tf.reproduce --experiment labelled --data DIR
                                                      real telemetry with labelled anomalies; some minutes per channel
+  python -m enhsim_tf.reproduce --experiment battery
+                                                     a real pair of simulators: a battery in PyBaMM; some minutes per seed
 
 exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
 """
@@ -64,8 +66,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--experiment",
-        choices=("robustness", "labelled"),
-        help="instead of the paper: robustness trains detectors with each kind of noise; labelled tests them on real telemetry with labelled anomalies",
+        choices=("robustness", "labelled", "battery"),
+        help="instead of the paper: robustness trains detectors with each kind of noise; labelled tests them on real telemetry with labelled anomalies; "
+        "battery enhances a coarse battery simulator to a fine one",
     )
     parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
     parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
@@ -82,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     check(options)
     folder = make_folders(options)
     if options.experiment:
-        return run_labelled(options, folder) if options.experiment == "labelled" else run_experiment(options, folder)
+        return {"robustness": run_experiment, "labelled": run_labelled, "battery": run_battery}[options.experiment](options, folder)
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import caption_of
     from enhsim_tf.reproduce.figure import save
@@ -194,6 +197,27 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     return 0
 
 
+def run_battery(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the study of a pair of battery simulators in a subfolder of the figures' folder, and returns the exit code."""
+    from enhsim_tf.reproduce.battery.simulate import check_installed
+
+    check_installed()
+    from enhsim_tf.reproduce.battery.findings import lines
+    from enhsim_tf.reproduce.battery.page import fill_page
+    from enhsim_tf.reproduce.battery.run import FOLDER, run
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    turned = {} if options.seeds is None else {"battery__num_seeds": options.seeds}
+    out = folder / FOLDER
+    found = run(make_settings(options.budget, **turned), options.cache or default_cache(), out, options.fresh, tell)
+    tell("\n" + "\n".join(lines(found)))
+    if options.budget == "full" and out == Path("figures") / FOLDER and not is_other(options):
+        fill_page(Path("docs/battery.md"), found)
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
 def check(options: argparse.Namespace) -> None:
     """Rejects options that cannot be used, before anything is computed and without importing TensorFlow."""
     from enhsim_tf.common.errors import InputError
@@ -203,9 +227,9 @@ def check(options: argparse.Namespace) -> None:
     if options.spread < 0:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)
-    for name in ("environment", "seeds"):
-        if getattr(options, name) is not None and options.experiment != "robustness":
-            raise InputError(f"Expected --{name} together with --experiment robustness. Received: --{name} without it.")
+    for name, experiments in (("environment", ("robustness",)), ("seeds", ("robustness", "battery"))):
+        if getattr(options, name) is not None and options.experiment not in experiments:
+            raise InputError(f"Expected --{name} together with --experiment {' or '.join(experiments)}. Received: --{name} without it.")
     if (options.experiment == "labelled") != (options.data is not None) or (options.channels and options.data is None):
         raise InputError("Expected --experiment labelled and --data DIR together, and --channels only with them. Received: one alone.")
     if options.data is not None:
