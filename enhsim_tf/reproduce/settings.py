@@ -247,7 +247,7 @@ class BatterySettings:
     test_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days on which everything is judged", smoke=4)
     coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
     fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
-    paper_epochs: int = setting(10, "epochs", f"{OUR_CHOICE}: 1,000 steps of the paper's network, with a falling rate", "40", smoke=1)
+    paper_epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: as in the ladder of enhancers, with a falling rate", "40", smoke=1)
     num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "about 1,000", smoke=4)
     num_network_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: autoencoders and the noise GAN take most of the time", smoke=1)
 

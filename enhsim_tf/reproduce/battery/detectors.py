@@ -9,7 +9,7 @@ import numpy as np
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
-from enhsim_tf.enhancer.ladder import Ladder, fit_rung
+from enhsim_tf.enhancer.ladder import fit_rung
 from enhsim_tf.noise.surrogates import GaussianAutoregression
 from enhsim_tf.realism.window_features import window_features
 from enhsim_tf.reproduce.battery.errors import about, fault_windows
@@ -66,19 +66,20 @@ class Judge:
     Args:
         recorded: The runs.
         pairs: The windows that the simulator is fitted to.
-        ladder: The fitted enhancer.
+        rung: The enhancer, a rung of `enhancer.ladder`.
         seed: Seed of everything drawn.
     """
 
-    def __init__(self, recorded: Recorded, pairs: PairWindows, ladder: Ladder, seed: int):
-        self.recorded, self.pairs, self.ladder, self.seed = recorded, pairs, ladder, seed
+    def __init__(self, recorded: Recorded, pairs: PairWindows, rung: str, seed: int):
+        self.recorded, self.pairs, self.seed = recorded, pairs, seed
+        self.enhancer = fit_rung(rung, pairs.coarse, pairs.telemetry, pairs.starts, seed)
         self.num_fit, self.num_coarse = (len(recorded.get(part, "coarse")) // ORBIT_SAMPLES - 1 for part in ("fit", "coarse"))
         self.num_stretches = max(1, len(recorded.get("test", "coarse")) // len(recorded.get("fault", "coarse")))
 
     @functools.cached_property
     def residuals(self) -> np.ndarray:
         """Residual windows of the orbits that the simulator is fitted to, see `cross_fitted_residuals`."""
-        return cross_fitted_residuals(self.pairs, self.ladder.chosen, self.seed)
+        return cross_fitted_residuals(self.pairs, self.enhancer.name, self.seed)
 
     @functools.cached_property
     def _test(self) -> dict[Fault | None, PairWindows]:
@@ -91,7 +92,7 @@ class Judge:
     def arms(self) -> Arms:
         """Training windows and threshold windows of each arm, except for the GAN's."""
         coarse, _ = coarse_windows(self.recorded, "coarse", 2 * _NUM)
-        enhanced = self.ladder.predict(coarse)
+        enhanced = self.enhancer.predict(coarse)
         autoregression = GaussianAutoregression.fit(self.residuals, _ORDER)
         fit, more = (pair_windows(self.recorded, part, _NUM, self.seed) for part in ("fit", "more"))
         part_samples = (_PART_ORBITS + 1) * ORBIT_SAMPLES
@@ -116,7 +117,7 @@ class Judge:
         gan = convolutional_noise_gan(self.residuals, num_iterations, self.seed)
         gan.fit(self.residuals, num_iterations, verbose=verbose)
         coarse, _ = coarse_windows(self.recorded, "coarse", 2 * _NUM)
-        return {CONVOLUTIONAL: _apart(self.ladder.predict(coarse) + gan.generate(2 * _NUM, self.seed), 1 / 2, self.num_coarse)}
+        return {CONVOLUTIONAL: _apart(self.enhancer.predict(coarse) + gan.generate(2 * _NUM, self.seed), 1 / 2, self.num_coarse)}
 
     def rows(self, arms: Mapping[str, tuple[np.ndarray, np.ndarray]], names: tuple[str, ...]) -> list[dict[str, Any]]:
         """Trains detectors on each arm and judges them; see `judge`."""
@@ -136,7 +137,7 @@ class Judge:
             scores = {}
             for fault in self._test:
                 pairs = fault_windows(self.recorded, fault, self.seed, is_planned=True)
-                run = self.ladder.predict(pairs.coarse) if is_enhanced else pairs.coarse[:, :, 0]
+                run = self.enhancer.predict(pairs.coarse) if is_enhanced else pairs.coarse[:, :, 0]
                 scores[fault] = _rms(pairs.telemetry - run)
             found += judge(arm, "residual", _rms(fitted), scores, self.num_stretches)
         return found
@@ -148,7 +149,7 @@ class Judge:
         faulty = np.concatenate([coarse_windows(self.recorded, "coarse_fault", each, fault)[0] for fault in ALL])
         windows = np.concatenate([nominal, faulty])
         found = []
-        for arm, values in ((COARSE, windows[:, :, 0]), (RESAMPLED, self.ladder.predict(windows) + self.noise(len(windows), 3))):
+        for arm, values in ((COARSE, windows[:, :, 0]), (RESAMPLED, self.enhancer.predict(windows) + self.noise(len(windows), 3))):
             training, held_out = _apart(values[: 2 * _NUM], 1 / 2, self.num_coarse)
             learnt = np.concatenate([training, values[2 * _NUM :]])
             labels = np.repeat([0, 1], [len(training), len(faulty)])

@@ -85,25 +85,22 @@ def replicate(settings: Settings, stages: Stages, regime: str, seed: int) -> "di
     """
     import pandas as pd
 
-    folder = recorded(settings, stages, regime, seed)
+    runs = recorded(settings, stages, regime, seed)
     chosen, found = settings.battery, []
-    steps = {
-        "errors": (chosen.paper_epochs,),
-        "detectors": (),
-        "networks": (chosen.num_iterations,),
-    }
-    for step, depends in steps.items():
+    first, after = None, [name_of(regime, seed)]
+    for step, depends in {"errors": (chosen.paper_epochs,), "detectors": (), "networks": (chosen.num_iterations,)}.items():
         if step == "networks" and seed >= chosen.first_seed + chosen.num_network_seeds:
             continue
 
-        def make(target: Path, step: str = step) -> None:
+        def make(target: Path, step: str = step, before: Path | None = first) -> None:
             from enhsim_tf.reproduce.battery import study
 
-            study.STEPS[step](target, record.read(folder), regime, seed, settings)
+            study.STEPS[step](target, record.read(runs), regime, seed, settings, before)
 
         name = f"battery {step} {regime} {seed}"
-        depends = (regime, seed, *depends)
-        found.append(stages.run(name, make, ("reproduce.battery.study",), depends, after=(name_of(regime, seed),)))
+        found.append(stages.run(name, make, ("reproduce.battery.study",), (regime, seed, *depends), after))
+        if first is None:  # the others read what this one has chosen
+            first, after = found[0], [*after, name]
     paths: Iterable[Path] = (path for each in found for path in sorted(each.glob("*.parquet")))
     tables: dict[str, list[pd.DataFrame]] = {}
     for path in paths:

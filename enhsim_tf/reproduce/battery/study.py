@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhancer.ladder import Ladder
 from enhsim_tf.reproduce.battery import detectors, errors
 from enhsim_tf.reproduce.battery.orbits import REGIMES
 from enhsim_tf.reproduce.battery.record import Recorded
@@ -23,7 +22,7 @@ def _write(folder: Path, name: str, rows: list[dict[str, Any]]) -> None:
     pd.DataFrame(rows).to_parquet(folder / f"{name}.parquet")
 
 
-def make_errors(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings) -> None:
+def make_errors(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings, before: Path | None) -> None:
     """Writes the tables `errors`, `choice`, `trust`, `speed` and `runs` of a replicate.
 
     Args:
@@ -32,6 +31,7 @@ def make_errors(folder: Path, recorded: Recorded, regime: str, seed: int, settin
         regime: A key of `orbits.REGIMES`.
         seed: The seed.
         settings: All settings.
+        before: The folder of the step before, which this step does not need.
     """
     pairs = pair_windows(recorded, "fit", errors.NUM_WINDOWS, seed)
     enhancers = errors.fit_enhancers(pairs, tuple(errors.ENHANCERS), seed, settings.battery.paper_epochs)
@@ -48,36 +48,36 @@ def make_errors(folder: Path, recorded: Recorded, regime: str, seed: int, settin
     _write(folder, "trust", errors.trust_rows(recorded, pairs))
     _write(folder, "speed", speed_rows(recorded, enhancers, REGIMES[regime], seed))
     reduced = recorded.about["reduced"]
-    _write(
-        folder,
-        "runs",
-        [{"num_runs": recorded.about["num_runs"], "num_reduced": len(reduced), "most_reductions": max(reduced.values(), default=0)}],
-    )
+    runs = {"num_runs": recorded.about["num_runs"], "num_reduced": len(reduced), "most_reductions": max(reduced.values(), default=0)}
+    _write(folder, "runs", [runs])
 
 
-def _judge(recorded: Recorded, seed: int) -> tuple[detectors.Judge, Ladder]:
-    pairs = pair_windows(recorded, "fit", errors.NUM_WINDOWS, seed)
-    ladder = errors.choose(pairs, seed)
-    return detectors.Judge(recorded, pairs, ladder, seed), ladder
+def _judge(recorded: Recorded, seed: int, before: Path | None) -> detectors.Judge:
+    """Fits the rung that the step `errors` has chosen again."""
+    import pandas as pd
+
+    choice = pd.read_parquet(before / "choice.parquet")
+    chosen = str(choice["rung"][choice["is_chosen"]].iloc[0])
+    return detectors.Judge(recorded, pair_windows(recorded, "fit", errors.NUM_WINDOWS, seed), chosen, seed)
 
 
-def make_detectors(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings) -> None:
+def make_detectors(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings, before: Path | None) -> None:
     """Writes the table `alarms` of the detectors without networks, of residuals and of classifiers; see `make_errors`."""
-    judge, _ = _judge(recorded, seed)
+    judge = _judge(recorded, seed, before)
     names = tuple(name for name in DETECTORS if name not in detectors.NETWORKS)
     _write(folder, "alarms", judge.rows(judge.arms(), names) + judge.residual_rows() + judge.labelled_rows())
 
 
-def make_networks(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings) -> None:
+def make_networks(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings, before: Path | None) -> None:
     """Writes the table `alarms` of the autoencoders, and of all detectors that learn noise of the GAN; see `make_errors`."""
-    judge, _ = _judge(recorded, seed)
+    judge = _judge(recorded, seed, before)
     arms = judge.arms()
     chosen = {name: arms[name] for name in (detectors.RESAMPLED, detectors.REAL_60, detectors.REAL_120)}
     generated = judge.convolutional_arm(settings.battery.num_iterations)
     _write(folder, "alarms", judge.rows(chosen, detectors.NETWORKS) + judge.rows(generated, tuple(DETECTORS)))
 
 
-STEPS: dict[str, Callable[[Path, Recorded, str, int, Settings], None]] = {
+STEPS: dict[str, Callable[[Path, Recorded, str, int, Settings, Path | None], None]] = {
     "errors": make_errors,
     "detectors": make_detectors,
     "networks": make_networks,
