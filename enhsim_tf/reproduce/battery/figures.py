@@ -12,6 +12,7 @@ from enhsim_tf.reproduce.battery.detectors import ARMS, REAL_120, RESAMPLED, RES
 from enhsim_tf.reproduce.battery.detectors import COARSE as COARSE_ARM
 from enhsim_tf.reproduce.battery.detectors import ENHANCED as CLEAN_ARM
 from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
+from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.figure import Figure
 
 Findings = Mapping[str, Any]
@@ -25,21 +26,28 @@ def _enhancers(about: Mapping[str, Any]) -> list[str]:
     return [*sorted(ENHANCERS, key=lambda name: -about["nominal"][name]["mean"]), FLOOR]
 
 
+def _reached(nominal: Mapping[str, Any]) -> str:
+    """Errors on nominal orbits in per cent of the coarse simulator's error."""
+    names = {
+        "the paper's network": "paper's network",
+        "ridge regression": "ridge, all columns",
+        "with a network on top": "ridge and network",
+    }
+    whole = nominal["coarse itself"]["mean"]
+    return ", ".join(f"{words} {100 * nominal[name]['mean'] / whole:.0f} %" for words, name in names.items())
+
+
 def errors(found: Findings) -> matplotlib.figure.Figure:
     """Error of each enhancer on nominal orbits and on each fault, a regime a panel."""
     regimes = found["regimes"]
-    said = "; ".join(
-        f"{regime}: coarse {about['nominal']['coarse itself']['mean']:.3f}, ridge {about['nominal']['ridge, all columns']['mean']:.3f}, "
-        f"with a network {about['nominal']['ridge and network']['mean']:.3f}"
-        for regime, about in regimes.items()
-    )
+    said = "; ".join(f"{regime}: {_reached(about['nominal'])}" for regime, about in regimes.items())
     first = next(iter(regimes.values()))
     figure, down = new_sheet(
         DOUBLE,
         3.7,
-        f"A linear map with the current as input comes close to the fine battery simulator, and a small network on top pays most where the battery is used hard ({said})",
+        f"Error of a coarse battery simulator that is enhanced to a fine one, as a share of the coarse simulator's own error ({said})",
         "Error of the voltage (NRMSE) on orbits that no enhancer has learnt from. Dot and bar: nominal orbits, mean and standard error over "
-        f"{first['num_seeds']} seeds. Crosses: mean over five severities of each of the five faults. Last row: the sensor's noise alone.",
+        f"{in_seeds(found['seeds'])}. Crosses: mean over five severities of each of the five faults. Last row: the sensor's noise alone.",
     )
     grid = panels(figure, down + 0.2, 1, len(regimes), gap=(0.3, 0.12), sharey=True)
     left = 1.75 / DOUBLE
@@ -57,6 +65,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
             axes.plot(spread, [-height] * 2, color=colour, linewidth=2.2, alpha=0.45)
             axes.plot(nominal["mean"], -height, "o", color=colour, markersize=5)
         axes.set_xscale("log")
+        axes.margins(x=0.06)
         axes.set_title(f"{regime} regime", weight="bold")
         axes.set_xlabel("NRMSE")
         axes.set_yticks(-np.arange(len(order)), order)
@@ -98,11 +107,11 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
         )
         for regime, about in regimes.items()
     }
-    said = "; ".join(f"{regime}: {100 * whole:.0f} % against {100 * residual:.0f} %" for regime, (whole, residual) in mean.items())
+    said = "; ".join(f"{regime}: {100 * whole:.0f} % and {100 * residual:.0f} %" for regime, (whole, residual) in mean.items())
     figure, down = new_sheet(
         DOUBLE,
         4.6,
-        f"The difference between telemetry and the enhanced run finds more fault windows than detectors that see the telemetry alone ({said})",
+        f"Fault windows that are found by detectors trained on enhanced telemetry, and by the difference between telemetry and the enhanced run ({said})",
         "Share of windows with an alarm under each fault, at thresholds that are set for 1 % false alarms on each training's own windows: high recall "
         "is worth nothing where false alarms are high, see the other figure. Means over detectors and seeds; severity 1 is the largest.",
     )
@@ -112,6 +121,8 @@ def recall(found: Findings) -> matplotlib.figure.Figure:
             for label, (values, style) in _recalls(about, kind).items():
                 axes.plot(about["faults"][kind]["severities"], 100 * np.asarray(values), markersize=3, linewidth=1.2, label=label, **style)
             axes.set_ylim(-4, 104)
+            axes.set_xlim(0.12, 1.08)
+            axes.set_xticks((0.2, 0.6, 1.0))
         row[0].set_ylabel(f"{regime}: recall (%)")
     for axes, kind in zip(grid[0], kinds, strict=True):
         axes.set_title(kind, weight="bold", fontsize=7.5)
