@@ -21,6 +21,8 @@ examples:
                                                      which part of the pipeline lowers false alarms; takes hours, can be interrupted
   python -m enhsim_tf.reproduce --experiment labelled --data DIR
                                                      real telemetry with labelled anomalies; some minutes per channel
+  python -m enhsim_tf.reproduce --experiment battery
+                                                     a real pair of simulators: a battery in PyBaMM; some minutes per seed
 
 exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
 """
@@ -31,6 +33,14 @@ FAMILIES = (
     *NOISES, "fractional", "bernoulli", "one_over_f", "interference", "telegraph", "quantised", "bursts", "heavy_tails", "loudness",
     "signal_dependent",
 )  # fmt: skip
+EXPERIMENTS = {
+    "robustness": "run_experiment",
+    "factorial": "run_factorial",
+    "noise": "run_noise",
+    "labelled": "run_labelled",
+    "battery": "run_battery",
+}
+WITH_ENVIRONMENTS = ("robustness", "factorial", "noise")
 RUNG_NAMES = ("none", "Gaussian", "autoregression", "residual windows", "autoregressive network", "GAN of the paper", "convolutional GAN")
 
 
@@ -71,9 +81,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--experiment",
-        choices=("robustness", "factorial", "noise", "labelled"),
+        choices=EXPERIMENTS,
         help="instead of the paper: robustness trains detectors with each kind of noise; factorial combines windows, extraction, enhancer and "
-        "generator; noise tries noise models on fourteen families; labelled tests detectors on real telemetry with labelled anomalies",
+        "generator; noise tries noise models on fourteen families; labelled tests detectors on real telemetry with labelled anomalies; battery "
+        "enhances a coarse battery simulator to a fine one",
     )
     parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
     parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
@@ -91,9 +102,8 @@ def run(options: argparse.Namespace) -> int:
     check(options)
     folder = make_folders(options)
     if options.experiment:
-        return {"robustness": run_experiment, "factorial": run_factorial, "noise": run_noise, "labelled": run_labelled}[options.experiment](
-            options, folder
-        )
+        runs = (run_robustness, run_factorial, run_noise, run_labelled, run_battery)
+        return dict(zip(EXPERIMENTS, runs, strict=True))[options.experiment](options, folder)
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import figure_caption
     from enhsim_tf.reproduce.figure import save
@@ -169,7 +179,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if different else 0
 
 
-def run_experiment(options: argparse.Namespace, folder: Path) -> int:
+def run_robustness(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on robustness in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.publish.report import report, verdict_lines
     from enhsim_tf.reproduce.robustness.run import FOLDER, run
@@ -260,6 +270,27 @@ def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     return 0
 
 
+def run_battery(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the study of a pair of battery simulators in a subfolder of the figures' folder, and returns the exit code."""
+    from enhsim_tf.reproduce.battery.simulate import check_installed
+
+    check_installed()
+    from enhsim_tf.reproduce.battery.findings import lines
+    from enhsim_tf.reproduce.battery.page import fill_page
+    from enhsim_tf.reproduce.battery.run import FOLDER, run
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    turned = {} if options.seeds is None else {"battery__num_seeds": options.seeds}
+    out = folder / FOLDER
+    found = run(make_settings(options.budget, **turned), options.cache or default_cache(), out, options.fresh, tell)
+    tell("\n" + "\n".join(lines(found)))
+    if options.budget == "full" and out == Path("figures") / FOLDER and not is_other(options):
+        fill_page(Path("docs/battery.md"), found)
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
 def check(options: argparse.Namespace) -> None:
     """Rejects options that cannot be used, before anything is computed and without importing TensorFlow."""
     from enhsim_tf.common.errors import InputError
@@ -269,9 +300,9 @@ def check(options: argparse.Namespace) -> None:
     if options.spread < 0:
         raise InputError(f"Expected a number of further seeds. Received: --spread {options.spread}.")
     chosen_figures(options.only)
-    for name in ("environment", "seeds"):
-        if getattr(options, name) is not None and options.experiment not in ("robustness", "factorial", "noise"):
-            raise InputError(f"Expected --{name} together with --experiment robustness, factorial or noise. Received: --{name} without it.")
+    for name, experiments in (("environment", WITH_ENVIRONMENTS), ("seeds", (*WITH_ENVIRONMENTS, "battery"))):
+        if getattr(options, name) is not None and options.experiment not in experiments:
+            raise InputError(f"Expected --{name} together with --experiment {' or '.join(experiments)}. Received: --{name} without it.")
     if (options.experiment == "labelled") != (options.data is not None) or (options.channels and options.data is None):
         raise InputError("Expected --experiment labelled and --data DIR together, and --channels only with them. Received: one alone.")
     if options.data is not None:

@@ -245,6 +245,22 @@ class LabelledSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class BatterySettings:
+    """The study of a pair of battery simulators: `python -m enhsim_tf.reproduce --experiment battery`."""
+
+    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
+    first_seed: int = setting(3_000, "seed", f"{OUR_CHOICE}: designs were chosen on seeds below")
+    fit_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days of telemetry, to which the simulator is fitted", smoke=4)
+    more_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: as many again, for detectors trained on more real telemetry", smoke=4)
+    test_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days on which everything is judged", smoke=4)
+    coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
+    fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
+    paper_epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: as in the ladder of enhancers, with a falling rate", "40", smoke=1)
+    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "about 1,000", smoke=4)
+    num_network_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: autoencoders and the noise GAN take most of the time", smoke=1)
+
+
+@dataclasses.dataclass(frozen=True)
 class Settings:
     """All groups of settings, the budget and the seed."""
 
@@ -260,6 +276,7 @@ class Settings:
     factorial: FactorialSettings = FactorialSettings()
     ladder: LadderSettings = LadderSettings()
     labelled: LabelledSettings = LabelledSettings()
+    battery: BatterySettings = BatterySettings()
     budget: str = "full"
     seed: int = 0
 

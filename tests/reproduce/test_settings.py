@@ -60,6 +60,15 @@ COUNTS = {
     "labelled.num_iterations",
     "labelled.num_arm_windows",
     "labelled.max_order",
+    "battery.num_seeds",
+    "battery.fit_orbits",
+    "battery.more_orbits",
+    "battery.test_orbits",
+    "battery.coarse_orbits",
+    "battery.fault_orbits",
+    "battery.paper_epochs",
+    "battery.num_iterations",
+    "battery.num_network_seeds",
 }
 
 

@@ -1,0 +1,200 @@
+"""Fills the generated parts of `docs/battery.md` from the findings of the study of the battery."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.reproduce.battery.detectors import ARMS, RESIDUALS
+from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
+from enhsim_tf.reproduce.battery.findings import C9_RATIO, LARGEST_GAP, LARGEST_SHARE, LEAST_DETECTORS, LEAST_SPEED, TRUSTED
+from enhsim_tf.reproduce.publish.results import fill_parts
+
+Findings = Mapping[str, Any]
+
+
+def fill_page(path: Path, found: Findings) -> None:
+    """Writes the generated parts of the page between their markers.
+
+    Args:
+        path: The page; nothing is done where it does not exist.
+        found: The findings.
+
+    Raises:
+        InputError: If the markers of a part are not there once.
+    """
+    if not path.is_file():
+        return
+    text = fill_parts(path.read_text(encoding="utf-8"), parts_of(found), path.name)
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def parts_of(found: Findings) -> dict[str, str]:
+    """The generated parts of the page by the names of their markers."""
+    return {
+        "scope": _scope(found),
+        "targets": _targets(found),
+        "errors": _errors(found),
+        "faults": _faults(found),
+        "speed": _speed(found),
+        "detectors": _detectors(found),
+        "recall": _recall(found),
+    }
+
+
+def _scope(found: Findings) -> str:
+    seeds, regimes = found["seeds"], found["regimes"]
+    runs = {key: sum(about["runs"][key] for about in regimes.values()) for key in ("number", "reduced")}
+    most = max(about["runs"]["most_reductions"] for about in regimes.values())
+    return (
+        f"The numbers on this page come from {'one seed' if len(seeds) == 1 else f'{len(seeds)} seeds'} with PyBaMM {found['versions']['pybamm']}, "
+        f"budget {found['budget']}. Of {runs['number']:,} recorded runs, {runs['reduced']} were recorded with a reduced current because a solver failed "
+        f"at the full one (at most {most} reductions of a tenth); none was left out."
+    )
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _errors(found: Findings) -> str:
+    regimes = found["regimes"]
+    names = [*ENHANCERS, "chosen", FLOOR]
+    rows = []
+    for name in names:
+        cells = [name]
+        for about in regimes.values():
+            each = about["nominal"][name]
+            cells.append(f"{each['mean']:.4f} ± {each['standard_error']:.4f}")
+            cells.append(f"{about['nominal_true'][name]['mean']:.4f}" if name in about["nominal_true"] else "0")
+        rows.append(cells)
+    head = ["enhancer"] + [f"{regime}, {what}" for regime in regimes for what in ("against telemetry", "against the truth")]
+    chosen = "; ".join(
+        f"{regime}: " + ", ".join(f"{name} for {number} of {about['num_seeds']} seeds" for name, number in about["chosen"].items())
+        for regime, about in regimes.items()
+    )
+    heat = "; ".join(
+        f"{regime}: " + ", ".join(f"{name} {each['mean']:.3f}" for name, each in about["temperature"].items())
+        for regime, about in regimes.items()
+    )
+    return f"{_table(head, rows)}\n\nChosen on held-out blocks of the fitted orbits: {chosen}. Temperature, against telemetry: {heat}."
+
+
+def _faults(found: Findings) -> str:
+    rows = []
+    for regime, about in found["regimes"].items():
+        for kind, each in about["faults"].items():
+            for place, severity in enumerate(each["severities"]):
+                cells = [
+                    f"{each[name][place]:.3f}"
+                    for name in ("coarse itself", "paper's network", "ridge, voltage", "ridge, all columns", "chosen")
+                ]
+                rows.append([regime, kind, f"{severity:g}", *cells, f"{100 * each['out_of_range'][place]:.0f} %"])
+    head = [
+        "regime",
+        "fault",
+        "severity",
+        "coarse itself",
+        "paper's network",
+        "ridge, voltage",
+        "ridge, all columns",
+        "chosen",
+        "out of range",
+    ]
+    return _table(head, rows)
+
+
+def _speed(found: Findings) -> str:
+    regimes = found["regimes"]
+    names = list(next(iter(regimes.values()))["seconds"])
+    rows = [[name, *(f"{1000 * about['seconds'][name]:.3f}" for about in regimes.values())] for name in names]
+    ratios = "; ".join(
+        f"{regime}: {about['bars']['speed']['alone']:,.0f} times faster than the fine simulator without the coarse run that it enhances, "
+        f"{about['bars']['speed']['with_coarse']:.1f} times with it"
+        for regime, about in regimes.items()
+    )
+    return f"{_table(['processor time for an orbit (ms)', *regimes], rows)}\n\nThe slowest chosen enhancer, {ratios}."
+
+
+def _mean(detectors: Mapping[str, Any], key: str) -> float:
+    values = [each[key]["mean"] if isinstance(each[key], Mapping) else each[key] for each in detectors.values()]
+    return sum(values) / len(values)
+
+
+def _detectors(found: Findings) -> str:
+    rows = []
+    for regime, about in found["regimes"].items():
+        arms = [arm for arm in (*ARMS, *RESIDUALS) if arm in about["detectors"]]
+        arms += [arm for arm in about["detectors"] if arm not in arms]
+        for arm in arms:
+            each = about["detectors"][arm]
+            seeds = {one["num_seeds"] for one in each.values()}
+            cells = [
+                f"{100 * _mean(each, key):.1f} %" for key in ("false_alarms", "recall", "recall_at_real_rate", "found", "found_by_chance")
+            ]
+            rows.append([regime, arm, str(len(each)), "-".join(map(str, sorted(seeds))), *cells])
+    head = [
+        "regime",
+        "trained on",
+        "detectors",
+        "seeds",
+        "false alarms",
+        "recall",
+        "recall at the real rate",
+        "runs found",
+        "nominal stretches called",
+    ]
+    return _table(head, rows)
+
+
+def _recall(found: Findings) -> str:
+    rows = []
+    for regime, about in found["regimes"].items():
+        severities = next(iter(about["faults"].values()))["severities"]
+        for arm in about["detectors"]:
+            each = about["detectors"][arm]
+            cells = []
+            for kind in about["faults"]:
+                means = [
+                    sum(one["by_fault_at_real_rate"][kind][place] for one in each.values()) / len(each) for place in range(len(severities))
+                ]
+                cells.append(" ".join(f"{100 * value:.0f}" for value in means))
+            rows.append([regime, arm, *cells])
+    first = next(iter(found["regimes"].values()))
+    return _table(["regime", "trained on", *first["faults"]], rows)
+
+
+def _targets(found: Findings) -> str:
+    rows = []
+    for regime, about in found["regimes"].items():
+        bars = about["bars"]
+        worse = bars["faults"]["worse_than_coarse"]
+        silent = [each for each in worse if not each["is_warned"]]
+        gaps = bars["alarms"]["gaps"]
+        told = {
+            f"error of the chosen enhancer at most {LARGEST_SHARE:g} of the coarse simulator's": ("error", f"{bars['error']['share']:.3f}"),
+            "not behind ridge regression by more than a standard error": (
+                "ridge",
+                f"{bars['ridge']['behind']:+.4f}, standard error {bars['ridge']['standard_error']:.4f}",
+            ),
+            f"on every fault below the coarse simulator's error, or out of range in more than {100 * TRUSTED:.0f} % of windows": (
+                "faults",
+                f"{len(worse)} of {sum(len(each['severities']) for each in about['faults'].values())} cases worse, {len(silent)} of them without a warning",
+            ),
+            f"at least {LEAST_SPEED:,} times faster than the fine simulator": (
+                "speed",
+                f"{bars['speed']['with_coarse']:.1f} with the coarse run, {bars['speed']['alone']:,.0f} without",
+            ),
+            f"false alarms within {100 * LARGEST_GAP:g} points of as many real orbits, at least {LEAST_DETECTORS} of {bars['alarms']['of']} detectors": (
+                "alarms",
+                f"{bars['alarms']['within']} of {len(gaps)} judged; " + ", ".join(f"{name} {100 * gap:+.1f}" for name, gap in gaps.items()),
+            ),
+            f"C9: on every fault at most {C9_RATIO:g} times the nominal error, and below the coarse simulator's": (
+                "C9",
+                f"largest ratio {bars['C9']['largest_ratio']:.1f}; below the coarse error: {'always' if bars['C9']['is_below_coarse'] else 'not always'}",
+            ),
+        }
+        rows += [[regime, target, "reached" if bars[name]["is_reached"] else "missed", numbers] for target, (name, numbers) in told.items()]
+    return _table(["regime", "target", "verdict", "measured"], rows)
