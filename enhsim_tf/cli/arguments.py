@@ -16,10 +16,11 @@ from telemetry to scores:
   python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   python -m enhsim_tf score models new.csv --out scores.parquet
 
-python -m enhsim_tf fit --help shows the options of fit; generate, verify and score have help texts too. The reproduction of the
+python -m enhsim_tf fit --help shows the options of fit; generate, verify, score and inject have help texts too. The reproduction of the
 paper is a separate command: python -m enhsim_tf.reproduce.
 """
 DETECTORS = tuple(map(option_name, registry.DETECTORS))
+KINDS = "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain"
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 
 
@@ -39,7 +40,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES + EXIT,
         **form,
     )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score}", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,inject}", required=True)
 
     fit = commands.add_parser(
         "fit",
@@ -140,6 +141,37 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(score)
+
+    inject = commands.add_parser(
+        "inject",
+        help="put labelled anomalies into nominal telemetry",
+        description="Puts anomalies into nominal telemetry of your own, at drawn or given places, and writes it with labels (docs/inject.md).",
+        epilog=f"kinds: {KINDS}\n" + EXIT,
+        **form,
+    )
+    _add_source(inject)
+    inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at drawn places, or all; used in turn")
+    inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at drawn places (default: one of each kind)")
+    inject.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="KIND[:SEVERITY]@BEGIN/LENGTH",
+        help="an anomaly at a given sample or time, such as ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h; may be repeated",
+    )
+    inject.add_argument(
+        "--severity", default="4", metavar="SD[:SD]", help="severity in standard deviations of the noise, or its range (default: 4)"
+    )
+    inject.add_argument(
+        "--length", default="100", metavar="N[:N]", help="length in samples, or a time such as 10min, or its range (default: 100)"
+    )
+    inject.add_argument(
+        "--gap", type=int, metavar="N", help="samples around a drawn anomaly that stay nominal (default: the longest length)"
+    )
+    inject.add_argument("--noise-sd", type=float, metavar="SD", help="standard deviation of the noise (default: from second differences)")
+    inject.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
+    inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
+    _add_seed(inject)
     return parser.parse_args(arguments)
 
 

@@ -18,6 +18,7 @@ from enhsim_tf.cli.arguments import DETECTORS, parse
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
+from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.enhanced_simulator import report_measure
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
@@ -104,7 +105,9 @@ def shell(*arguments, cwd, **options):
 # help
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["fit", "--help"], ["generate", "--help"], ["score", "--help"], ["scrore"], []])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["fit", "--help"], ["generate", "--help"], ["score", "--help"], ["inject", "--help"], ["scrore"], []]
+)
 def test_help_and_wrong_options_import_nothing_slow(arguments):
     script = (
         "import sys\nfrom enhsim_tf.__main__ import main\ncode = 0\n"
@@ -122,7 +125,12 @@ def test_help_and_wrong_options_import_nothing_slow(arguments):
 
 
 def test_help_lists_all_choices(capsys):
-    for command, words in (("generate", [*MODES, "stuck:0.5"]), ("score", DETECTORS), ("fit", ["influxdb://", "convolutional", "paper"])):
+    for command, words in (
+        ("generate", [*MODES, "stuck:0.5"]),
+        ("score", DETECTORS),
+        ("fit", ["influxdb://", "convolutional", "paper"]),
+        ("inject", INJECTIONS),
+    ):
         with pytest.raises(SystemExit):
             parse([command, "--help"])
         text = capsys.readouterr().out
@@ -209,6 +217,38 @@ def test_several_channels_have_a_file_each(told, tmp_path):
     assert told("generate", "WORLD/single", "--windows", 1, "--out", "scores.v2")[0] == 0  # an existing folder may have a dot in its name
 
 
+def test_inject_writes_labelled_telemetry(told, tmp_path):
+    arguments = (
+        "inject",
+        "WORLD/one.csv",
+        "--kinds",
+        "all",
+        "--length",
+        "20:60",
+        "--at",
+        "level_shift:8@2024-01-01T02:00/5min",
+        "--seed",
+        3,
+    )
+    code, out, errors = told(*arguments, "--out", "labelled.parquet")
+    assert code == 0 and not errors and "9 anomalies" in out and "noise sd 0.19" in out
+    frame = pd.read_parquet(tmp_path / "labelled.parquet")
+    assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
+    assert frame.loc[frame["severity"] == 8, "time"].min() == pd.Timestamp("2024-01-01T02:00Z") and set(frame["scenario"]) == {
+        "nominal",
+        *INJECTIONS,
+    }
+    nominal = table()["volts"].to_numpy(np.float32)
+    np.testing.assert_array_equal(frame["mask"], frame["value"].to_numpy() != nominal)
+
+
+def test_inject_writes_one_timeeval_file_or_one_file_for_each_channel(told, tmp_path):
+    code, _, errors = told("inject", "WORLD/two.csv", "--kinds", "ramp", "--timeeval", "--out", "joint.csv")
+    assert code == 0 and not errors and list(pd.read_csv(tmp_path / "joint.csv")) == ["timestamp", "volts", "amps", "is_anomaly"]
+    code, _, errors = told("inject", "WORLD/two.csv", "--kinds", "ramp", "--timeeval", "--out", "single")
+    assert code == 0 and not errors and sorted(path.name for path in (tmp_path / "single").iterdir()) == ["amps.csv", "volts.csv"]
+
+
 def test_a_single_channel_and_a_single_simulator_match_whatever_their_names(told, tmp_path):
     code, _, errors = told("score", "WORLD/single", "WORLD/two.csv", "--column", "amps", "--windows", 30, "--out", "scores.parquet")
     assert (code, errors) == (0, []) and len(pd.read_parquet(tmp_path / "scores.parquet")) == 1_500
@@ -263,9 +303,10 @@ def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
 
 FIT = ["fit", "WORLD/one.csv", "--out", "models"]
 GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
+INJECT = ["inject", "WORLD/one.csv", "--out", "x.csv"]
 SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
 WRONG = {
-    "no command": ([], "{fit,generate,verify,score}"),
+    "no command": ([], "{fit,generate,verify,score,inject}"),
     "unknown command": (["train"], "'train'"),
     "fit without a source": (["fit", "--out", "models"], "SOURCE"),
     "fit without a place": (["fit", "WORLD/one.csv"], "--out"),
@@ -335,6 +376,18 @@ WRONG = {
     "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "telemetry below a window": (["score", "WORLD/single", "WORLD/short.csv", "--out", "x.parquet"], "60 samples"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
+    "inject nothing": (INJECT, "--kinds"),
+    "inject an unknown kind": ([*INJECT, "--kinds", "ramp,rust"], "'rust'"),
+    "inject at no place": ([*INJECT, "--at", "ramp@here"], "BEGIN/LENGTH"),
+    "inject beyond the telemetry": ([*INJECT, "--at", "ramp@1490/20"], "1,500 samples"),
+    "inject twice at a place": ([*INJECT, "--at", "ramp@90/20", "--at", "gain@100/5"], "do not overlap"),
+    "inject more than fits": ([*INJECT, "--kinds", "all", "--length", "1000"], "room for 8 anomalies"),
+    "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
+    "inject a range of three": ([*INJECT, "--kinds", "ramp", "--length", "1:2:3"], "--length 1:2:3"),
+    "inject without noise": (["inject", "WORLD/words.csv", "--kinds", "ramp", "--out", "x.csv"], "words.csv"),
+    "inject into the telemetry itself": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "WORLD/one.csv"], "for both"),
+    "inject into a picture": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "x.png"], "x.png"),
+    "inject TimeEval's table as Parquet": ([*INJECT[:-1], "x.parquet", "--kinds", "ramp", "--timeeval"], "x.parquet"),
     "scores as a picture": (["score", "WORLD/single", "WORLD/one.csv", "--out", "x.png"], "x.png"),
 }
 
