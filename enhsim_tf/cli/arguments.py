@@ -126,7 +126,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     score = commands.add_parser(
         "score",
         help="score telemetry with a detector trained on generated telemetry",
-        description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.",
+        description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.\n"
+        "Beside SCORES it writes the alarms, one per row, to a file that ends in .events.csv: begin, end, peak, duration_s,\n"
+        "num_flagged, score and confidence. Flags at most one window apart are one alarm. It reports the expected number of false\n"
+        "alarms per day at the threshold, with its 95 % interval.",
         epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False) + f"\n{EXIT}",
         **form,
     )
