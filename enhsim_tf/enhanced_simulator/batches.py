@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.enhanced_simulator.checks import check_finite
 from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
 
 if TYPE_CHECKING:
@@ -23,8 +24,11 @@ def complete_batch(
 
     Returns:
         float32 array of the same shape, in the telemetry's unit.
+
+    Raises:
+        InputError: If a value is not finite.
     """
     windows = simulator.enhance(coarse)
     if levels is not None:
         windows = apply_shift_and_gain(windows, *levels.T)
-    return windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng)
+    return check_finite(windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng))

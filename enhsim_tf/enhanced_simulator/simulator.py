@@ -12,7 +12,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import complete_batch
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_finite, check_parts, is_finite
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
@@ -361,7 +361,7 @@ class EnhancedSimulator:
         for begin, clean in zip(starts, enhanced, strict=True):
             signal[begin : begin + window] += fade * clean
             total[begin : begin + window] += fade
-        return (signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed))
+        return check_finite((signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed)))
 
     def _follow_levels(self, num_windows: int, seed: int) -> np.ndarray:
         """Returns offset and gain of consecutive windows: those seen in training, forwards and backwards from a random time."""
@@ -376,8 +376,17 @@ class EnhancedSimulator:
             folder: The folder. A simulator that was saved there before is replaced.
 
         Raises:
-            InputError: If the folder contains something other than a saved simulator; it is left unchanged.
+            InputError: If the folder contains something other than a saved simulator, or if a number of the simulator is not
+                finite; the folder is left unchanged.
         """
+        networks = {"enhancer": self.enhancer, "generator": self.noise.generator, "discriminator": self.noise.discriminator}
+        numbers = np.array([self.interval_s, self.offset, self.scale, self.noise.scale])
+        bad = [name for name, network in networks.items() if not is_finite(network.get_weights())]
+        if bad or not is_finite([numbers, *([] if self.levels is None else [self.levels])]):
+            raise InputError(
+                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad) or 'units or levels'} with NaN or infinity. "
+                "It was not saved. Fit it again."
+            )
         settings = {
             "coarse": self.coarse.get_config(),
             "noise": self.noise.get_config(),
@@ -388,7 +397,6 @@ class EnhancedSimulator:
             "trained": self.trained,
             "keras": keras.__version__,
         }
-        networks = {"enhancer": self.enhancer, "generator": self.noise.generator, "discriminator": self.noise.discriminator}
         write_saved(folder, networks, settings)
 
     @classmethod

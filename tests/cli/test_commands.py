@@ -213,7 +213,8 @@ def test_several_channels_have_a_file_each(told, tmp_path):
         "score", "WORLD/models", "WORLD/two.csv", "--windows", 30, "--detector", "limit-check", "--out", "scores.v2/new"
     )
     assert (code, errors) == (0, [])
-    assert {path.name for path in (tmp_path / "scores.v2" / "new").iterdir()} == {"volts.parquet", "amps.parquet"}
+    names = {"volts.parquet", "amps.parquet", "volts.events.csv", "amps.events.csv"}
+    assert {path.name for path in (tmp_path / "scores.v2" / "new").iterdir()} == names
     assert told("generate", "WORLD/single", "--windows", 1, "--out", "scores.v2")[0] == 0  # an existing folder may have a dot in its name
 
 
