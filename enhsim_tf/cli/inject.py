@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_of, counted, for_each, outputs_of
+from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -30,7 +30,7 @@ def run_inject(options: argparse.Namespace) -> int:
     except ValueError:
         raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
     chosen = InjectOptions(kinds, degrees, length, options.number, tuple(options.at), options.gap, options.noise_sd, options.seed)
-    cleaning = cleaning_of(options, 3)
+    cleaning = cleaning_options(options, 3)
     from enhsim_tf.telemetry.cleaning.clean import clean
     from enhsim_tf.telemetry.sources import read_source
 
@@ -38,7 +38,7 @@ def run_inject(options: argparse.Namespace) -> int:
     suffixes = (".csv",) if options.timeeval else (".parquet", ".csv")
     is_joint = options.timeeval and options.out.suffix in suffixes and not os.path.isdir(options.out)
     names = ["all channels"] if is_joint else list(series)
-    paths = outputs_of(options.out, names, suffixes)
+    paths = output_paths(options.out, names, suffixes)
     for path in paths.values():
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
             raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")

@@ -137,9 +137,9 @@ def _given(text: str, options: InjectOptions, index: "pd.Index", interval_s: flo
     length = _num_samples(found["length"], interval_s)
     if found["begin"].isdecimal():
         return Anomaly(found["kind"], severity, int(found["begin"][:12]), length)
-    from enhsim_tf.datasets.labelled_windows import start_of
+    from enhsim_tf.datasets.labelled_windows import parse_start
 
-    time = start_of(found["begin"])
+    time = parse_start(found["begin"])
     if not hasattr(index, "tz"):
         raise InputError(f"Expected a sample number as the place, since the telemetry has no times. Received: {text[:80]!r}.")
     place = int(index.searchsorted(time))

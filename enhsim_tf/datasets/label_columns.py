@@ -24,6 +24,7 @@ from enhsim_tf.common.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 NOMINAL = "nominal"
 LABELS = ("scenario", "severity", "onset", "end", "mask")
@@ -56,6 +57,30 @@ def label_samples(mask: np.ndarray, events: Sequence[tuple[str, float, int, int]
         "onset": pd.arrays.IntegerArray(onset, hidden.copy()),
         "end": pd.arrays.IntegerArray(end, hidden.copy()),
         "mask": mask,
+    }
+
+
+def label_windows(names: Sequence[str], severities: Sequence[float], masks: np.ndarray) -> dict[str, "pa.Array"]:
+    """Makes the label columns of windows.
+
+    Args:
+        names: Scenario of each window, which may be nominal.
+        severities: Severity of the scenario of each window.
+        masks: Boolean array that marks the changed samples, shape `(windows, samples)`.
+
+    Returns:
+        The columns `LABELS`. A window in which the scenario changed no sample is labelled nominal, with the severity 0.
+    """
+    import pyarrow as pa
+
+    changed, samples = masks.any(axis=1), masks.shape[1]
+    onset, end = masks.argmax(axis=1), samples - masks[:, ::-1].argmax(axis=1)
+    return {
+        "scenario": pa.array(np.where(changed, np.asarray(names, object), NOMINAL), pa.string()),
+        "severity": pa.array(np.where(changed, severities, 0).astype(np.float32)),
+        "onset": pa.array(onset.astype(np.int32), mask=~changed),
+        "end": pa.array(end.astype(np.int32), mask=~changed),
+        "mask": pa.FixedSizeListArray.from_arrays(pa.array(masks.ravel()), samples),
     }
 
 

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, spans, tolerance_of
 from enhsim_tf.enhanced_simulator.checks import check_finite
 from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
 
@@ -32,3 +33,35 @@ def complete_batch(
     if levels is not None:
         windows = apply_shift_and_gain(windows, *levels.T)
     return check_finite(windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng))
+
+
+def complete_labelled_batch(
+    simulator: "EnhancedSimulator",
+    coarse: np.ndarray,
+    nominal: np.ndarray,
+    levels: np.ndarray | None,
+    noise_rng: np.random.Generator | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Completes a batch of coarse windows, some of which a degraded mode has changed, and marks the changed samples.
+
+    Args:
+        simulator: The simulator.
+        coarse: Coarse windows, float32 of shape `(windows, samples)`.
+        nominal: Nominal coarse windows of the same times, same shape.
+        levels: Offset and gain of each window, shape `(windows, 2)`, or None for a simulator whose level is constant.
+        noise_rng: Random generator of the noise, or None for windows without noise.
+
+    Returns:
+        `(windows, mask)`: float32 windows in the telemetry's unit, and a boolean array of the same shape, which marks the samples
+        that differ from the nominal windows with the same noise (see `changes`). All other samples equal them to the bit.
+
+    Raises:
+        InputError: If a value is not finite.
+    """
+    changed = coarse != nominal
+    windows, mask = complete_batch(simulator, nominal, levels, None), np.zeros(coarse.shape, bool)
+    if changed.any():
+        degraded = complete_batch(simulator, coarse, levels, None)
+        tolerance = tolerance_of(simulator.noise_sd, simulator.scale)
+        windows, mask = blend_changes(windows, degraded, spans(changed), fade_length(coarse.shape[1]), tolerance)
+    return check_finite(windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng)), mask
