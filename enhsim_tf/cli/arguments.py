@@ -84,7 +84,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     generate = commands.add_parser(
         "generate",
         help="generate labelled training data",
-        description="Generates windows or one continuous series. Labels give the scenario (nominal or a degraded mode), its severity and onset.",
+        description="Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
+        "the scenario (nominal or the mode), its severity, onset and end.",
         epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1; onset is the start\n"
         "of the degraded mode as a share of the window or series (default: 0.25). A channel without times has one sample per second.\n"
         + EXIT,
@@ -104,9 +105,29 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         metavar="MODE:SEVERITY[:ONSET]",
         help="a degraded mode, such as stuck:0.5; may be repeated",
     )
+    series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
+    series.add_argument("--number", type=int, metavar="N", help="number of events at drawn places; the scenarios are used in turn")
+    series.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="MODE[:SEVERITY]@BEGIN/LENGTH",
+        help="an event at a given sample or time, such as stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h; may be repeated",
+    )
+    series.add_argument(
+        "--length", default="100", metavar="N[:N]", help="length of drawn events in samples, or a time, or its range (default: 100)"
+    )
+    series.add_argument("--gap", type=int, metavar="N", help="nominal samples around a drawn event (default: the longest length)")
+    series.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channel, is_anomaly")
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
     generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
-    generate.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet file, or a folder for several channels")
+    generate.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="a .parquet file (a series may be a .csv file), or a folder for several channels",
+    )
     large = generate.add_argument_group(
         "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
     )

@@ -21,10 +21,11 @@ def run_inject(options: argparse.Namespace) -> int:
     """
     from enhsim_tf.datasets.inject import InjectOptions, inject_channel
     from enhsim_tf.datasets.label_columns import write_table, write_timeeval
+    from enhsim_tf.datasets.places import split_limits
     from enhsim_tf.detection.anomalies import INJECTIONS
 
     kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
-    severity, length = (_limits(name, getattr(options, name)) for name in ("severity", "length"))
+    severity, length = (split_limits(name, getattr(options, name)) for name in ("severity", "length"))
     try:
         degrees = (float(severity[0]), float(severity[1]))
     except ValueError:
@@ -71,14 +72,6 @@ def run_inject(options: argparse.Namespace) -> int:
     for frame in frames.values():
         tell(frame.attrs["lines"])
     return 0
-
-
-def _limits(name: str, text: str) -> tuple[str, str]:
-    """Splits `least:greatest`; one value stands for both."""
-    least, colon, greatest = text.partition(":")
-    if not least or (colon and not greatest) or ":" in greatest:
-        raise InputError(f"Expected --{name} as one value, or as least:greatest. Received: --{name} {text}.")
-    return least, greatest or least
 
 
 def _without_notes(frame: "pd.DataFrame") -> "pd.DataFrame":

@@ -1,7 +1,6 @@
 """Anomalies in a user's own nominal telemetry: a labelled test set without a simulator."""
 
 import dataclasses
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import label_samples
 from enhsim_tf.datasets.labelled_windows import parse_length
+from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_place
 from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.detection.injection import Anomaly, check_kind, estimate_noise_sd, inject_anomalies
 from enhsim_tf.telemetry.series import Telemetry
@@ -17,7 +17,6 @@ from enhsim_tf.telemetry.series import Telemetry
 if TYPE_CHECKING:
     import pandas as pd
 
-_AT = re.compile(r"(?P<kind>\w+)(?::(?P<severity>[^@]+))?@(?P<begin>.+)/(?P<length>[^/]+)")
 _MOST = 10_000  # anomalies in a channel
 
 
@@ -67,7 +66,7 @@ class InjectOptions:
         for text in self.length:
             parse_length(str(text))
         for text in self.at:
-            _parse_at(text)
+            _checked_place(text)
 
 
 def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.DataFrame":
@@ -98,15 +97,16 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.Da
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
     index = pd.concat([to_series(part) for part in parts]).index
-    shortest, longest = (_num_samples(text, interval_s) for text in options.length)
-    if shortest > longest:
-        raise InputError(f"Expected lengths with the least first. Received: {options.length[0]}:{options.length[1]}.")
+    shortest, longest = length_limits(options.length, interval_s)
     number = (len(options.kinds) if options.number is None else options.number) if options.kinds else 0
     drawn = [
-        (options.kinds[each % len(options.kinds)], _draw(options.severity, rng), int(rng.integers(shortest, longest + 1)))
+        (options.kinds[each % len(options.kinds)], draw_between(options.severity, rng), int(rng.integers(shortest, longest + 1)))
         for each in range(number)
     ]
-    given = [_given(text, options, index, interval_s, rng) for text in options.at]
+    given = []
+    for place in map(_checked_place, options.at):
+        severity = draw_between(options.severity, rng) if place.severity is None else place.severity
+        given.append(Anomaly(place.kind, severity, *place.samples(index, interval_s)))
     gap = max([length for *_, length in drawn], default=0) if options.gap is None else options.gap
     changed, mask, anomalies = inject_anomalies(values, given, drawn, noise_sd, gap, rng)
     events = [(each.kind, each.severity, each.begin, each.end) for each in anomalies]
@@ -115,50 +115,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.Da
     return frame
 
 
-def _parse_at(text: str) -> re.Match:
-    found = _AT.fullmatch(text)
-    try:
-        if not found:
-            raise ValueError
-        severity = float(found["severity"] or 1)
-    except ValueError:
-        raise InputError(
-            f"Expected KIND[:SEVERITY]@BEGIN/LENGTH, such as ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h. Received: {text[:80]!r}."
-        ) from None
-    check_kind(found["kind"], severity)
-    parse_length(found["length"])
-    return found
-
-
-def _given(text: str, options: InjectOptions, index: "pd.Index", interval_s: float, rng: np.random.Generator) -> Anomaly:
-    """Returns the anomaly at a given place, counted in samples."""
-    found = _parse_at(text)
-    severity = float(found["severity"]) if found["severity"] else _draw(options.severity, rng)
-    length = _num_samples(found["length"], interval_s)
-    if found["begin"].isdecimal():
-        return Anomaly(found["kind"], severity, int(found["begin"][:12]), length)
-    from enhsim_tf.datasets.labelled_windows import parse_start
-
-    time = parse_start(found["begin"])
-    if not hasattr(index, "tz"):
-        raise InputError(f"Expected a sample number as the place, since the telemetry has no times. Received: {text[:80]!r}.")
-    place = int(index.searchsorted(time))
-    if time < index[0] or place == len(index) or (index[place] - time).total_seconds() > interval_s:
-        raise InputError(
-            f"Expected a time from {index[0].isoformat()} to {index[-1].isoformat()}, not in a gap. Received: {text[:80]!r}. Choose another."
-        )
-    return Anomaly(found["kind"], severity, place, length)
-
-
-def _draw(limits: tuple[float, float], rng: np.random.Generator) -> float:
-    low, high = limits
-    return low if low == high else float(rng.uniform(low, high))
-
-
-def _num_samples(text: str, interval_s: float) -> int:
-    """Converts a length to samples, at least one."""
-    length, unit = parse_length(str(text))
-    samples = length if unit == "samples" else length / interval_s
-    if not 0.5 <= samples < 1e9:
-        raise InputError(f"Expected a length of at least one sample, one every {interval_s:g} s. Received: {str(text)[:40]!r}.")
-    return round(samples)
+def _checked_place(text: str) -> Place:
+    place = parse_place(text)
+    check_kind(place.kind, 1.0 if place.severity is None else place.severity)
+    return place

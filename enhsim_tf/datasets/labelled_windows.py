@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.label_columns import label_samples, label_windows, write_table
+from enhsim_tf.datasets.label_columns import label_samples, label_windows, write_table, write_timeeval
 from enhsim_tf.datasets.scenario_file import Mix
 
 if TYPE_CHECKING:
@@ -245,8 +245,10 @@ def write_series_labelled(
     scenario: Degraded | None,
     seed: int,
     start: "str | pd.Timestamp | None" = None,
-) -> None:
-    """Writes the result of `series_labelled` to a Parquet file. Its index becomes the first column.
+    schedule: Sequence[ScheduledMode] = (),
+    is_timeeval: bool = False,
+) -> int:
+    """Writes the result of `series_labelled` to a Parquet or CSV file. Its index becomes the first column.
 
     Args:
         path: Path of the file.
@@ -255,8 +257,18 @@ def write_series_labelled(
         scenario: A degraded mode, or None for nominal telemetry.
         seed: Random seed.
         start: Time of the first sample, or None.
+        schedule: Degraded modes at given places, instead of a scenario.
+        is_timeeval: Whether to write TimeEval's CSV, see `label_columns.write_timeeval`.
+
+    Returns:
+        Number of changed samples.
     """
-    write_table(path, series_labelled(simulator, num_samples, scenario, seed, start))
+    frame = series_labelled(simulator, num_samples, scenario, seed, start, schedule)
+    if is_timeeval:
+        write_timeeval(path, {str(simulator.trained.get("telemetry", "value")): frame})
+    else:
+        write_table(path, frame)
+    return int(frame["mask"].sum())
 
 
 def _active(scenario: Degraded | None, num_samples: int) -> Degraded | None:

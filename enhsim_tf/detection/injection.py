@@ -13,7 +13,7 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.anomalies import INJECTIONS, SPIKE_INTERVAL
 
-_TRIES = 100  # drawn places of an anomaly, before the series is said to have no place where it changes a sample
+TRIES = 100  # drawn places of an anomaly, before the series is said to have no place where it changes a sample
 _NORMAL_MAD = 1.482602218505602  # standard deviation of a normal distribution, in units of its median absolute deviation
 
 
@@ -133,27 +133,15 @@ def inject_anomalies(
         found.append(changed)
     for kind, severity, length in sorted(drawn, key=lambda each: -each[2]):
         check_kind(kind, severity)
-        for _ in range(_TRIES):
-            begins = _free(bounds, taken, length, gap)
-            total = sum(stop - start for start, stop in begins)
-            if not total:
-                raise InputError(
-                    f"Expected room for {len(given) + len(drawn)} anomalies that do not overlap. Received: {edges[-1]:,} samples, in which "
-                    f"{len(found)} are placed and {length} samples with a gap of {gap} on each side are nowhere free. Ask for fewer or shorter ones."
-                )
-            place = int(rng.integers(total))
-            for start, stop in begins:
-                if place < stop - start:
-                    break
-                place -= stop - start
-            anomaly = Anomaly(kind, severity, start + place, length)
+        for _ in range(TRIES):
+            anomaly = Anomaly(kind, severity, draw_begin(bounds, taken, length, gap, rng), length)
             changed = _put(values, nominal, anomaly, bounds, noise_sd, rng)
             if changed is not None:
                 break
         else:
             raise InputError(
                 f"Expected a place where the anomaly changes a sample. Received: {kind} at {severity:g} sd over {length} samples, which changes "
-                f"none at {_TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
+                f"none at {TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
             )
         taken.append((anomaly.begin, anomaly.end))
         found.append(changed)
@@ -185,8 +173,19 @@ def _put(
     return dataclasses.replace(anomaly, begin=anomaly.begin + int(places[0]), length=int(places[-1] - places[0]) + 1)
 
 
-def _free(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], length: int, gap: int) -> list[tuple[int, int]]:
-    """Returns the ranges of samples at which an anomaly of a length may begin."""
+def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], length: int, gap: int, rng: np.random.Generator) -> int:
+    """Draws the first sample of an event uniformly from all samples at which it fits.
+
+    Args:
+        bounds: First sample and end of each part of the series. An event lies within one part.
+        taken: First sample and end of each event that is placed already.
+        length: Number of samples of the event.
+        gap: Least number of samples between two events.
+        rng: Random number generator.
+
+    Raises:
+        InputError: If the event fits nowhere.
+    """
     ranges = []
     for start, stop in bounds:
         inside = sorted(each for each in taken if start <= each[0] < stop)
@@ -195,7 +194,15 @@ def _free(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], l
             if first - gap - length >= begin:
                 ranges.append((begin, first - gap - length + 1))
             begin = end + gap
-    return ranges
+    counts = np.cumsum([stop - start for start, stop in ranges])
+    if not ranges:
+        raise InputError(
+            f"Expected room for events that do not overlap. Received: {bounds[-1][1]:,} samples, in which {len(taken)} events are placed and "
+            f"{length} samples with a gap of {gap} on each side are nowhere free. Ask for fewer or shorter ones."
+        )
+    place = int(rng.integers(counts[-1]))
+    number = int(np.searchsorted(counts, place, side="right"))
+    return ranges[number][0] + place - (int(counts[number - 1]) if number else 0)
 
 
 def _check_place(anomaly: Anomaly, bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]]) -> None:

@@ -195,6 +195,21 @@ def test_generate_writes_a_series_with_times(fitted, told, tmp_path):
     assert (frame["scenario"] == "stuck").any() and not frame["mask"][: 1_620 - 4].any()  # changes fade in over a sixteenth of a window
 
 
+def test_generate_writes_a_series_with_several_events(fitted, told, tmp_path):
+    arguments = ["generate", fitted[0], "--continuous", "2000", "--scenario", "stuck:1", "--scenario", "drift:1", "--number", "3"]
+    arguments += ["--length", "30:60", "--at", "gain_loss:1@2025-01-01T01:00/10min", "--start", "2025-01-01"]
+    code, out, errors = told(*arguments, "--out", "day.csv")
+    assert (code, errors) == (0, []) and "with 4 events" in out
+    frame = pd.read_csv(tmp_path / "day.csv")
+    assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
+    assert set(frame["scenario"]) == {"nominal", "stuck", "drift", "gain_loss"} and frame["onset"].nunique() == 4
+    first = frame.loc[frame["scenario"] == "gain_loss", "onset"].iloc[0]
+    assert 360 - 4 <= first < 420  # changes fade in over a sixteenth of a window
+    assert told(*arguments, "--timeeval", "--out", "eval.csv")[0] == 0
+    same = pd.read_csv(tmp_path / "eval.csv")
+    assert list(same) == ["timestamp", "volts", "is_anomaly"] and same["is_anomaly"].astype(bool).tolist() == frame["mask"].tolist()
+
+
 def test_score_gives_every_sample_a_score_and_a_flag(fitted, world, told, tmp_path):
     code, out, errors = told("score", fitted[0], "WORLD/one.csv", "--windows", 60, "--out", "scores.csv")
     assert (code, errors) == (0, []) and "of 1,500 scored samples" in out and "set to flag 1.0%" in out
@@ -361,6 +376,14 @@ WRONG = {
         [*GENERATE, "--continuous", "1d", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"],
         "at most one --scenario",
     ),
+    "events of windows": ([*GENERATE, "--windows", "5", "--scenario", "stuck:1", "--number", "3"], "--continuous"),
+    "events of no mode": ([*GENERATE, "--continuous", "1d", "--number", "3"], "--number 3"),
+    "event of an unknown mode": ([*GENERATE, "--continuous", "1d", "--at", "rust:1@5/5"], "'rust'"),
+    "event beyond the series": ([*GENERATE, "--continuous", "100", "--at", "stuck:1@90/20"], "sample 110"),
+    "events that overlap": ([*GENERATE, "--continuous", "900", "--at", "stuck:1@90/20", "--at", "drift:1@100/20"], "Move one"),
+    "a place and a scenario": ([*GENERATE, "--continuous", "900", "--at", "stuck:1@90/20", "--scenario", "drift:1"], "--number"),
+    "more events than fit": ([*GENERATE, "--continuous", "900", "--scenario", "drift:1", "--number", "9"], "room for events"),
+    "windows for TimeEval": ([*GENERATE, "--windows", "5", "--timeeval"], "--continuous"),
     "start without a series": ([*GENERATE, "--windows", "5", "--start", "2024-01-01"], "--start"),
     "start that is no time": ([*GENERATE, "--continuous", "1d", "--start", "soon"], "'soon'"),
     "models that are not there": (["generate", "nowhere", "--windows", "5", "--out", "x.parquet"], "nowhere"),
@@ -386,7 +409,7 @@ WRONG = {
     "inject at no place": ([*INJECT, "--at", "ramp@here"], "BEGIN/LENGTH"),
     "inject beyond the telemetry": ([*INJECT, "--at", "ramp@1490/20"], "1,500 samples"),
     "inject twice at a place": ([*INJECT, "--at", "ramp@90/20", "--at", "gain@100/5"], "do not overlap"),
-    "inject more than fits": ([*INJECT, "--kinds", "all", "--length", "1000"], "room for 8 anomalies"),
+    "inject more than fits": ([*INJECT, "--kinds", "all", "--length", "1000"], "room for events"),
     "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
     "inject a range of three": ([*INJECT, "--kinds", "ramp", "--length", "1:2:3"], "--length 1:2:3"),
     "inject without noise": (["inject", "WORLD/words.csv", "--kinds", "ramp", "--out", "x.csv"], "words.csv"),

@@ -102,7 +102,7 @@ def test_overlaps_and_places_outside_are_refused(refused):
         inject_anomalies([series(100), series(100)], [Anomaly("ramp", 4, 90, 20)], [], 0.2, 0, rng)
     with refused("within a part"):
         inject_anomalies([series(100)], [Anomaly("ramp", 4, 100, 1)], [], 0.2, 0, rng)
-    with refused("room for 2 anomalies", "1 are placed"):
+    with refused("room for events", "1 events are placed"):
         inject_anomalies([series(100)], [], [("ramp", 4, 60), ("ramp", 4, 41)], 0.2, 0, rng)
     with refused("range of float32"):
         inject_anomalies([series(100)], [Anomaly("dropout", 1e39, 10, 5)], [], 1.0, 0, rng)
