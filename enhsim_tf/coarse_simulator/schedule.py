@@ -48,6 +48,22 @@ class ScheduledMode:
         return self.begin + self.length
 
 
+def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int] | None:
+    """Returns the samples of a window or series at which a stuck mechanism stands still, as its first sample and its end.
+
+    Args:
+        scenario: A degraded mode, or None.
+        num_samples: Length of the window or series.
+
+    Returns:
+        None if the mechanism is not stuck.
+    """
+    if scenario is None or scenario.mode != "stuck" or scenario.severity == 0:
+        return None
+    begin = min(scenario.first_sample(num_samples), num_samples - 1)
+    return begin, begin + int(round(scenario.severity * (num_samples - 1 - begin), 6)) + 1
+
+
 def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[ScheduledMode]:
     """Checks that the events of a schedule do not overlap and lie within a series.
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.schedule import held_samples
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import NOMINAL, label_windows
@@ -122,18 +123,20 @@ def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: i
         own = np.flatnonzero(rows.model == number)
         for first in range(0, len(own), batch):
             chosen = own[first : first + batch]
-            coarse, nominal = np.zeros((2, batch, plan.window), np.float32)
+            (coarse, nominal), held = np.zeros((2, batch, plan.window), np.float32), []
             for place, row in enumerate(chosen):
                 times = simulator.interval_s * (rows.start[row] + np.arange(plan.window))
                 nominal[place] = coarse[place] = simulator.coarse.simulate(times[None])[0]
                 scenario = _scenario_of(plan, rows, row)
                 if scenario is not None:
                     coarse[place] = simulator.coarse.simulate(times[None], scenario, happening)[0]
+                    stuck = held_samples(scenario, plan.window)
+                    held += [(place, *stuck)] if stuck else []
             levels = None
             if simulator.levels is not None:
                 levels = np.zeros((batch, 2))
                 levels[: len(chosen)] = simulator.levels[(rows.level[chosen] * len(simulator.levels)).astype(int)]
-            completed = complete_labelled_batch(simulator, coarse, nominal, levels, noise)
+            completed = complete_labelled_batch(simulator, coarse, nominal, levels, noise, held)
             windows[chosen], masks[chosen] = (each[: len(chosen)] for each in completed)
     return windows, masks, rows
 

@@ -1,10 +1,11 @@
 """The step that all generation of windows shares: one batch from coarse windows to telemetry ("Combined" in the paper's pipeline)."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, spans, tolerance_of
+from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
 from enhsim_tf.enhanced_simulator.checks import check_finite
 from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
 
@@ -41,6 +42,7 @@ def complete_labelled_batch(
     nominal: np.ndarray,
     levels: np.ndarray | None,
     noise_rng: np.random.Generator | None,
+    held: Sequence[tuple[int, int, int]] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Completes a batch of coarse windows, some of which a degraded mode has changed, and marks the changed samples.
 
@@ -50,6 +52,8 @@ def complete_labelled_batch(
         nominal: Nominal coarse windows of the same times, same shape.
         levels: Offset and gain of each window, shape `(windows, 2)`, or None for a simulator whose level is constant.
         noise_rng: Random generator of the noise, or None for windows without noise.
+        held: Window, first sample and end of each range of samples at which a mechanism is stuck. Its telemetry stands still there,
+            and the coarse window is not used.
 
     Returns:
         `(windows, mask)`: float32 windows in the telemetry's unit, and a boolean array of the same shape, which marks the samples
@@ -58,10 +62,11 @@ def complete_labelled_batch(
     Raises:
         InputError: If a value is not finite.
     """
-    changed = coarse != nominal
+    changed, tolerance = coarse != nominal, tolerance_of(simulator.noise_sd, simulator.scale)
+    changed[[row for row, *_ in held]] = False
     windows, mask = complete_batch(simulator, nominal, levels, None), np.zeros(coarse.shape, bool)
     if changed.any():
         degraded = complete_batch(simulator, coarse, levels, None)
-        tolerance = tolerance_of(simulator.noise_sd, simulator.scale)
         windows, mask = blend_changes(windows, degraded, spans(changed), fade_length(coarse.shape[1]), tolerance)
+    hold_values(windows, mask, held, tolerance)
     return check_finite(windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng)), mask

@@ -3,9 +3,13 @@
 The enhancer maps whole windows, so a change of a few coarse samples changes every sample of its output, also before the change
 began. Generated telemetry therefore takes the enhanced degraded run only from the first to the last coarse sample that differs
 from the nominal run of the same seed. Over a sixteenth of a window on both sides it fades into the enhanced nominal run, and
-beyond that it equals the nominal run to the bit. Differences up to a tenth of the standard deviation of the noise are removed. A
-sample is therefore either marked, and differs by more than that tolerance, or it is the sample of the nominal run.
+beyond that it equals the nominal run to the bit. Where a mechanism is stuck, the telemetry without noise keeps the value that it had
+when the mechanism stopped: the enhancer has never seen a mechanism that stands still, and its output moves on. Differences up to a
+tenth of the standard deviation of the noise are removed. A sample is therefore either marked, and differs by more than that
+tolerance, or it is the sample of the nominal run.
 """
+
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -71,3 +75,19 @@ def blend_changes(
     blended = (nominal + weight * (np.asarray(degraded, np.float64) - nominal)).astype(np.float32)
     mask = np.abs(blended.astype(np.float64) - nominal) > tolerance
     return np.where(mask, blended, nominal), mask
+
+
+def hold_values(windows: np.ndarray, mask: np.ndarray, held: Iterable[tuple[int, int, int]], tolerance: float) -> None:
+    """Puts the changes of stuck mechanisms into runs that are nominal there, and marks them, both in place.
+
+    Args:
+        windows: Enhanced run, float32 of shape `(rows, samples)`.
+        mask: Boolean array of the same shape.
+        held: Row, first sample and end of each range of samples that keeps the value of its first sample.
+        tolerance: Largest difference from the nominal run that does not count as a change.
+    """
+    for row, begin, end in held:
+        piece, value = windows[row, begin:end], windows[row, begin]
+        changed = np.abs(piece.astype(np.float64) - value) > tolerance
+        piece[changed] = value
+        mask[row, begin:end] |= changed

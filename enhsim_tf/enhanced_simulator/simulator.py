@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, simulate_schedule
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, held_samples, simulate_schedule
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import complete_batch, complete_labelled_batch
-from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, spans, tolerance_of
+from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_finite, check_parts, is_finite
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
@@ -333,7 +333,11 @@ class EnhancedSimulator:
             times = self.interval_s * (starts[first : first + _CHUNK, None] + np.arange(self.window))
             nominal = self.coarse.simulate(times)
             coarse = nominal if scenario is None else self.coarse.simulate(times, scenario, rng)
-            yield complete_labelled_batch(self, coarse, nominal, None if levels is None else levels[first : first + _CHUNK], noise_rng)
+            held = held_samples(scenario, self.window)
+            rows = [(row, *held) for row in range(len(coarse))] if held else []
+            yield complete_labelled_batch(
+                self, coarse, nominal, None if levels is None else levels[first : first + _CHUNK], noise_rng, rows
+            )
 
     def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
         check_counts(num_windows=(num_windows, 0))
@@ -416,12 +420,19 @@ class EnhancedSimulator:
             coarse = simulate_schedule(self.coarse, times, schedule, rng)
         clean, mask, events = self._join_series(nominal, levels)[:num_samples], np.zeros(num_samples, bool), []
         if coarse is not None:
-            inside = np.zeros((1, num_samples), bool)
-            for _, _, begin, end in ranges:
-                inside[:, begin:end] = spans((coarse != nominal)[None, begin:end])
-            tolerance = tolerance_of(self.noise_sd, self.scale)
-            degraded = self._join_series(coarse, levels)[:num_samples]
-            (clean,), (mask,) = blend_changes(clean[None], degraded[None], inside, fade_length(window), tolerance)
+            inside, held = np.zeros((1, num_samples), bool), []
+            for mode, severity, begin, end in ranges:
+                stuck = held_samples(scenario or Degraded(mode, severity, 0.0), end - begin)
+                if stuck:
+                    held.append((0, begin + stuck[0], begin + stuck[1]))
+                else:
+                    inside[:, begin:end] = spans((coarse != nominal)[None, begin:end])
+            tolerance, clean, mask = tolerance_of(self.noise_sd, self.scale), clean[None].copy(), mask[None]
+            if inside.any():
+                degraded = self._join_series(coarse, levels)[None, :num_samples]
+                clean, mask = blend_changes(clean, degraded, inside, fade_length(window), tolerance)
+            hold_values(clean, mask, held, tolerance)
+            clean, mask = clean[0], mask[0]
             edges = [0, *((before[3] + after[2]) // 2 for before, after in itertools.pairwise(ranges)), num_samples]
             for (mode, severity, *_), (begin, end) in zip(ranges, itertools.pairwise(edges), strict=True):
                 changed = np.flatnonzero(mask[begin:end])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode, held_samples
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhanced_simulator.changes import TOLERANCE, blend_changes, spans
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -50,6 +50,9 @@ def test_unmarked_samples_of_a_hundred_scenarios_equal_the_nominal_run(spreading
         coarse = spreading.generate_coarse(8, scenario, number) != spreading.generate_coarse(8, None, number)
         for marks, changed in zip(mask, coarse, strict=True):
             near = np.convolve(spans(changed[None])[0], np.ones(2 * FADE + 1), "same") > 0
+            if scenario.mode == "stuck":
+                begin, end = held_samples(scenario, WINDOW)
+                near[begin:end] = True
             assert not marks[~near].any()  # at most a sixteenth of a window beyond the coarse change
             num_changed += marks.any()
     assert num_changed > 600
@@ -75,6 +78,23 @@ def test_unmarked_samples_of_random_series_equal_the_nominal_series(spreading):
             assert mask[onset] and mask[end - 1] and (mode, severity) in {(each.mode, each.severity) for each in schedule}
             covered[onset:end] = True
         assert covered[mask].all()
+
+
+@pytest.mark.parametrize("severity", [0.05, 0.5, 1.0])
+def test_a_stuck_mechanism_gives_still_telemetry_until_its_end(spreading, severity):
+    scenario, tolerance = Degraded("stuck", severity, 0.25), TOLERANCE * spreading.noise_sd
+    windows = spreading.generate_clean(20, scenario, 3)
+    last = 16 + int(severity * 47)  # of 48 samples from the onset on, the first one is the one at which the mechanism stops
+    assert held_samples(scenario, WINDOW) == (16, last + 1)
+    assert np.abs(windows[:, 16 : last + 1] - windows[:, 16:17]).max() <= tolerance
+    np.testing.assert_array_equal(windows[:, last + 1 :], spreading.generate_clean(20, None, 3)[:, last + 1 :])
+    coarse, times = COARSE.simulate(np.arange(float(WINDOW))[None], scenario)[0], np.arange(WINDOW)
+    assert len(set(coarse[16 : last + 1])) == 1 and (coarse[last + 1 :] == COARSE.simulate(times[None])[0, last + 1 :]).all()
+    schedule = [ScheduledMode("stuck", severity, 100, 48), ScheduledMode("drift", 1.0, 300, 50)]
+    without = EnhancedSimulator(COARSE, spreading.enhancer, GaussianNoise(0.0, WINDOW), levels=spreading.levels)
+    values, mask, events = without.generate_labelled_series(500, seed=2, schedule=schedule)
+    np.testing.assert_allclose(values[100 : last + 85], values[100], atol=2e-4)
+    assert events[0][0] == "stuck" and events[0][3] <= last + 85 and not mask[last + 85 : 290].any()
 
 
 def test_nominal_telemetry_has_no_marks(spreading):
