@@ -21,10 +21,11 @@ with a simulator of your own, which recorded simulator.csv beside the telemetry 
   python -m enhsim_tf fit telemetry.csv --coarse simulator.csv --out models
   python -m enhsim_tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
-python -m enhsim_tf fit --help shows the options of fit; generate, verify and score have help texts too. The reproduction of the
+python -m enhsim_tf fit --help shows the options of fit; generate, verify, score and inject have help texts too. The reproduction of the
 paper is a separate command: python -m enhsim_tf.reproduce.
 """
 DETECTORS = tuple(map(option_name, registry.DETECTORS))
+KINDS = "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain"
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 
 
@@ -44,7 +45,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES + EXIT,
         **form,
     )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score}", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,inject}", required=True)
 
     fit = commands.add_parser(
         "fit",
@@ -104,7 +105,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     generate = commands.add_parser(
         "generate",
         help="generate labelled training data",
-        description="Generates windows or one continuous series. Labels give the scenario (nominal or a degraded mode), its severity and onset.",
+        description="Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
+        "the scenario (nominal or the mode), its severity, onset and end.",
         epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1; onset is the start\n"
         "of the degraded mode as a share of the window or series (default: 0.25). A channel without times has one sample per second.\n"
         + EXIT,
@@ -124,9 +126,29 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         metavar="MODE:SEVERITY[:ONSET]",
         help="a degraded mode, such as stuck:0.5; may be repeated",
     )
+    series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
+    series.add_argument("--number", type=int, metavar="N", help="number of events at drawn places; the scenarios are used in turn")
+    series.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="MODE[:SEVERITY]@BEGIN/LENGTH",
+        help="an event at a given sample or time, such as stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h; may be repeated",
+    )
+    series.add_argument(
+        "--length", default="100", metavar="N[:N]", help="length of drawn events in samples, or a time, or its range (default: 100)"
+    )
+    series.add_argument("--gap", type=int, metavar="N", help="nominal samples around a drawn event (default: the longest length)")
+    series.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channel, is_anomaly")
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
     generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
-    generate.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet file, or a folder for several channels")
+    generate.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="a .parquet file (a series may be a .csv file), or a folder for several channels",
+    )
     coarse = generate.add_argument_group("your own simulator", "for models that were fitted with --coarse (docs/own_simulator.md)")
     _add_coarse(coarse)
     coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with another draw of noise (default: 1)")
@@ -150,7 +172,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     score = commands.add_parser(
         "score",
         help="score telemetry with a detector trained on generated telemetry",
-        description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.",
+        description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.\n"
+        "Beside SCORES it writes the alarms, one per row, to a file that ends in .events.csv: begin, end, peak, duration_s,\n"
+        "num_flagged, score and confidence. Flags at most one window apart are one alarm. It reports the expected number of false\n"
+        "alarms per day at the threshold, with its 95 % interval.",
         epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False) + f"\n{EXIT}",
         **form,
     )
@@ -167,6 +192,37 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     _add_coarse(coarse)
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(score)
+
+    inject = commands.add_parser(
+        "inject",
+        help="put labelled anomalies into nominal telemetry",
+        description="Puts anomalies into nominal telemetry of your own, at drawn or given places, and writes it with labels (docs/inject.md).",
+        epilog=f"kinds: {KINDS}\n" + EXIT,
+        **form,
+    )
+    _add_source(inject)
+    inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at drawn places, or all; used in turn")
+    inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at drawn places (default: one of each kind)")
+    inject.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="KIND[:SEVERITY]@BEGIN/LENGTH",
+        help="an anomaly at a given sample or time, such as ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h; may be repeated",
+    )
+    inject.add_argument(
+        "--severity", default="4", metavar="SD[:SD]", help="severity in standard deviations of the noise, or its range (default: 4)"
+    )
+    inject.add_argument(
+        "--length", default="100", metavar="N[:N]", help="length in samples, or a time such as 10min, or its range (default: 100)"
+    )
+    inject.add_argument(
+        "--gap", type=int, metavar="N", help="samples around a drawn anomaly that stay nominal (default: the longest length)"
+    )
+    inject.add_argument("--noise-sd", type=float, metavar="SD", help="standard deviation of the noise (default: from second differences)")
+    inject.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
+    inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
+    _add_seed(inject)
     return parser.parse_args(arguments)
 
 

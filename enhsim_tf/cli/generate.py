@@ -1,11 +1,18 @@
 """`python -m enhsim_tf generate`: generates labelled training data with fitted simulators."""
 
 import argparse
+from typing import TYPE_CHECKING
 
 from enhsim_tf.cli.options import counted, for_each, load, output_paths
 from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
+
+if TYPE_CHECKING:
+    from enhsim_tf.coarse_simulator.degraded import Degraded
+    from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+    from enhsim_tf.datasets.places import Place
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 
 def run_generate(options: argparse.Namespace) -> int:
@@ -27,11 +34,15 @@ def run_generate(options: argparse.Namespace) -> int:
         raise InputError(
             f"Expected --start only together with --continuous. Received: --start {options.start} with --windows. Leave it out."
         )
+    placing = [name for name in ("at", "number", "gap", "timeeval") if getattr(options, name)]
+    if placing and options.continuous is None:
+        raise InputError(f"Expected --{placing[0]} only together with --continuous. Received: --{placing[0]} without it. Leave it out.")
     if options.workers or options.engine or options.scenarios:
         from enhsim_tf.cli.generate_many import run_generate_many
 
         return run_generate_many(options, tell)
     options.seed = options.seed or 0
+    from enhsim_tf.coarse_simulator.degraded import Degraded
     from enhsim_tf.datasets.labelled_windows import (
         divide_windows,
         parse_length,
@@ -41,6 +52,7 @@ def run_generate(options: argparse.Namespace) -> int:
         write_series_labelled,
         write_windows_labelled,
     )
+    from enhsim_tf.datasets.places import parse_place, split_limits
     from enhsim_tf.datasets.scenario_file import make_mix
 
     scenarios = [parse_scenario(text) for text in options.scenario]
@@ -48,8 +60,21 @@ def run_generate(options: argparse.Namespace) -> int:
         raise InputError("Expected --windows or --continuous. Received: neither.")
     if options.windows is not None and options.windows < 1:
         raise InputError(f"Expected at least one window. Received: --windows {options.windows}.")
-    if options.continuous is not None and len(scenarios) > 1:
-        raise InputError(f"Expected at most one --scenario with --continuous. Received: {len(scenarios)}. Write one series for each.")
+    is_scheduled = bool(options.at) or options.number is not None
+    if options.continuous is not None and len(scenarios) > 1 and options.number is None:
+        raise InputError(
+            f"Expected at most one --scenario with --continuous, unless --number gives events at drawn places. Received: {len(scenarios)}."
+        )
+    if options.number is not None and not (1 <= options.number <= 10_000 and scenarios):
+        raise InputError(f"Expected --number from 1 to 10,000, with --scenario. Received: --number {options.number}.")
+    if options.at and scenarios and options.number is None:
+        raise InputError(
+            "Expected --number with --at and --scenario. Received: none. Leave out --scenario, or say how many events to draw."
+        )
+    places = [parse_place(text) for text in options.at]
+    for place in places:
+        Degraded(place.kind, 1.0 if place.severity is None else place.severity)
+    split_limits("length", options.length)
     nominal_share = 0.5 if options.nominal_share is None else options.nominal_share
     shares = divide_windows(make_mix(scenarios, nominal_share), options.windows, options.seed) if options.windows else []
     start = None if options.start is None else parse_start(options.start)
@@ -58,19 +83,31 @@ def run_generate(options: argparse.Namespace) -> int:
     from enhsim_tf.enhanced_simulator.model_folder import chosen_of, models_of
 
     models = chosen_of(models_of(options.models), options.channel)
-    paths = output_paths(options.out, models, (".parquet",))
+    suffixes = (".csv",) if options.timeeval else (".parquet",) if options.continuous is None else (".parquet", ".csv")
+    paths = output_paths(options.out, models, suffixes)
 
     def write(channel: str) -> None:
         simulator = load(models[channel])
         if options.continuous is None:
-            write_windows_labelled(paths[channel], simulator, shares)
+            unchanged = write_windows_labelled(paths[channel], simulator, shares)
             what = f"{counted(options.windows, 'window')} of {simulator.window} samples"
         else:
             length = parse_num_samples(options.continuous, simulator.interval_s)
-            scenario = scenarios[0] if scenarios else None
-            write_series_labelled(paths[channel], simulator, length, scenario, options.seed, start)
+            scenario = scenarios[0] if scenarios and not is_scheduled else None
+            schedule, unchanged = _schedule_of(options, simulator, length, places, scenarios) if is_scheduled else [], {}
+            num_changed = write_series_labelled(
+                paths[channel], simulator, length, scenario, options.seed, start, schedule, options.timeeval
+            )
             what = f"{counted(length, 'sample')}, one every {simulator.interval_s:g} s"
+            what += f", with {counted(len(schedule), 'event')}" if schedule else ""
+            what += f", {num_changed:,} of them changed" if schedule or scenario else ""
         tell(f"{printable(channel)}: {what} in {paths[channel]}")
+        for scenario, number in unchanged.items():
+            if number:
+                tell(
+                    f"{printable(channel)}: {scenario.mode} at {scenario.severity:g} changes nothing in {counted(number, 'window')}, "
+                    "which are labelled nominal"
+                )
         if not scenarios:
             return
         from enhsim_tf.enhanced_simulator.trusted_range import TrustedRange
@@ -83,3 +120,28 @@ def run_generate(options: argparse.Namespace) -> int:
             )
 
     return for_each(models, write)
+
+
+def _schedule_of(
+    options: argparse.Namespace, simulator: "EnhancedSimulator", length: int, places: "list[Place]", modes: "list[Degraded]"
+) -> "list[ScheduledMode]":
+    """Returns the events of a series at the places that are given, and at drawn ones."""
+    import numpy as np
+    import pandas as pd
+
+    from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+    from enhsim_tf.datasets.labelled_windows import parse_start
+    from enhsim_tf.datasets.places import length_limits, split_limits
+    from enhsim_tf.datasets.schedule import draw_schedule
+
+    index = pd.RangeIndex(length)
+    if options.start is not None:
+        since = np.round(simulator.interval_s * 1e9 * np.arange(length)).astype(np.int64)
+        index = pd.DatetimeIndex(parse_start(options.start) + pd.to_timedelta(since, unit="ns"))
+    given = [
+        ScheduledMode(place.kind, 1.0 if place.severity is None else place.severity, *place.samples(index, simulator.interval_s))
+        for place in places
+    ]
+    lengths = length_limits(split_limits("length", options.length), simulator.interval_s)
+    rng = np.random.default_rng([options.seed, 3])
+    return draw_schedule(simulator, length, given, modes, options.number or 0, lengths, options.gap, rng)

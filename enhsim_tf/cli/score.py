@@ -16,7 +16,7 @@ def run_score(options: argparse.Namespace) -> int:
         options: Parsed options of `score`.
     """
     from enhsim_tf.detection.registry import DETECTORS, option_name
-    from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel, write_scores
+    from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, events_path, score_channel, write_scores
 
     detector = {option_name(name): name for name in DETECTORS}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
@@ -36,7 +36,7 @@ def run_score(options: argparse.Namespace) -> int:
             f"Expected fitted channels: {printable(known)}. Received: {unknown[0]!r}. Select the channels to score with --column."
         )
     paths = output_paths(options.out, series, (".parquet", ".csv"))
-    for path in paths.values():
+    for path in [*paths.values(), *map(events_path, paths.values())]:
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
             raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
 
@@ -63,6 +63,12 @@ def run_score(options: argparse.Namespace) -> int:
             f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal samples"
             + (f"; {counted(left, 'sample')} not scored, in parts shorter than a window" if left else "")
             + f"; in {paths[channel]}"
+        )
+        number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
+        unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
+        tell(
+            f"{printable(channel)}: {counted(number, 'event')} in {events_path(paths[channel])}; on generated nominal telemetry "
+            f"{expected:.3g} false alarms per {unit} (95 % interval {low:.3g} to {high:.3g})"
         )
 
     return for_each(series, write)

@@ -1,7 +1,6 @@
-"""Labelled training data: windows, or one continuous series, with a label for the scenario of each window or sample.
+"""Labelled training data: windows, or one continuous series, with labels that mark exactly the samples that a scenario has changed.
 
-The labels are columns beside the data: `scenario` (`nominal` or a degraded mode), `severity`, and for windows `onset`, the
-first affected sample.
+The labels are the columns of `label_columns` beside the data.
 """
 
 import dataclasses
@@ -14,8 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.datasets.label_columns import label_samples, label_windows, write_table, write_timeeval
 from enhsim_tf.datasets.scenario_file import Mix
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
-NOMINAL = "nominal"
 _SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
 _LENGTH = re.compile(
     r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?"
@@ -152,27 +152,32 @@ def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
-def window_columns(window: int) -> dict[str, "pa.DataType"]:
+def window_columns(window: int, has_mask: bool = True) -> dict[str, "pa.DataType"]:
     """Returns the columns of labelled windows and their types.
 
     Args:
         window: Length of a window in samples.
+        has_mask: Whether the windows have an end and a mask. Those of earlier versions have not.
     """
     import pyarrow as pa
 
-    return {"window": pa.list_(pa.float32(), window), "scenario": pa.string(), "severity": pa.float32(), "onset": pa.int32()}
+    columns = {"window": pa.list_(pa.float32(), window), "scenario": pa.string(), "severity": pa.float32(), "onset": pa.int32()}
+    return columns | ({"end": pa.int32(), "mask": pa.list_(pa.bool_(), window)} if has_mask else {})
 
 
-def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> None:
+def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> dict[Degraded, int]:
     """Writes labelled windows to one Parquet file, chunk by chunk. The file appears only when it is complete.
 
-    The columns are `window` (a list of float32), `scenario`, `severity` and `onset` (the first affected sample, null for
-    nominal windows).
+    The columns are `window` (a list of float32) and `label_columns.LABELS`. A window that its scenario has not changed, such as
+    one in which the mechanism would have stood still anyway, is labelled nominal.
 
     Args:
         path: Path of the file.
         simulator: The simulator.
         shares: The scenarios and their numbers of windows.
+
+    Returns:
+        For each scenario, the number of its windows that are labelled nominal because it has changed no sample of them.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -181,17 +186,18 @@ def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulato
         {"interval_s": repr(simulator.interval_s), "channel": str(simulator.trained.get("telemetry", ""))}
     )
     make_folder(Path(path).parent)
+    unchanged: dict[Degraded, int] = {}
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
         for share in shares:
-            name, severity, onset = _labels(share.scenario, simulator.window)
-            for windows in simulator.generate_chunks(share.num_windows, share.scenario, share.seed):
-                columns = [
-                    pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), simulator.window),
-                    pa.array([name] * len(windows)),
-                    pa.array([severity] * len(windows), pa.float32()),
-                    pa.array([onset] * len(windows), pa.int32()),
-                ]
-                writer.write_table(pa.table(columns, schema=schema))
+            scenario = _active(share.scenario, simulator.window)
+            name, severity = (scenario.mode, scenario.severity) if scenario else ("", 0.0)
+            for windows, masks in simulator.generate_labelled_chunks(share.num_windows, scenario, share.seed):
+                values = pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), simulator.window)
+                labels = label_windows([name] * len(windows), [severity] * len(windows), masks)
+                writer.write_table(pa.table({"window": values, **labels}).cast(schema))
+                if scenario:
+                    unchanged[scenario] = unchanged.get(scenario, 0) + int(np.count_nonzero(~masks.any(axis=1)))
+    return unchanged
 
 
 def series_labelled(
@@ -200,38 +206,36 @@ def series_labelled(
     scenario: Degraded | None = None,
     seed: int = 0,
     start: "str | pd.Timestamp | None" = None,
+    schedule: Sequence[ScheduledMode] = (),
 ) -> "pd.DataFrame":
-    """Generates one continuous series with labels. Samples before the onset of the scenario are labelled nominal.
+    """Generates one continuous series with labels. Samples that equal those of the nominal series are labelled nominal.
 
     Args:
         simulator: The simulator.
         num_samples: Length of the series in samples.
-        scenario: A degraded mode, or None for nominal telemetry.
+        scenario: A degraded mode over the whole series, or None for nominal telemetry.
         seed: Random seed.
         start: Time of the first sample, for example "2024-01-01". A time without a time zone is taken as UTC. None gives
             times in seconds from 0.
+        schedule: Degraded modes at given places, each followed by nominal operation, instead of a scenario.
 
     Returns:
-        A data frame with one row per sample and the columns `value`, `scenario` (categorical) and `severity`. Its index is a
-        `DatetimeIndex` in UTC named `time`, or, without a start, seconds named `time_s`.
+        A data frame with one row per sample and the columns `value` and `label_columns.LABELS`; `scenario` is categorical. Its
+        index is a `DatetimeIndex` in UTC named `time`, or, without a start, seconds named `time_s`.
 
     Raises:
-        InputError: If the start is not a time.
+        InputError: If the start is not a time, if events overlap or lie outside the series, or if both a scenario and a schedule
+            are given.
     """
     import pandas as pd
 
-    name, severity, onset = _labels(scenario, num_samples)
+    scenario = _active(scenario, num_samples)
     seconds = np.arange(num_samples) * simulator.interval_s
     index = pd.Index(seconds, name="time_s")
     if start is not None:
         index = pd.DatetimeIndex(parse_start(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"), name="time")
-    late = np.zeros(num_samples, bool) if onset is None else np.arange(num_samples) >= onset
-    columns = {
-        "value": simulator.generate_series(num_samples, scenario, seed),
-        "scenario": pd.Categorical.from_codes(late.astype(np.int8), list(dict.fromkeys([NOMINAL, name]))),
-        "severity": np.where(late, severity, 0).astype(np.float32),
-    }
-    return pd.DataFrame(columns, index=index)
+    values, mask, events = simulator.generate_labelled_series(num_samples, scenario, seed, schedule=schedule)
+    return pd.DataFrame({"value": values, **label_samples(mask, events)}, index=index)
 
 
 def write_series_labelled(
@@ -241,8 +245,10 @@ def write_series_labelled(
     scenario: Degraded | None,
     seed: int,
     start: "str | pd.Timestamp | None" = None,
-) -> None:
-    """Writes the result of `series_labelled` to a Parquet file. Its index becomes the first column.
+    schedule: Sequence[ScheduledMode] = (),
+    is_timeeval: bool = False,
+) -> int:
+    """Writes the result of `series_labelled` to a Parquet or CSV file. Its index becomes the first column.
 
     Args:
         path: Path of the file.
@@ -251,18 +257,24 @@ def write_series_labelled(
         scenario: A degraded mode, or None for nominal telemetry.
         seed: Random seed.
         start: Time of the first sample, or None.
+        schedule: Degraded modes at given places, instead of a scenario.
+        is_timeeval: Whether to write TimeEval's CSV, see `label_columns.write_timeeval`.
+
+    Returns:
+        Number of changed samples.
     """
-    make_folder(Path(path).parent)
-    frame = series_labelled(simulator, num_samples, scenario, seed, start)
-    with replace_file(path) as temporary:
-        frame.reset_index().to_parquet(temporary, compression="zstd", index=False)
+    frame = series_labelled(simulator, num_samples, scenario, seed, start, schedule)
+    if is_timeeval:
+        write_timeeval(path, {str(simulator.trained.get("telemetry", "value")): frame})
+    else:
+        write_table(path, frame)
+    return int(frame["mask"].sum())
 
 
-def _labels(scenario: Degraded | None, num_samples: int) -> tuple[str, float, int | None]:
-    """Returns the name, severity and first affected sample of a scenario. Severity 0 is labelled nominal."""
+def _active(scenario: Degraded | None, num_samples: int) -> Degraded | None:
+    """Returns the scenario, or None if it changes nothing because its severity is 0."""
     if scenario is None or scenario.severity == 0:
-        return NOMINAL, 0.0, None
-    onset = scenario.first_sample(num_samples)
-    if onset >= num_samples:
+        return None
+    if scenario.first_sample(num_samples) >= num_samples:
         raise InputError(f"Expected an onset within {num_samples} samples. Received: {scenario.onset}. Choose an earlier one.")
-    return scenario.mode, scenario.severity, onset
+    return scenario

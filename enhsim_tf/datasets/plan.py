@@ -20,6 +20,7 @@ from enhsim_tf.enhanced_simulator.safe_loading import read_description
 from enhsim_tf.enhanced_simulator.saving import MANIFEST, check_saved, settings_of
 
 FORMAT = "enhsim_tf.datasets.generate/1"
+LABELS = "onset, end and mask of the changed samples"  # in the settings of a data set; earlier versions labelled from the onset on
 _SHARD = 8_192  # default windows per shard, for windows of up to 512 samples
 _SHARD_VALUES = 2**22  # default values per shard, for longer windows
 MOST_VALUES = 2**26  # maximum values per shard: 256 MiB, which a worker holds in memory
@@ -112,6 +113,7 @@ class Plan:
                 for part in self.mix.scenarios
             ],
             "models": [{"name": model.name, "share": model.share, "sha256": model.sha256} for model in self.models],
+            "labels": LABELS,
             "versions": {name: importlib.metadata.version(name) for name in _VERSIONS},
         }
 

@@ -3,8 +3,8 @@
 Each shard has a random seed of its own, and the networks always compute batches of the same size. The bytes of a shard are
 therefore the same in every worker and in every order of generation.
 
-The columns are `window` (a list of float32), `scenario` (`nominal` or a degraded mode), `severity`, `onset` (the first
-affected sample, null for nominal windows), and `model` if the plan has several models.
+The columns are `window` (a list of float32), `label_columns.LABELS`, and `model` if the plan has several models. Windows of data
+sets of earlier versions have neither an `end` nor a `mask`.
 """
 
 import functools
@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.schedule import held_samples
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.labelled_windows import NOMINAL, window_columns
-from enhsim_tf.datasets.plan import FORMAT, Plan
-from enhsim_tf.enhanced_simulator.batches import complete_batch
+from enhsim_tf.datasets.label_columns import NOMINAL, label_windows
+from enhsim_tf.datasets.labelled_windows import window_columns
+from enhsim_tf.datasets.plan import FORMAT, LABELS, Plan
+from enhsim_tf.enhanced_simulator.batches import complete_labelled_batch
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
 
 if TYPE_CHECKING:
@@ -102,7 +104,7 @@ def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator)
     return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
 
 
-def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, Rows]:
+def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
     """Generates the windows of a shard.
 
     Args:
@@ -111,25 +113,32 @@ def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: i
         shard: Number of the shard.
 
     Returns:
-        The windows, float32 of shape `(rows, samples)`, and their properties.
+        The windows, float32 of shape `(rows, samples)`, a boolean array of the same shape that marks the samples that a scenario
+        has changed, and the properties of the windows.
     """
     rows, happening, noise = draw_rows(plan, shard)
-    windows = np.empty((len(rows.start), plan.window), np.float32)
+    windows, masks = np.empty((len(rows.start), plan.window), np.float32), np.empty((len(rows.start), plan.window), bool)
     batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // plan.window))
     for number, simulator in enumerate(simulators):
         own = np.flatnonzero(rows.model == number)
         for first in range(0, len(own), batch):
             chosen = own[first : first + batch]
-            coarse = np.zeros((batch, plan.window), np.float32)
-            for row, window in zip(chosen, coarse, strict=False):
+            (coarse, nominal), held = np.zeros((2, batch, plan.window), np.float32), []
+            for place, row in enumerate(chosen):
                 times = simulator.interval_s * (rows.start[row] + np.arange(plan.window))
-                window[:] = simulator.coarse.simulate(times[None], _scenario_of(plan, rows, row), happening)[0]
+                nominal[place] = coarse[place] = simulator.coarse.simulate(times[None])[0]
+                scenario = _scenario_of(plan, rows, row)
+                if scenario is not None:
+                    coarse[place] = simulator.coarse.simulate(times[None], scenario, happening)[0]
+                    stuck = held_samples(scenario, plan.window)
+                    held += [(place, *stuck)] if stuck else []
             levels = None
             if simulator.levels is not None:
                 levels = np.zeros((batch, 2))
                 levels[: len(chosen)] = simulator.levels[(rows.level[chosen] * len(simulator.levels)).astype(int)]
-            windows[chosen] = complete_batch(simulator, coarse, levels, noise)[: len(chosen)]
-    return windows, rows
+            completed = complete_labelled_batch(simulator, coarse, nominal, levels, noise, held)
+            windows[chosen], masks[chosen] = (each[: len(chosen)] for each in completed)
+    return windows, masks, rows
 
 
 def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
@@ -148,7 +157,7 @@ def shard_schema(settings: dict[str, Any], key: str) -> "pa.Schema":
     """
     import pyarrow as pa
 
-    columns = window_columns(settings["window"])
+    columns = window_columns(settings["window"], settings.get("labels") == LABELS)
     if len(settings["models"]) > 1:
         columns["model"] = pa.string()
     return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})
@@ -202,17 +211,10 @@ class ShardMaker:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        windows, rows = make_windows(self.plan, self.simulators, shard)
-        nominal = rows.severity == 0  # including scenario 0
+        windows, masks, rows = make_windows(self.plan, self.simulators, shard)
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
-        scenarios = [_scenario_of(self.plan, rows, row) for row in range(len(nominal))]
-        onsets = np.array([0 if each is None else each.first_sample(self.plan.window) for each in scenarios], np.int32)
-        columns = [
-            pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), self.plan.window),
-            pa.array(np.where(nominal, NOMINAL, modes[rows.scenario]), pa.string()),
-            pa.array(rows.severity.astype(np.float32)),
-            pa.array(onsets, mask=nominal),
-        ]
+        values = pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), self.plan.window)
+        columns = [values, *label_windows(modes[rows.scenario], rows.severity, masks).values()]
         if len(self.plan.models) > 1:
             columns.append(pa.array(np.array([model.name for model in self.plan.models], object)[rows.model], pa.string()))
         table = pa.table(columns, schema=shard_schema(self.settings, self.key))

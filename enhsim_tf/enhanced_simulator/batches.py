@@ -1,9 +1,12 @@
 """The step that all generation of windows shares: one batch from coarse windows to telemetry ("Combined" in the paper's pipeline)."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
+from enhsim_tf.enhanced_simulator.checks import check_finite
 from enhsim_tf.enhancer.training_pairs import apply_shift_and_gain
 
 if TYPE_CHECKING:
@@ -23,8 +26,47 @@ def complete_batch(
 
     Returns:
         float32 array of the same shape, in the telemetry's unit.
+
+    Raises:
+        InputError: If a value is not finite.
     """
     windows = simulator.enhance(coarse)
     if levels is not None:
         windows = apply_shift_and_gain(windows, *levels.T)
-    return windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng)
+    return check_finite(windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng))
+
+
+def complete_labelled_batch(
+    simulator: "EnhancedSimulator",
+    coarse: np.ndarray,
+    nominal: np.ndarray,
+    levels: np.ndarray | None,
+    noise_rng: np.random.Generator | None,
+    held: Sequence[tuple[int, int, int]] = (),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Completes a batch of coarse windows, some of which a degraded mode has changed, and marks the changed samples.
+
+    Args:
+        simulator: The simulator.
+        coarse: Coarse windows, float32 of shape `(windows, samples)`.
+        nominal: Nominal coarse windows of the same times, same shape.
+        levels: Offset and gain of each window, shape `(windows, 2)`, or None for a simulator whose level is constant.
+        noise_rng: Random generator of the noise, or None for windows without noise.
+        held: Window, first sample and end of each range of samples at which a mechanism is stuck. Its telemetry stands still there,
+            and the coarse window is not used.
+
+    Returns:
+        `(windows, mask)`: float32 windows in the telemetry's unit, and a boolean array of the same shape, which marks the samples
+        that differ from the nominal windows with the same noise (see `changes`). All other samples equal them to the bit.
+
+    Raises:
+        InputError: If a value is not finite.
+    """
+    changed, tolerance = coarse != nominal, tolerance_of(simulator.noise_sd, simulator.scale)
+    changed[[row for row, *_ in held]] = False
+    windows, mask = complete_batch(simulator, nominal, levels, None), np.zeros(coarse.shape, bool)
+    if changed.any():
+        degraded = complete_batch(simulator, coarse, levels, None)
+        windows, mask = blend_changes(windows, degraded, spans(changed), fade_length(coarse.shape[1]), tolerance)
+    hold_values(windows, mask, held, tolerance)
+    return check_finite(windows if noise_rng is None else windows + simulator.noise.generate(len(windows), noise_rng)), mask

@@ -1,11 +1,15 @@
 """Checks of the arguments that the methods of the enhanced simulator and its training share."""
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
+
+import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry
+
+_LEAST_SPAN, _MOST_SIZE = 1e-12, 1e15  # beyond them, squares of the noise or of the values leave the range of float32
 
 
 def check_counts(**counts: tuple[Any, int]) -> None:
@@ -81,3 +85,47 @@ def config_of(coarse: Any) -> dict[str, Any]:
             "Fit it with fit_run_model, whose models can be saved without it."
         )
     return coarse.get_config()
+
+
+def check_size(values: np.ndarray, what: str) -> None:
+    """Checks that the values of a channel are neither too large nor too small for networks, which compute in float32.
+
+    Args:
+        values: The values, float32.
+        what: Name of the channel.
+
+    Raises:
+        InputError: If a value is beyond 1e15, or if all lie within 1e-12.
+    """
+    low, high = float(np.min(values)), float(np.max(values))
+    if not (max(-low, high) <= _MOST_SIZE and high - low >= _LEAST_SPAN):
+        raise InputError(
+            f"Expected values up to {_MOST_SIZE:g} that span at least {_LEAST_SPAN:g}. Received: {what}, from {low:g} to {high:g}. "
+            "Give it in another unit."
+        )
+
+
+def is_finite(arrays: Iterable[np.ndarray]) -> bool:
+    """Whether all values of all arrays are finite.
+
+    Args:
+        arrays: Arrays, such as the weights of a network.
+    """
+    return all(np.isfinite(each).all() for each in arrays)
+
+
+def check_finite(windows: np.ndarray) -> np.ndarray:
+    """Checks generated telemetry and returns it.
+
+    Args:
+        windows: Generated windows or a generated series.
+
+    Raises:
+        InputError: If a value is not finite.
+    """
+    if not np.isfinite(windows).all():
+        bad = int(np.size(windows) - np.count_nonzero(np.isfinite(windows)))
+        raise InputError(
+            f"Expected a simulator that generates finite values. Received: {bad:,} of {np.size(windows):,} values that are not. Fit it again."
+        )
+    return windows

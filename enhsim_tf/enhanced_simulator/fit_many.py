@@ -239,7 +239,8 @@ def fit_job(job: Job) -> list[str]:
         simulator.save(temporary)
         write_json(temporary / "report.json", {"realism": report.to_dict(), "cleaning": cleaned.report.to_dict()})
         figure.savefig(temporary / "report.png", dpi=200, format="png")
-    return [*cleaned.report.lines(), *report.lines()]
+    notes = [f"{printable(job.channel)}: {note}" for note in simulator.trained.get("notes", ())]
+    return [*cleaned.report.lines(), *notes, *report.lines()]
 
 
 def _tell_if_heard(line: str) -> None:

@@ -21,7 +21,7 @@ _MOST_LAYERS = 2_000  # a discriminator has 220
 _MOST_UNSAVED = 1_000_000  # maximum number of values that layers allocate without saved weights: means and variances
 _LAYERS = "Dense Conv1D BatchNormalization Normalization InputLayer Concatenate Cropping1D Flatten Reshape LeakyReLU Activation ReLU"
 _LAYERS += " GlobalAveragePooling1D GlobalMaxPooling1D"
-_OPERATIONS = "Absolute Add Arcsinh Concatenate Diff GetItem Log Max Mean Multiply Power Reshape Sqrt Subtract TrueDivide"
+_OPERATIONS = "Absolute Add Arcsinh Concatenate Diff GetItem Log Max Maximum Mean Multiply Power Reshape Sqrt Subtract TrueDivide"
 _KINDS = {
     "keras": {"Sequential", "DTypePolicy"},
     "keras.layers": set(_LAYERS.split()),

@@ -15,6 +15,7 @@ import numpy as np
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.evaluation import score_trace
+from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
@@ -66,7 +67,8 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     Returns:
         A data frame with the index of `sources.to_series` and the columns `value`, `score` (scaled so that the threshold is
         1; NaN in parts shorter than a window) and `flag` (whether the score is above 1). `frame.attrs` contains
-        `expected_false_alarm_rate`.
+        `expected_false_alarm_rate`, `events` (the rows of `events_table`), and `false_alarms_per_day`: the number that is
+        expected on nominal telemetry, with the limits of its 95 % interval, from a further generated series.
 
     Raises:
         InputError: If the sampling interval differs from the simulator's, or if every part is shorter than a window.
@@ -89,16 +91,66 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     detector = DETECTORS[options.detector](options.seed).fit(training)
     nominal = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 1)
     threshold = float(np.quantile(score_trace(detector, nominal, window, stride), 1 - options.false_alarm_rate))
-    frames = []
+    further = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 2)  # on it the alarms are counted
+    further_scores = _relative(score_trace(detector, further, window, stride), threshold)
+    frames, events = [], []
     for part in parts:
         scores = np.full(len(part), np.nan)
         if len(part) >= window:
             scores = _relative(score_trace(detector, part.values, window, stride), threshold)
         series = to_series(part)
+        events += _event_rows(scores, sum(map(len, frames)), further_scores, window, simulator.interval_s)
         frames.append(pd.DataFrame({"value": series, "score": scores, "flag": scores > 1}, index=series.index))
     frame = pd.concat(frames)
     frame.attrs["expected_false_alarm_rate"] = options.false_alarm_rate
+    num_alarms = len(events_of(further_scores > 1, gap=window))
+    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(further) * simulator.interval_s))
+    frame.attrs["events"] = events
     return frame
+
+
+def _event_rows(scores: np.ndarray, before: int, nominal_scores: np.ndarray, window: int, interval_s: float) -> list[dict]:
+    """Returns the events of a part in plain JSON types. Flags within a window of each other are one event, as they share windows."""
+    flags, rows = scores > 1, []
+    found = events_of(flags, scores, window)
+    peaks = [scores[event.peak] for event in found]
+    for event, peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True):
+        rows.append(
+            {
+                "begin": before + event.begin,
+                "end": before + event.end,
+                "peak": before + event.peak,
+                "duration_s": (event.end - event.begin) * interval_s,
+                "num_flagged": int(flags[event.begin : event.end].sum()),
+                "score": float(peak),
+                "confidence": float(confidence),
+            }
+        )
+    return rows
+
+
+def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Returns the events in the scores of a channel, one row per alarm.
+
+    Args:
+        frame: Scores, as returned by `score_channel`.
+
+    Returns:
+        A data frame with the columns `begin`, `end` and `peak` (times of the first flagged sample, of the sample after the last
+        one, and of the highest score; sample numbers if the telemetry has no times), `duration_s`, `num_flagged`, `score` (the
+        highest score; the threshold is 1) and `confidence` (see `events.confidences`). Runs of flags that are at most one window
+        apart are one event.
+    """
+    import pandas as pd
+
+    names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
+    table = pd.DataFrame(frame.attrs["events"], columns=names)
+    index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
+    if hasattr(index, "tz"):
+        after = index[begin] + pd.to_timedelta(table["duration_s"].to_numpy(float), unit="s").round("us")
+    else:
+        after = index[end - 1] + 1
+    return table.assign(begin=index[begin], end=after, peak=index[table["peak"].to_numpy(int)])
 
 
 def _relative(scores: np.ndarray, threshold: float) -> np.ndarray:
@@ -106,14 +158,20 @@ def _relative(scores: np.ndarray, threshold: float) -> np.ndarray:
     return scores / threshold if threshold > 0 else 1 + scores - threshold
 
 
+def events_path(path: str | os.PathLike) -> Path:
+    """Returns the path of the events beside a file of scores, for example `scores.events.csv` beside `scores.parquet`."""
+    return Path(path).with_suffix(".events.csv")
+
+
 def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
-    """Writes scores to a `.parquet` or `.csv` file. The file appears only when it is complete.
+    """Writes scores to a `.parquet` or `.csv` file, and their events to `events_path`. The files appear only when both are complete.
 
     Args:
         path: Path of the file.
         frame: Scores, as returned by `score_channel`.
     """
-    with replace_file(path) as temporary:
+    with replace_file(path) as temporary, replace_file(events_path(path)) as events:
+        events_table(frame).to_csv(events, index=False)
         if Path(path).suffix == ".csv":
             frame.to_csv(temporary)
         else:

@@ -1,5 +1,7 @@
 """The enhanced simulator: coarse simulation, enhancement and generated noise (step 5 and "Combined" of the paper's pipeline)."""
 
+import functools
+import itertools
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -8,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, held_samples, simulate_schedule
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.batches import complete_batch
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of
+from enhsim_tf.enhanced_simulator.batches import complete_batch, complete_labelled_batch
+from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_finite, check_parts, config_of, is_finite
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
@@ -25,6 +29,7 @@ from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
 
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the enhanced waveform
 _CHUNK = 4_096  # number of windows generated at a time
+_NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
 _START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 
 # arguments of `EnhancedSimulator.fit` that reproduce the paper
@@ -75,6 +80,11 @@ class EnhancedSimulator:
     def window(self) -> int:
         """Length of a window in samples."""
         return self.enhancer.input_shape[1]
+
+    @functools.cached_property
+    def noise_sd(self) -> float:
+        """Standard deviation of the generated noise, in the telemetry's unit."""
+        return float(np.std(self.noise.generate(_NUM_NOISE, 0), dtype=np.float64))
 
     @classmethod
     def fit(
@@ -286,6 +296,22 @@ class EnhancedSimulator:
         Returns:
             An iterator over float32 arrays of shape `(chunk, samples)`, in the telemetry's unit.
         """
+        return (windows for windows, _ in self._chunks(num_windows, scenario, seed, _noise_rng(seed)))
+
+    def generate_labelled_chunks(
+        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Generates the windows of `generate_chunks`, each chunk with a mask of the samples that the scenario has changed.
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Random seed. The same seed gives the same windows.
+
+        Returns:
+            An iterator over tuples of float32 windows and boolean masks, both of shape `(chunk, samples)`. A sample that is not
+            marked equals that of `generate_chunks` without a scenario and with the same seed.
+        """
         return self._chunks(num_windows, scenario, seed, _noise_rng(seed))
 
     def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
@@ -299,18 +325,23 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_windows, samples)`, in the telemetry's unit.
         """
-        return self._join(num_windows, self._chunks(num_windows, scenario, seed, None))
+        return self._join(num_windows, (windows for windows, _ in self._chunks(num_windows, scenario, seed, None)))
 
     def _chunks(
         self, num_windows: int, scenario: Degraded | None, seed: int, noise_rng: np.random.Generator | None
-    ) -> Iterator[np.ndarray]:
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         check_counts(num_windows=(num_windows, 0))
         rng = np.random.default_rng(seed)
         starts, levels = rng.integers(0, _START_RANGE, num_windows), self._draw_levels(num_windows, seed)
         for first in range(0, num_windows, _CHUNK):
             times = self.interval_s * (starts[first : first + _CHUNK, None] + np.arange(self.window))
-            coarse = self.coarse.simulate(times, scenario, rng)
-            yield complete_batch(self, coarse, None if levels is None else levels[first : first + _CHUNK], noise_rng)
+            nominal = self.coarse.simulate(times)
+            coarse = nominal if scenario is None else self.coarse.simulate(times, scenario, rng)
+            held = held_samples(scenario, self.window)
+            rows = [(row, *held) for row in range(len(coarse))] if held else []
+            yield complete_labelled_batch(
+                self, coarse, nominal, None if levels is None else levels[first : first + _CHUNK], noise_rng, rows
+            )
 
     def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
         check_counts(num_windows=(num_windows, 0))
@@ -347,25 +378,82 @@ class EnhancedSimulator:
         Returns:
             float32 array of shape `(num_samples,)`, in the telemetry's unit.
         """
+        return self.generate_labelled_series(num_samples, scenario, seed, start_s)[0]
+
+    def generate_labelled_series(
+        self,
+        num_samples: int,
+        scenario: Degraded | None = None,
+        seed: int = 0,
+        start_s: float = 0.0,
+        schedule: Sequence[ScheduledMode] = (),
+    ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
+        """Generates the series of `generate_series`, with a mask of the samples that a degraded mode has changed.
+
+        Args:
+            num_samples: Length of the series in samples.
+            scenario: A degraded mode over the whole series, or None.
+            seed: Random seed of the scenario and the noise.
+            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
+            schedule: Degraded modes at given places, instead of a scenario.
+
+        Returns:
+            `(values, mask, events)`: the float32 series, a boolean array that marks the samples that differ from the nominal
+            series of the same seed, both of shape `(samples,)`, and for each event that changed a sample its mode, its severity,
+            its first changed sample, and the first sample after its last changed one.
+
+        Raises:
+            InputError: If events overlap or lie outside the series, or if both a scenario and a schedule are given.
+        """
         check_counts(num_samples=(num_samples, 1))
+        if scenario is not None and schedule:
+            raise InputError("Expected a scenario or a schedule. Received: both. Put the scenario into the schedule.")
+        schedule = check_schedule(schedule, num_samples)
         window, hop = self.window, self.window // 2
         num_windows = num_overlapping(num_samples, window)
-        length = window + (num_windows - 1) * hop
         rng = np.random.default_rng(seed)
-        times = start_s + self.interval_s * np.arange(length)[None]
-        coarse = self.coarse.simulate(times, rng=rng)[0]
-        if scenario is not None:  # the scenario covers only the series, and the last window may extend beyond it
-            coarse[:num_samples] = self.coarse.simulate(times[:, :num_samples], scenario, rng)[0]
-        starts = hop * np.arange(num_windows)
+        times = start_s + self.interval_s * np.arange(window + (num_windows - 1) * hop)
         levels = None if self.levels is None else self._follow_levels(num_windows, seed)
-        enhanced = complete_batch(self, cut_windows(coarse, starts, window), levels, None)
+        nominal, coarse = self.coarse.simulate(times[None])[0], None
+        ranges = [(event.mode, event.severity, event.begin, event.end) for event in schedule]
+        if scenario is not None:  # the scenario covers only the series, and the last window may extend beyond it
+            coarse = nominal.copy()
+            coarse[:num_samples] = self.coarse.simulate(times[None, :num_samples], scenario, rng)[0]
+            ranges = [(scenario.mode, scenario.severity, 0, num_samples)]
+        elif schedule:
+            coarse = simulate_schedule(self.coarse, times, schedule, rng)
+        clean, mask, events = self._join_series(nominal, levels)[:num_samples], np.zeros(num_samples, bool), []
+        if coarse is not None:
+            inside, held = np.zeros((1, num_samples), bool), []
+            for mode, severity, begin, end in ranges:
+                stuck = held_samples(scenario or Degraded(mode, severity, 0.0), end - begin)
+                if stuck:
+                    held.append((0, begin + stuck[0], begin + stuck[1]))
+                else:
+                    inside[:, begin:end] = spans((coarse != nominal)[None, begin:end])
+            tolerance, clean, mask = tolerance_of(self.noise_sd, self.scale), clean[None].copy(), mask[None]
+            if inside.any():
+                degraded = self._join_series(coarse, levels)[None, :num_samples]
+                clean, mask = blend_changes(clean, degraded, inside, fade_length(window), tolerance)
+            hold_values(clean, mask, held, tolerance)
+            clean, mask = clean[0], mask[0]
+            edges = [0, *((before[3] + after[2]) // 2 for before, after in itertools.pairwise(ranges)), num_samples]
+            for (mode, severity, *_), (begin, end) in zip(ranges, itertools.pairwise(edges), strict=True):
+                changed = np.flatnonzero(mask[begin:end])
+                events += [(mode, severity, begin + int(changed[0]), begin + int(changed[-1]) + 1)] if len(changed) else []
+        return check_finite(clean + self.noise.generate_series(num_samples, _noise_rng(seed))), mask, events
 
+    def _join_series(self, coarse: np.ndarray, levels: np.ndarray | None) -> np.ndarray:
+        """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
+        window, hop = self.window, self.window // 2
+        starts = np.arange(0, len(coarse) - window + 1, hop)
+        enhanced = complete_batch(self, cut_windows(coarse, starts, window), levels, None)
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
-        signal, total = np.zeros((2, length))
+        signal, total = np.zeros((2, len(coarse)))
         for begin, clean in zip(starts, enhanced, strict=True):
             signal[begin : begin + window] += fade * clean
             total[begin : begin + window] += fade
-        return (signal / total)[:num_samples].astype(np.float32) + self.noise.generate_series(num_samples, _noise_rng(seed))
+        return (signal / total).astype(np.float32)
 
     def _follow_levels(self, num_windows: int, seed: int) -> np.ndarray:
         """Returns offset and gain of consecutive windows: those seen in training, forwards and backwards from a random time."""
@@ -380,8 +468,17 @@ class EnhancedSimulator:
             folder: The folder. A simulator that was saved there before is replaced.
 
         Raises:
-            InputError: If the folder contains something other than a saved simulator; it is left unchanged.
+            InputError: If the folder contains something other than a saved simulator, or if a number of the simulator is not
+                finite; the folder is left unchanged.
         """
+        networks = {"enhancer": self.enhancer, "generator": self.noise.generator, "discriminator": self.noise.discriminator}
+        numbers = np.array([self.interval_s, self.offset, self.scale, self.noise.scale])
+        bad = [name for name, network in networks.items() if not is_finite(network.get_weights())]
+        if bad or not is_finite([numbers, *([] if self.levels is None else [self.levels])]):
+            raise InputError(
+                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad) or 'units or levels'} with NaN or infinity. "
+                "It was not saved. Fit it again."
+            )
         settings = {
             "coarse": config_of(self.coarse),
             "noise": self.noise.get_config(),
@@ -392,7 +489,6 @@ class EnhancedSimulator:
             "trained": self.trained,
             "keras": keras.__version__,
         }
-        networks = {"enhancer": self.enhancer, "generator": self.noise.generator, "discriminator": self.noise.discriminator}
         write_saved(folder, networks, settings)
 
     @classmethod

@@ -14,7 +14,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts
+from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts, check_size, is_finite
 from enhsim_tf.enhanced_simulator.choosing import choose_enhancer
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
@@ -25,6 +25,7 @@ from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.guarded_training import train_guarded
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 _ROUNDS = 3  # with `follow`: rounds of enhancer training; the windows are aligned again between two rounds
 _NUM_LEVELS = 500  # with `follow`: maximum number of windows whose shift and gain are stored in the simulator
 _BATCH_SIZE, _LEARNING_RATE = 15, 0.001  # of the enhancer, as in the paper
+_ATTEMPTS, _SLOWER = 3, 0.1  # trainings of the enhancer if they diverge, and the factor of the learning rate from one to the next
 _MIN_WINDOWS = {"moving average": 2, "enhancer": 8}  # minimum length of the telemetry in windows, for each extraction
 
 
@@ -117,6 +119,7 @@ def train(
     parts = check_parts(telemetry)
     values = np.concatenate([part.values for part in parts])
     check_values(values, parts[0].name, _MIN_WINDOWS[settings.extraction] * settings.window)
+    check_size(values, parts[0].name)
     by_enhancer = settings.extraction == "enhancer"
     averaged = [] if by_enhancer else _subtract_moving_average(parts, settings)  # before training, so that a wrong width fails early
     simulator = _build(create, parts, coarse, settings)
@@ -139,7 +142,9 @@ def train(
         noise_windows, _ = cut_windows_from_parts(
             averaged, random_window_starts(averaged, settings.window, settings.num_windows, rng), settings.window
         )
-    simulator.noise = train_noise(noise_windows, settings, verbose, progress)
+    notes: list[str] = []
+    simulator.noise = train_noise(noise_windows, settings, verbose, progress, notes)
+    simulator.trained |= {"notes": notes} if notes else {}
     return simulator
 
 
@@ -181,25 +186,45 @@ def _train_round(
     callbacks: list[keras.callbacks.Callback],
     verbose: int,
 ) -> None:
-    """Trains the enhancer on pairs of windows for some epochs, in the units of the network."""
+    """Trains the enhancer on pairs of windows for some epochs, in the units of the network.
+
+    If the training diverges, it is repeated from the weights before it with a smaller learning rate.
+    """
     num_steps = epochs * -(-len(pairs) // _BATCH_SIZE)
-    rate = keras.optimizers.schedules.CosineDecay(_LEARNING_RATE, num_steps) if decay else _LEARNING_RATE
     source, target = ((windows - simulator.offset) / simulator.scale for windows in (pairs.coarse, pairs.target_in_unit))
-    fit_windows(simulator.enhancer, source, target, epochs, _BATCH_SIZE, seed, rate, callbacks=callbacks, verbose=verbose)
+    before = simulator.enhancer.get_weights()
+    for attempt in range(_ATTEMPTS):
+        rate = _LEARNING_RATE * _SLOWER**attempt
+        schedule = keras.optimizers.schedules.CosineDecay(rate, num_steps) if decay else rate
+        fit_windows(simulator.enhancer, source, target, epochs, _BATCH_SIZE, seed, schedule, callbacks=callbacks, verbose=verbose)
+        if is_finite(simulator.enhancer.get_weights()):
+            return
+        simulator.enhancer.set_weights(before)
+    raise InputError(
+        f"Expected telemetry from which the enhancer can learn. Received: {_ATTEMPTS} trainings that diverged, the last one at a learning rate "
+        f"of {rate:.2g}. Look for values far from all others, or give another channel."
+    )
 
 
-def train_noise(noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseGAN:
-    """Builds the noise networks and trains them on windows of extracted noise, shape `(windows, samples)`."""
-    if settings.noise == "convolutional":
-        gan = convolutional_noise_gan(noise_windows, settings.num_iterations, settings.seed)
-    else:
+def train_noise(
+    noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress, notes: list[str] | None = None
+) -> NoiseGAN:
+    """Builds the noise networks and trains them on windows of extracted noise, shape `(windows, samples)`.
+
+    `notes` receives a sentence for each training that diverged, and one if the networks were replaced by Gaussian noise.
+    """
+
+    def build() -> NoiseGAN:
+        if settings.noise == "convolutional":
+            return convolutional_noise_gan(noise_windows, settings.num_iterations, settings.seed)
         generator, discriminator = (build(settings.window, seed=settings.seed) for build in (build_generator, build_discriminator))
         scale = noise_unit(noise_windows) if settings.normalise else 1.0
-        gan = NoiseGAN(generator, discriminator, scale=scale, seed=settings.seed)
+        return NoiseGAN(generator, discriminator, scale=scale, seed=settings.seed)
+
     report_iteration = progress.loop("noise GAN, iteration", settings.num_iterations)
     show_bars = None if verbose == "auto" else bool(verbose)
-    gan.fit(noise_windows, settings.num_iterations, verbose=show_bars, on_iteration=report_iteration)
-    return gan
+    note = (lambda line: None) if notes is None else notes.append
+    return train_guarded(build, noise_windows, settings.num_iterations, show_bars, report_iteration, note)
 
 
 def _subtract_moving_average(parts: Sequence[Telemetry], settings: TrainingSettings) -> list[Telemetry]:

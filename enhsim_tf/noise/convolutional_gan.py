@@ -138,7 +138,8 @@ def _statistics(values: keras.KerasTensor) -> tuple[keras.KerasTensor, keras.Ker
     square = unit * unit  # products instead of powers, because the gradient of a power computes logarithms
     steps = ops.diff(values, axis=1)
     bends = ops.diff(steps, axis=1)
-    moments = [mean(values), ops.log(scale), mean(square * unit), ops.log(mean(square * square)), ops.log(mean(ops.abs(unit)) + _TINY)]
+    kurtosis = ops.maximum(mean(square * square), _TINY)  # 0 in a window of zeros, whose logarithm would make every weight NaN
+    moments = [mean(values), ops.log(scale), mean(square * unit), ops.log(kurtosis), ops.log(mean(ops.abs(unit)) + _TINY)]
     roughness = [ops.log(mean(each * each) + _TINY) for each in (steps, bends)]
     correlations = [mean(unit[:, lag:] * unit[:, :-lag]) for lag in _LAGS if lag < window]
     exceedances = [mean(ops.relu(sign * each - threshold)) for each in (values, unit) for sign in (1, -1) for threshold in _THRESHOLDS]

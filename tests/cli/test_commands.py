@@ -18,6 +18,7 @@ from enhsim_tf.cli.arguments import DETECTORS, parse
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
+from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.enhanced_simulator import report_measure
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
@@ -104,7 +105,9 @@ def shell(*arguments, cwd, **options):
 # help
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["fit", "--help"], ["generate", "--help"], ["score", "--help"], ["scrore"], []])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["fit", "--help"], ["generate", "--help"], ["score", "--help"], ["inject", "--help"], ["scrore"], []]
+)
 def test_help_and_wrong_options_import_nothing_slow(arguments):
     script = (
         "import sys\nfrom enhsim_tf.__main__ import main\ncode = 0\n"
@@ -122,7 +125,12 @@ def test_help_and_wrong_options_import_nothing_slow(arguments):
 
 
 def test_help_lists_all_choices(capsys):
-    for command, words in (("generate", [*MODES, "stuck:0.5"]), ("score", DETECTORS), ("fit", ["influxdb://", "convolutional", "paper"])):
+    for command, words in (
+        ("generate", [*MODES, "stuck:0.5"]),
+        ("score", DETECTORS),
+        ("fit", ["influxdb://", "convolutional", "paper"]),
+        ("inject", INJECTIONS),
+    ):
         with pytest.raises(SystemExit):
             parse([command, "--help"])
         text = capsys.readouterr().out
@@ -169,8 +177,12 @@ def test_generate_writes_training_data_with_a_fitted_simulator(fitted, told, tmp
     assert re.fullmatch(r"volts: stuck at 0\.5: \d+% of such windows are outside its enhancer's training range", second)
     assert third.startswith("volts: drift at 1: 100% of such")
     frame = pd.read_parquet(tmp_path / "deep" / "training.parquet")
-    assert frame["scenario"].value_counts().to_dict() == {"nominal": 20, "stuck": 10, "drift": 10}
-    assert set(frame.loc[frame["scenario"] == "drift", "onset"]) == {32} and np.stack(frame["window"]).shape == (40, 64)
+    changed = np.stack(frame["mask"]).any(axis=1)
+    assert (
+        not changed[:20].any()
+        and (frame["scenario"] == np.where(changed, np.repeat(["", "stuck", "drift"], [20, 10, 10]), "nominal")).all()
+    )
+    assert frame["onset"].min() >= 16 - 4 and np.stack(frame["window"]).shape == (40, 64)
     assert 10 < np.stack(frame["window"]).mean() < 30  # in the telemetry's unit
 
 
@@ -180,7 +192,22 @@ def test_generate_writes_a_series_with_times(fitted, told, tmp_path):
     assert (code, errors) == (0, []) and "2,160 samples, one every 10 s" in out
     frame = pd.read_parquet(tmp_path / "day.parquet")
     assert (pd.DatetimeIndex(frame["time"]) == pd.date_range("2025-01-01", periods=2_160, freq="10s", tz="UTC")).all()
-    assert (frame["scenario"] == "stuck").to_numpy().nonzero()[0].tolist() == list(range(1_620, 2_160))
+    assert (frame["scenario"] == "stuck").any() and not frame["mask"][: 1_620 - 4].any()  # changes fade in over a sixteenth of a window
+
+
+def test_generate_writes_a_series_with_several_events(fitted, told, tmp_path):
+    arguments = ["generate", fitted[0], "--continuous", "2000", "--scenario", "stuck:1", "--scenario", "drift:1", "--number", "3"]
+    arguments += ["--length", "30:60", "--at", "gain_loss:1@2025-01-01T01:00/10min", "--start", "2025-01-01"]
+    code, out, errors = told(*arguments, "--out", "day.csv")
+    assert (code, errors) == (0, []) and "with 4 events" in out
+    frame = pd.read_csv(tmp_path / "day.csv")
+    assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
+    assert set(frame["scenario"]) == {"nominal", "stuck", "drift", "gain_loss"} and frame["onset"].nunique() == 4
+    first = frame.loc[frame["scenario"] == "gain_loss", "onset"].iloc[0]
+    assert 360 - 4 <= first < 420  # changes fade in over a sixteenth of a window
+    assert told(*arguments, "--timeeval", "--out", "eval.csv")[0] == 0
+    same = pd.read_csv(tmp_path / "eval.csv")
+    assert list(same) == ["timestamp", "volts", "is_anomaly"] and same["is_anomaly"].astype(bool).tolist() == frame["mask"].tolist()
 
 
 def test_score_gives_every_sample_a_score_and_a_flag(fitted, world, told, tmp_path):
@@ -205,8 +232,41 @@ def test_several_channels_have_a_file_each(told, tmp_path):
         "score", "WORLD/models", "WORLD/two.csv", "--windows", 30, "--detector", "limit-check", "--out", "scores.v2/new"
     )
     assert (code, errors) == (0, [])
-    assert {path.name for path in (tmp_path / "scores.v2" / "new").iterdir()} == {"volts.parquet", "amps.parquet"}
+    names = {"volts.parquet", "amps.parquet", "volts.events.csv", "amps.events.csv"}
+    assert {path.name for path in (tmp_path / "scores.v2" / "new").iterdir()} == names
     assert told("generate", "WORLD/single", "--windows", 1, "--out", "scores.v2")[0] == 0  # an existing folder may have a dot in its name
+
+
+def test_inject_writes_labelled_telemetry(told, tmp_path):
+    arguments = (
+        "inject",
+        "WORLD/one.csv",
+        "--kinds",
+        "all",
+        "--length",
+        "20:60",
+        "--at",
+        "level_shift:8@2024-01-01T02:00/5min",
+        "--seed",
+        3,
+    )
+    code, out, errors = told(*arguments, "--out", "labelled.parquet")
+    assert code == 0 and not errors and "9 anomalies" in out and "noise sd 0.19" in out
+    frame = pd.read_parquet(tmp_path / "labelled.parquet")
+    assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
+    assert frame.loc[frame["severity"] == 8, "time"].min() == pd.Timestamp("2024-01-01T02:00Z") and set(frame["scenario"]) == {
+        "nominal",
+        *INJECTIONS,
+    }
+    nominal = table()["volts"].to_numpy(np.float32)
+    np.testing.assert_array_equal(frame["mask"], frame["value"].to_numpy() != nominal)
+
+
+def test_inject_writes_one_timeeval_file_or_one_file_for_each_channel(told, tmp_path):
+    code, _, errors = told("inject", "WORLD/two.csv", "--kinds", "ramp", "--timeeval", "--out", "joint.csv")
+    assert code == 0 and not errors and list(pd.read_csv(tmp_path / "joint.csv")) == ["timestamp", "volts", "amps", "is_anomaly"]
+    code, _, errors = told("inject", "WORLD/two.csv", "--kinds", "ramp", "--timeeval", "--out", "single")
+    assert code == 0 and not errors and sorted(path.name for path in (tmp_path / "single").iterdir()) == ["amps.csv", "volts.csv"]
 
 
 def test_a_single_channel_and_a_single_simulator_match_whatever_their_names(told, tmp_path):
@@ -263,9 +323,10 @@ def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
 
 FIT = ["fit", "WORLD/one.csv", "--out", "models"]
 GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
+INJECT = ["inject", "WORLD/one.csv", "--out", "x.csv"]
 SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
 WRONG = {
-    "no command": ([], "{fit,generate,verify,score}"),
+    "no command": ([], "{fit,generate,verify,score,inject}"),
     "unknown command": (["train"], "'train'"),
     "fit without a source": (["fit", "--out", "models"], "SOURCE"),
     "fit without a place": (["fit", "WORLD/one.csv"], "--out"),
@@ -315,6 +376,14 @@ WRONG = {
         [*GENERATE, "--continuous", "1d", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"],
         "at most one --scenario",
     ),
+    "events of windows": ([*GENERATE, "--windows", "5", "--scenario", "stuck:1", "--number", "3"], "--continuous"),
+    "events of no mode": ([*GENERATE, "--continuous", "1d", "--number", "3"], "--number 3"),
+    "event of an unknown mode": ([*GENERATE, "--continuous", "1d", "--at", "rust:1@5/5"], "'rust'"),
+    "event beyond the series": ([*GENERATE, "--continuous", "100", "--at", "stuck:1@90/20"], "sample 110"),
+    "events that overlap": ([*GENERATE, "--continuous", "900", "--at", "stuck:1@90/20", "--at", "drift:1@100/20"], "Move one"),
+    "a place and a scenario": ([*GENERATE, "--continuous", "900", "--at", "stuck:1@90/20", "--scenario", "drift:1"], "--number"),
+    "more events than fit": ([*GENERATE, "--continuous", "900", "--scenario", "drift:1", "--number", "9"], "room for events"),
+    "windows for TimeEval": ([*GENERATE, "--windows", "5", "--timeeval"], "--continuous"),
     "start without a series": ([*GENERATE, "--windows", "5", "--start", "2024-01-01"], "--start"),
     "start that is no time": ([*GENERATE, "--continuous", "1d", "--start", "soon"], "'soon'"),
     "models that are not there": (["generate", "nowhere", "--windows", "5", "--out", "x.parquet"], "nowhere"),
@@ -335,6 +404,18 @@ WRONG = {
     "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "telemetry below a window": (["score", "WORLD/single", "WORLD/short.csv", "--out", "x.parquet"], "60 samples"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
+    "inject nothing": (INJECT, "--kinds"),
+    "inject an unknown kind": ([*INJECT, "--kinds", "ramp,rust"], "'rust'"),
+    "inject at no place": ([*INJECT, "--at", "ramp@here"], "BEGIN/LENGTH"),
+    "inject beyond the telemetry": ([*INJECT, "--at", "ramp@1490/20"], "1,500 samples"),
+    "inject twice at a place": ([*INJECT, "--at", "ramp@90/20", "--at", "gain@100/5"], "do not overlap"),
+    "inject more than fits": ([*INJECT, "--kinds", "all", "--length", "1000"], "room for events"),
+    "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
+    "inject a range of three": ([*INJECT, "--kinds", "ramp", "--length", "1:2:3"], "--length 1:2:3"),
+    "inject without noise": (["inject", "WORLD/words.csv", "--kinds", "ramp", "--out", "x.csv"], "words.csv"),
+    "inject into the telemetry itself": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "WORLD/one.csv"], "for both"),
+    "inject into a picture": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "x.png"], "x.png"),
+    "inject TimeEval's table as Parquet": ([*INJECT[:-1], "x.parquet", "--kinds", "ramp", "--timeeval"], "x.parquet"),
     "scores as a picture": (["score", "WORLD/single", "WORLD/one.csv", "--out", "x.png"], "x.png"),
 }
 

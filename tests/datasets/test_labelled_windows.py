@@ -9,7 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.datasets.label_columns import LABELS
 from enhsim_tf.datasets.labelled_windows import (
     Share,
     divide_windows,
@@ -171,15 +173,31 @@ def written(tmp_path):
 def test_labels_agree_with_the_generated_windows(written):
     path, shares = written
     frame, first = pd.read_parquet(path), 0
-    assert list(frame.columns) == ["window", "scenario", "severity", "onset"] and len(frame) == 80
+    assert list(frame.columns) == ["window", *LABELS] and len(frame) == 80
     for share in shares:
         rows = frame.iloc[first : first + share.num_windows]
         expected = known().generate(share.num_windows, share.scenario, share.seed)
         np.testing.assert_array_equal(np.stack(rows["window"]), expected)
+        mask = expected != known().generate(share.num_windows, None, share.seed)
+        np.testing.assert_array_equal(np.stack(rows["mask"]), mask)
+        changed = mask.any(axis=1)
+        active = share.scenario if share.scenario and share.scenario.severity else None
+        assert (rows["scenario"] == np.where(changed, active.mode if active else "", "nominal")).all()
+        assert (rows["severity"] == np.where(changed, np.float32(active.severity if active else 0), 0)).all()
+        assert rows["onset"].isna().tolist() == rows["end"].isna().tolist() == (~changed).tolist()
+        for row, marks in zip(rows[changed].itertuples(), mask[changed], strict=True):
+            assert marks[int(row.onset)] and marks[int(row.end) - 1] and marks.sum() == marks[int(row.onset) : int(row.end)].sum()
         first += share.num_windows
-    counts = frame.groupby(["scenario", frame["severity"].round(6)]).size().to_dict()
-    assert counts == {("nominal", 0.0): 20 + 20, ("stuck", 0.5): 20, ("drift", np.float32(0.8)): 20}  # severity 0 is nominal
-    assert frame["onset"].isna().sum() == 40 and frame.loc[frame["scenario"] == "nominal", "onset"].isna().all()
+    assert set(frame["scenario"]) == {"nominal", "stuck", "drift"} and (frame["scenario"] == "drift").sum() == 20  # severity 0 is nominal
+
+
+def test_windows_that_a_scenario_does_not_change_are_labelled_nominal_and_counted(tmp_path):
+    stuck = Degraded("stuck", 0.25, 0.5)  # the period is 48 s, so the mechanism often stands still for 15 s anyway
+    unchanged = write_windows_labelled(tmp_path / "x.parquet", known(), [Share(None, 10, 1), Share(stuck, 200, 2)])
+    frame = pd.read_parquet(tmp_path / "x.parquet")[10:]
+    same = (known().generate(200, stuck, 2) == known().generate(200, None, 2)).all(axis=1)
+    assert unchanged == {stuck: same.sum()} and 20 < same.sum() < 180
+    assert ((frame["scenario"] == "nominal").to_numpy() == same).all()
 
 
 @pytest.mark.parametrize("onset", [0.0, 0.25, 0.29, 0.4, 0.99])
@@ -189,11 +207,13 @@ def test_the_onset_is_the_first_affected_sample(tmp_path, onset):
     write_windows_labelled(tmp_path / "x.parquet", known(noise_sd=0), [Share(None, 5, 1), Share(scenario, 5, 1)])
     frame = pd.read_parquet(tmp_path / "x.parquet")
     nominal, drifting = np.stack(frame["window"][:5]), np.stack(frame["window"][5:])
-    (label,) = set(frame["onset"][5:])
-    assert label == int(round(onset * WINDOW, 6))
-    np.testing.assert_array_equal(drifting[:, : int(label) + 1], nominal[:, : int(label) + 1])
-    if label + 1 < WINDOW:
-        assert (drifting[:, int(label) + 1 :] != nominal[:, int(label) + 1 :]).all()
+    begin = int(round(onset * WINDOW, 6)) + 1
+    np.testing.assert_array_equal(drifting[:, :begin], nominal[:, :begin])
+    if begin == WINDOW:
+        assert frame["onset"].isna().all() and set(frame["scenario"]) == {"nominal"}
+    else:
+        assert set(frame["onset"][5:]) == {begin} and set(frame["end"][5:]) == {WINDOW}
+        assert (drifting[:, begin:] != nominal[:, begin:]).all()
 
 
 def test_an_onset_after_the_last_sample_is_refused(tmp_path, refused):
@@ -209,9 +229,10 @@ def test_other_programs_can_read_the_file(written):
     path, _ = written
     schema = pq.read_schema(path)
     assert str(schema.field("window").type) == "fixed_size_list<element: float>[60]" or schema.field("window").type.list_size == WINDOW
-    assert [str(schema.field(name).type) for name in ("scenario", "severity", "onset")] == ["string", "float", "int32"]
+    assert [str(schema.field(name).type) for name in ("scenario", "severity", "onset", "end")] == ["string", "float", "int32", "int32"]
+    assert schema.field("mask").type.list_size == WINDOW
     assert schema.metadata[b"interval_s"] == b"2.0" and schema.metadata[b"channel"] == b"volts"
-    assert pq.read_table(path, filters=[("scenario", "==", "stuck")]).num_rows == 20
+    assert 0 < pq.read_table(path, filters=[("scenario", "==", "stuck")]).num_rows <= 20
 
 
 def test_same_seed_same_bytes(tmp_path):
@@ -233,13 +254,49 @@ def test_same_seed_same_bytes(tmp_path):
 def test_a_series_equals_that_of_the_simulator(tmp_path, scenario):
     write_series_labelled(tmp_path / "x.parquet", known(), 1_234, scenario, 9)
     frame = pd.read_parquet(tmp_path / "x.parquet")
-    assert list(frame.columns) == ["time_s", "value", "scenario", "severity"]
+    assert list(frame.columns) == ["time_s", "value", *LABELS]
     np.testing.assert_array_equal(frame["value"], known().generate_series(1_234, scenario, 9))
     np.testing.assert_array_equal(frame["time_s"], 2.0 * np.arange(1_234))
-    late = np.arange(1_234) >= (370 if scenario and scenario.severity else 1_234)  # 0.3 * 1234 = 370.2
-    np.testing.assert_array_equal(frame["scenario"] == "dropout", late)
-    np.testing.assert_array_equal(frame["scenario"] == "nominal", ~late)
-    np.testing.assert_allclose(frame["severity"], np.where(late, 0.7, 0), rtol=1e-6)
+    mask = known().generate_series(1_234, scenario, 9) != known().generate_series(1_234, None, 9)
+    assert mask.any() == bool(scenario and scenario.severity) and not mask[:370].any()  # 0.3 * 1234 = 370.2
+    np.testing.assert_array_equal(frame["mask"], mask)
+    np.testing.assert_array_equal(frame["scenario"] == "dropout", mask)
+    np.testing.assert_array_equal(frame["scenario"] == "nominal", ~mask)
+    np.testing.assert_allclose(frame["severity"], np.where(mask, 0.7, 0), rtol=1e-6)
+    for name, value in (("onset", mask.argmax()), ("end", 1_234 - mask[::-1].argmax())):
+        assert frame[name].isna().tolist() == (~mask).tolist() and (frame[name][mask] == value).all()
+
+
+def test_a_series_has_several_events_and_is_nominal_between_them():
+    schedule = [ScheduledMode("stuck", 1.0, 800, 100), ScheduledMode("drift", 0.5, 100, 60), ScheduledMode("dropout", 1.0, 400, 200)]
+    frame = series_labelled(known(), 1_234, None, 9, schedule=schedule)
+    nominal = known().generate_series(1_234, None, 9)
+    np.testing.assert_array_equal(frame["mask"], frame["value"] != nominal)
+    outside = np.ones(1_234, bool)
+    for event in schedule:
+        rows = frame.iloc[event.begin : event.end]
+        rows = rows[rows["mask"]]
+        assert set(rows["scenario"]) == {event.mode} and set(rows["severity"]) == {event.severity}
+        assert event.begin <= rows["onset"].iloc[0] and rows["end"].iloc[0] <= event.end and rows["onset"].nunique() == 1
+        outside[event.begin : event.end] = False
+    assert not frame["mask"][outside].any()
+    stuck = frame["value"].iloc[800:900].to_numpy() - (nominal[800:900] - COARSE.simulate(2.0 * np.arange(800, 900)[None])[0])
+    np.testing.assert_allclose(stuck, stuck[0], atol=1e-6)  # without its noise, it stands still until the end
+
+
+def test_wrong_schedules_are_refused(refused):
+    for wrong in (
+        [ScheduledMode("stuck", 1.0, 100, 100), ScheduledMode("drift", 1.0, 200, 50)],
+        [ScheduledMode("stuck", 1.0, 100, 100), ScheduledMode("drift", 1.0, 150, 10)],
+        [ScheduledMode("stuck", 1.0, 950, 51)],
+    ):
+        with refused("stuck"):
+            series_labelled(known(), 1_000, schedule=wrong)
+    with refused("both"):
+        series_labelled(known(), 1_000, Degraded("stuck"), schedule=[ScheduledMode("stuck", 1.0, 100, 50)])
+    for wrong in (("rust", 1.0, 0, 5), ("stuck", 2.0, 0, 5), ("stuck", 1.0, -1, 5), ("stuck", 1.0, 0, 0)):
+        with refused():
+            ScheduledMode(*wrong)
 
 
 def test_a_series_with_a_start_has_times(tmp_path):
@@ -247,7 +304,7 @@ def test_a_series_with_a_start_has_times(tmp_path):
     assert isinstance(frame.index, pd.DatetimeIndex) and str(frame.index.tz) == "UTC" and frame.index.name == "time"
     expected = pd.date_range("2024-02-28T23:59:59", periods=1_000, freq="100ms", tz="UTC")
     assert (frame.index == expected).all()  # to the nanosecond
-    assert (frame["scenario"].iloc[:500] == "nominal").all() and (frame["scenario"].iloc[500:] == "stuck").all()
+    assert (frame["scenario"].iloc[:500] == "nominal").all() and (frame["scenario"].iloc[500:] == "stuck").any()
     write_series_labelled(tmp_path / "x.parquet", known(interval_s=0.1), 1_000, Degraded("stuck", 0.5, 0.5), 1, "2024-02-28T23:59:59")
     read = pd.read_parquet(tmp_path / "x.parquet")
     assert (pd.DatetimeIndex(read["time"]) == expected).all() and (read["value"].to_numpy() == frame["value"].to_numpy()).all()
@@ -259,11 +316,11 @@ def test_a_series_with_a_start_has_times(tmp_path):
 class Broken(EnhancedSimulator):
     """Fails after the first windows."""
 
-    def generate_chunks(self, *arguments):
-        yield from [np.zeros((3, WINDOW), np.float32)]
+    def generate_labelled_chunks(self, *arguments):
+        yield from [(np.zeros((3, WINDOW), np.float32), np.zeros((3, WINDOW), bool))]
         raise KeyboardInterrupt
 
-    def generate_series(self, *arguments):
+    def generate_labelled_series(self, *arguments, **options):
         raise KeyboardInterrupt
 
 

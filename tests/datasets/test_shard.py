@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.datasets.plan import make_plan, plan_key
+from enhsim_tf.common.atomic_files import sha256, write_json
+from enhsim_tf.datasets.folder import MANIFEST, check_folder, find_problems
+from enhsim_tf.datasets.plan import FORMAT, make_plan, plan_key
 from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare
 from enhsim_tf.datasets.shard import draw_rows, make_windows, shard_file, shard_schema, systematic
 from tests.faults.small_data_set import COARSE, INTERVAL_S, WINDOW, Plain, PlainMaker, plan
@@ -31,25 +33,31 @@ def test_each_window_agrees_with_its_labels(tmp_path):
     severities = []
     for shard in range(2):
         record, table = table_of(maker, shard)
+        rows = draw_rows(maker.plan, shard)[0]
         assert record.rows == len(table) == 100
-        assert table["scenario"].value_counts().to_dict() == dict.fromkeys(("nominal", *EVERY_MODE), 20)
-        for row in table.itertuples():
-            scenario = None if row.scenario == "nominal" else Degraded(row.scenario, float(row.severity), row.onset / WINDOW)
+        asked = np.array(["nominal", *EVERY_MODE])[rows.scenario]
+        assert {name: int((asked == name).sum()) for name in set(asked)} == dict.fromkeys(("nominal", *EVERY_MODE), 20)
+        nominal = COARSE.simulate(INTERVAL_S * (rows.start[:, None] + np.arange(WINDOW)))
+        for number, row in enumerate(table.itertuples()):
+            scenario = None if asked[number] == "nominal" else Degraded(asked[number], rows.severity[number], rows.onset[number])
             candidates = COARSE.simulate(times, scenario)
-            assert np.abs(candidates - row.window).max(axis=1).min() < 1e-6
-            if scenario is None:
-                assert row.severity == 0 and np.isnan(row.onset)
-            else:
-                assert 0.2 <= row.severity <= 0.9 and 6 <= row.onset <= 42
+            assert np.abs(candidates - row.window).max(axis=1).min() < 1e-4  # the tolerance of a simulator without noise
+            mask = row.window != nominal[number]
+            np.testing.assert_array_equal(row.mask, mask)
+            if mask.any():
+                assert (row.scenario, row.severity) == (asked[number], np.float32(rows.severity[number]))
+                assert (row.onset, row.end) == (np.flatnonzero(mask)[0], np.flatnonzero(mask)[-1] + 1) and row.onset >= 6
                 severities.append(row.severity)
-    assert len(set(severities)) == len(severities) == 160
-    assert np.mean(severities) == pytest.approx(0.55, abs=5 * 0.7 / np.sqrt(12 * 160))
+            else:
+                assert (row.scenario, row.severity) == ("nominal", 0) and np.isnan(row.onset) and np.isnan(row.end)
+    assert len(set(severities)) == len(severities) > 120  # some stuck mechanisms would have stood still anyway
+    assert np.mean(severities) == pytest.approx(0.55, abs=5 * 0.7 / np.sqrt(12 * 120))
 
 
 def test_windows_have_the_levels_and_the_noise_of_their_simulator():
     levels = np.array([(10.0, 1.0), (20.0, 2.0), (30.0, 3.0)])
     nominal = plan(600, 600, mix=Mix())
-    windows, _ = make_windows(nominal, [Plain(0, levels)], 0)
+    windows, _, _ = make_windows(nominal, [Plain(0, levels)], 0)
     at = {}
     for shift, gain in levels:
         inside = np.abs((windows - shift) / gain).max(axis=1) <= 0.7501  # the range of the coarse signal
@@ -100,7 +108,7 @@ def test_the_content_of_a_shard_file(tmp_path):
     maker = PlainMaker(family, tmp_path)
     record, table = table_of(maker, 0)
     schema = pq.read_schema(tmp_path / shard_file(0))
-    assert list(table) == ["window", "scenario", "severity", "onset", "model"]
+    assert list(table) == ["window", "scenario", "severity", "onset", "end", "mask", "model"]
     assert table["model"].value_counts().to_dict() == {"model-0": 25, "model-1": 75}
     stated = json.loads(json.dumps(family.settings()))
     assert schema.equals(shard_schema(stated, plan_key(stated))) and schema.metadata[b"settings"].decode() == family.key
@@ -246,3 +254,17 @@ def test_models_with_different_windows_are_refused(model, tmp_path, refused):
 def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
     with refused(words):
         plan(**changes)
+
+
+def test_a_data_set_of_an_earlier_version_is_verified_and_not_continued(tmp_path, refused):
+    made, folder = plan(40, 40), tmp_path / "set"
+    folder.mkdir()
+    PlainMaker(made, tmp_path)(0)
+    settings = {name: value for name, value in made.settings().items() if name != "labels"}  # as the earlier version wrote them
+    table = pq.read_table(tmp_path / shard_file(0)).drop(["end", "mask"])
+    pq.write_table(table.replace_schema_metadata(shard_schema(settings, plan_key(settings)).metadata), folder / shard_file(0))
+    shards = [{"file": shard_file(0), "rows": 40, "sha256": sha256(folder / shard_file(0))}]
+    write_json(folder / MANIFEST, {"format": FORMAT, "settings": settings, "shards": shards})
+    assert list(find_problems(folder)) == []
+    with refused("Expected labels as in the data set", "Give another --out"):
+        check_folder(folder, made)

@@ -151,4 +151,43 @@ def test_written_scores_can_be_read(known, short, tmp_path, suffix):
     assert (read.index == frame.index).all() and (read["flag"] == frame["flag"]).all()
     np.testing.assert_allclose(read["score"], frame["score"], rtol=1e-12)
     np.testing.assert_allclose(read["value"], frame["value"], rtol=1e-6)
-    assert [path.name for path in tmp_path.iterdir()] == [path.name]
+    assert sorted(each.name for each in tmp_path.iterdir()) == sorted([path.name, "scores.events.csv"])
+
+
+def test_events_are_the_flags_with_their_times(known, short, tmp_path):
+    series = telemetry(known)
+    series.values[1_500:1_520] += 4.0
+    parts = [series.part(0, 1_000), series.part(1_100, 3_000)]  # with a gap of 100 samples
+    frame = score_channel(known, parts, ScoreOptions(num_windows=300, seed=1))
+    table = scoring.events_table(frame)
+    assert list(table) == ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
+    best = table.loc[table["score"].idxmax()]
+    shifted = frame.index[0] + pd.Timedelta(seconds=2 * 1_500)
+    assert best["begin"] <= shifted < best["end"] and best["begin"] <= best["peak"] < best["end"] and best["confidence"] > 0.98
+    assert table["num_flagged"].sum() == frame["flag"].sum() and table["confidence"].between(0, 1).all()
+    for row in table.itertuples():
+        inside = frame[(frame.index >= row.begin) & (frame.index < row.end)]
+        assert inside["flag"].iloc[0] and inside["flag"].iloc[-1] and inside["score"].max() == row.score == frame["score"][row.peak]
+        assert row.duration_s == 2 * len(inside) and (row.end - row.begin).total_seconds() == row.duration_s
+    assert (table["begin"].iloc[1:].to_numpy() - table["end"].iloc[:-1].to_numpy() > np.timedelta64(2 * WINDOW, "s")).all()
+    write_scores(tmp_path / "scores.parquet", frame)
+    written = pd.read_csv(tmp_path / "scores.events.csv", parse_dates=["begin", "end", "peak"])
+    assert written["begin"].tolist() == table["begin"].tolist() and sorted(tmp_path.iterdir())[0].name == "scores.events.csv"
+
+
+def test_a_series_without_times_has_events_by_sample_and_maybe_none(known, short):
+    nominal = telemetry(known, 600, start=None, interval_s=2.0)
+    frame = score_channel(known, [nominal], ScoreOptions(num_windows=150, false_alarm_rate=1e-4))
+    assert scoring.events_table(frame).empty and not frame["flag"].any()
+    nominal.values[300:310] += 8
+    (event,) = scoring.events_table(score_channel(known, [nominal], ScoreOptions(num_windows=150, false_alarm_rate=1e-4))).itertuples()
+    assert event.begin <= 300 < event.end and 310 - WINDOW <= event.peak < 300 + WINDOW
+
+
+def test_expected_false_alarms_are_those_of_nominal_telemetry(known, short):
+    options = ScoreOptions("nearest neighbours", num_windows=150, false_alarm_rate=0.1, seed=3)
+    series = telemetry(known, 400 * WINDOW, seed=500)
+    frame = score_channel(known, [series], options)
+    expected, low, high = frame.attrs["false_alarms_per_day"]
+    found = len(frame.attrs["events"]) / (len(series) * 2.0 / 86_400)
+    assert low < expected < high and low / 2 < found < 2 * high

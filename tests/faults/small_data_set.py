@@ -30,6 +30,7 @@ class Plain:
 
     def __init__(self, noise_sd=0.1, levels=None):
         self.coarse, self.noise, self.levels, self.interval_s = COARSE, GaussianNoise(noise_sd, WINDOW), levels, INTERVAL_S
+        self.noise_sd, self.scale = noise_sd, 1.0
 
     def enhance(self, coarse):
         return coarse

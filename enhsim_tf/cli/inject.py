@@ -1,0 +1,81 @@
+"""`python -m enhsim_tf inject`: puts labelled anomalies into nominal telemetry."""
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths
+from enhsim_tf.common.console import tell
+from enhsim_tf.common.errors import InputError, printable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def run_inject(options: argparse.Namespace) -> int:
+    """Injects anomalies into each channel of the source and returns the exit code.
+
+    Args:
+        options: Parsed options of `inject`.
+    """
+    from enhsim_tf.datasets.inject import InjectOptions, inject_channel
+    from enhsim_tf.datasets.label_columns import write_table, write_timeeval
+    from enhsim_tf.datasets.places import split_limits
+    from enhsim_tf.detection.anomalies import INJECTIONS
+
+    kinds = tuple(INJECTIONS) if options.kinds == "all" else tuple(filter(None, (options.kinds or "").split(",")))
+    severity, length = (split_limits(name, getattr(options, name)) for name in ("severity", "length"))
+    try:
+        degrees = (float(severity[0]), float(severity[1]))
+    except ValueError:
+        raise InputError(f"Expected a severity such as 4 or 2:8. Received: --severity {options.severity}.") from None
+    chosen = InjectOptions(kinds, degrees, length, options.number, tuple(options.at), options.gap, options.noise_sd, options.seed)
+    cleaning = cleaning_options(options, 3)
+    from enhsim_tf.telemetry.cleaning.clean import clean
+    from enhsim_tf.telemetry.sources import read_source
+
+    series = read_source(options.source, options.column, options.time, cleaning)
+    suffixes = (".csv",) if options.timeeval else (".parquet", ".csv")
+    is_joint = options.timeeval and options.out.suffix in suffixes and not os.path.isdir(options.out)
+    names = ["all channels"] if is_joint else list(series)
+    paths = output_paths(options.out, names, suffixes)
+    for path in paths.values():
+        if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
+            raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
+
+    def make(channel: str, path: Path) -> "pd.DataFrame":
+        cleaned = clean(series[channel], cleaning)
+        frame = inject_channel(cleaned.parts, chosen)
+        said = "given" if chosen.noise_sd is not None else "estimated from second differences"
+        lines = [
+            *cleaned.report.lines(),
+            f"{printable(channel)}: {counted(len(frame.attrs['anomalies']), 'anomaly').replace('anomalys', 'anomalies')}, "
+            f"{counted(int(frame['mask'].sum()), 'sample')} of {len(frame):,} changed; noise sd {frame.attrs['noise_sd']:.4g} ({said}); in {path}",
+        ]
+        frame.attrs["lines"] = "\n".join(lines)
+        return frame
+
+    def write(channel: str) -> None:
+        frame = make(channel, paths[channel])
+        if options.timeeval:
+            write_timeeval(paths[channel], {channel: frame})
+        else:
+            write_table(paths[channel], _without_notes(frame))
+        tell(frame.attrs["lines"])
+
+    if not is_joint:
+        return for_each(series, write)
+    (path,) = paths.values()
+    frames = {channel: make(channel, path) for channel in series}
+    write_timeeval(path, frames)
+    for frame in frames.values():
+        tell(frame.attrs["lines"])
+    return 0
+
+
+def _without_notes(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Returns the frame without attributes, which Parquet would store as JSON."""
+    plain = frame.copy(deep=False)
+    plain.attrs = {}
+    return plain

@@ -1,0 +1,121 @@
+"""Tests that no channel ends in a model that is not finite, and that such a model is refused wherever it comes from."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.datasets.plan import Model, Plan
+from enhsim_tf.datasets.scenario_file import Mix
+from enhsim_tf.datasets.shard import make_windows
+from enhsim_tf.enhanced_simulator import training
+from enhsim_tf.enhanced_simulator.fit_options import FitOptions
+from enhsim_tf.enhanced_simulator.fitting import fit_simulator
+from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.enhancer.network import build_enhancer
+from enhsim_tf.noise.linear_noise import linear_noise
+from enhsim_tf.telemetry.series import Telemetry
+
+pytestmark = pytest.mark.usefixtures("narrow_enhancer")
+TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2)
+PLACES = np.arange(1_500)
+WAVE = np.sin(2 * np.pi * PLACES / 60)
+NOISE = 0.1 * np.random.default_rng(0).standard_normal(1_500)
+SPIKE = np.where(PLACES == 900, 1.0, 0.0)
+
+
+def channel(values):
+    return [Telemetry(np.asarray(values, np.float32), name="volts")]
+
+
+FITTED = {
+    "a constant stretch": np.where((PLACES > 400) & (PLACES < 1_100), WAVE[400], WAVE),
+    "a wave below a spike": WAVE + NOISE + 1e5 * SPIKE,
+}
+REFUSED = {
+    "values of 1e-30": (1e-30 * (WAVE + NOISE), "another unit"),
+    "values of 1e30": (1e30 * (WAVE + NOISE), "another unit"),
+    "one value of 1e30": (WAVE + NOISE + 1e30 * SPIKE, "another unit"),
+    "one value": (np.ones(1_500), "no period"),
+}
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_a_hostile_channel_gets_a_finite_model_without_a_warning(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        simulator = fit_simulator(channel(FITTED[name]), TINY, 0)
+        series, windows = simulator.generate_series(300, seed=1), simulator.generate(5, seed=1)
+    assert np.isfinite(series).all() and np.isfinite(windows).all()
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_channel_that_no_network_can_learn_is_refused_in_one_line(name, refused):
+    values, word = REFUSED[name]
+    with warnings.catch_warnings(), refused(word):
+        warnings.simplefilter("error", RuntimeWarning)
+        fit_simulator(channel(values), TINY, 0)
+
+
+@pytest.mark.parametrize(("failures", "is_fitted"), [(1, True), (3, False)])
+def test_an_enhancer_that_diverges_is_trained_again_more_slowly(monkeypatch, failures, is_fitted):
+    rates, plain = [], training.fit_windows
+
+    def fit_windows(model, *arguments, **options):
+        rate = arguments[5]
+        rates.append(float(rate(0) if callable(rate) else rate))
+        if len(rates) <= failures:
+            return model.set_weights([weight * np.nan for weight in model.get_weights()])
+        return plain(model, *arguments, **options)
+
+    monkeypatch.setattr(training, "fit_windows", fit_windows)
+    if is_fitted:
+        simulator = fit_simulator(channel(WAVE + NOISE), FitOptions(window=64, num_windows=40, epochs=1, num_iterations=0), 0)
+        assert np.isfinite(simulator.generate(5)).all()
+    else:
+        with pytest.raises(InputError, match="3 trainings that diverged"):
+            fit_simulator(channel(WAVE + NOISE), TINY, 0)
+    assert rates[:3] == pytest.approx([1e-3, 1e-4, 1e-5][: len(rates)])
+
+
+def broken(which):
+    """A simulator with a NaN in one of its networks."""
+    noise = linear_noise(np.random.default_rng(0).standard_normal((20, 60)))
+    simulator = EnhancedSimulator(SquareWaveSimulator([SquareWave(40)]), build_enhancer(60, 8, seed=0), noise)
+    network = simulator.enhancer if which == "enhancer" else getattr(noise, which)
+    network.set_weights([*(weight for weight in network.get_weights()[:-1]), network.get_weights()[-1] * np.nan])
+    return simulator
+
+
+@pytest.mark.parametrize("which", ["enhancer", "generator"])
+def test_what_is_not_finite_is_neither_generated_nor_scored_nor_written(which, refused, tmp_path):
+    simulator = broken(which)
+    for use in (
+        lambda: simulator.generate(3),
+        lambda: simulator.generate_series(200),
+        lambda: simulator.generate_to_parquet(tmp_path / "x.parquet", 3),
+        lambda: score_channel(simulator, channel(WAVE), ScoreOptions(num_windows=20)),
+        lambda: make_windows(Plan(Mix(), (Model("volts", tmp_path, 1.0, "", 60, 1.0),), 0, 5, 5), [simulator], 0),
+    ):
+        with refused("finite", "Fit it again"):
+            use()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("which", ["enhancer", "generator", "discriminator"])
+def test_what_is_not_finite_is_not_saved(which, refused, tmp_path):
+    with refused(which, "not saved"):
+        broken(which).save(tmp_path / "model")
+    assert not list(tmp_path.iterdir())
+
+
+def test_replaced_noise_is_saved_and_loaded(tmp_path):
+    noise = linear_noise(np.random.default_rng(0).standard_normal((20, 60)))
+    simulator = EnhancedSimulator(SquareWaveSimulator([SquareWave(40)]), build_enhancer(60, 8, seed=0), noise)
+    simulator.save(tmp_path / "model")
+    loaded = EnhancedSimulator.load(tmp_path / "model")
+    np.testing.assert_array_equal(loaded.generate(3, seed=1), simulator.generate(3, seed=1))
+    np.testing.assert_array_equal(loaded.generate_series(200, seed=1), simulator.generate_series(200, seed=1))
