@@ -1,0 +1,276 @@
+"""Ridge regression and the mean of the nearest training windows: what an enhancer has to beat (section 2.2).
+
+Both map coarse windows to telemetry windows without a network. Their one setting is chosen by cross-validation over blocks of
+time, and neither result depends on the units of the windows.
+"""
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+
+PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))  # of standardised inputs, so they fit every unit
+NUM_NEIGHBOURS = (1, 3, 10, 30, 100, 300)
+_LEAST_SHARE = 0.25  # of the windows outside a block that must remain where those that overlap the block are left out
+_ROUNDING = 1e-12  # a column whose deviation is below this share of its largest value is constant
+_ROWS = 256  # windows predicted at a time, which bounds the memory
+
+
+@dataclasses.dataclass(frozen=True)
+class Ridge:
+    """A fitted ridge regression from input windows to target windows.
+
+    Args:
+        weights: Change of each output for a change of each input, float64 of shape `(samples * columns, outputs)`.
+        input_mean: Mean training window, float64 of shape `(samples, columns)`.
+        target_mean: Mean training target, float64 of shape `(outputs,)`.
+        penalty: The chosen penalty.
+        penalties: The penalties that were tried, shape `(penalties,)`.
+        errors: Cross-validated error of each penalty: root-mean-square error divided by the standard deviation of the
+            targets about their mean window, shape `(penalties,)`. NaN if there was a single window.
+    """
+
+    weights: np.ndarray
+    input_mean: np.ndarray
+    target_mean: np.ndarray
+    penalty: float
+    penalties: np.ndarray
+    errors: np.ndarray
+
+    @property
+    def is_at_edge(self) -> bool:
+        """Whether the chosen penalty is the smallest or the largest one tried, so that another may be better."""
+        return self.penalty in (self.penalties.min(), self.penalties.max())
+
+    def predict(self, inputs: np.ndarray) -> np.ndarray:
+        """Predicts the targets of input windows.
+
+        Args:
+            inputs: Windows of shape `(windows, samples)` or `(windows, samples, columns)`, as in training.
+
+        Returns:
+            float32 array of shape `(windows, outputs)`.
+
+        Raises:
+            InputError: If the shape differs from that of the training windows.
+        """
+        windows = _with_columns(inputs)
+        if windows.shape[1:] != self.input_mean.shape:
+            raise InputError(
+                f"Expected windows of (samples, columns) {self.input_mean.shape}, as in training. Received: {windows.shape[1:]}. "
+                "Cut windows of the same length with the same columns."
+            )
+        return (self.target_mean + _flat(windows - self.input_mean) @ self.weights).astype(np.float32)
+
+
+def fit_ridge(
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    starts: np.ndarray | None = None,
+    *,
+    penalties: Sequence[float] = PENALTIES,
+    num_blocks: int = 5,
+) -> Ridge:
+    """Fits ridge regression, with the penalty chosen by cross-validation over blocks of time.
+
+    Inputs are centred per sample and divided by one standard deviation per column, so that the result does not depend on
+    units. Samples are not scaled one by one, because that would blow up the rounding errors of constant ones. Among penalties
+    with the same error, the largest is chosen.
+
+    Args:
+        inputs: Input windows of shape `(windows, samples)` or `(windows, samples, columns)`.
+        targets: Target windows of shape `(windows, outputs)`.
+        starts: Position of each window in time, in samples, shape `(windows,)`. If None, the windows are in the order of time
+            and share no sample.
+        penalties: Penalties to choose from. The sum of squared weights of the standardised inputs is multiplied by them and
+            added to the sum of squared errors.
+        num_blocks: Number of blocks of time.
+
+    Returns:
+        The regression, fitted to all windows.
+
+    Raises:
+        InputError: If shapes do not match, values are not finite, or penalties are not positive.
+    """
+    windows, targets, starts = _checked(inputs, targets, starts)
+    penalties = np.asarray(penalties, np.float64)
+    if penalties.ndim != 1 or not len(penalties) or not (np.isfinite(penalties) & (penalties > 0)).all():
+        raise InputError(f"Expected penalties above 0. Received: {penalties.tolist()}. Leave `penalties` at its default.")
+    squares, power = np.zeros(len(penalties)), 0.0
+    for training, held_out in time_blocks(starts, num_blocks, windows.shape[1]):
+        solution = _Solution(windows[training], targets[training])
+        inner, centred = solution.project(windows[held_out]), targets[held_out] - solution.target_mean
+        power += float(np.sum((targets[held_out] - targets.mean(axis=0)) ** 2))
+        for number, penalty in enumerate(penalties):
+            squares[number] += np.sum((centred - inner @ solution.coefficients(penalty)) ** 2)
+    is_known = len(windows) > 1
+    errors = np.sqrt(squares / (power or 1.0)) if is_known else np.full(len(penalties), np.nan)
+    best = errors == errors.min() if is_known else np.ones(len(penalties), bool)
+    penalty = float(penalties[best].max())
+    solution = _Solution(windows, targets)
+    return Ridge(solution.weights(penalty), solution.input_mean, solution.target_mean, penalty, penalties, errors)
+
+
+def nearest_windows(train_inputs: np.ndarray, train_targets: np.ndarray, inputs: np.ndarray, num_neighbours: int = 30) -> np.ndarray:
+    """Predicts the targets of windows as the mean target of the nearest training windows.
+
+    The distance is the Euclidean one, with each column divided by its standard deviation in training.
+
+    Args:
+        train_inputs: Training windows of shape `(windows, samples)` or `(windows, samples, columns)`.
+        train_targets: Their targets, shape `(windows, outputs)`.
+        inputs: Windows to predict, shape as `train_inputs`.
+        num_neighbours: Number of training windows that are averaged; all of them if there are fewer.
+
+    Returns:
+        float32 array of shape `(windows, outputs)`.
+
+    Raises:
+        InputError: If shapes do not match, values are not finite, or the number of neighbours is below 1.
+    """
+    train, targets, _ = _checked(train_inputs, train_targets, None)
+    windows = _with_columns(inputs)
+    if windows.shape[1:] != train.shape[1:] or num_neighbours < 1:
+        raise InputError(
+            f"Expected windows of {train.shape[1:]} and at least 1 neighbour. Received: {windows.shape[1:]} and {num_neighbours}. "
+            "Cut windows as for training."
+        )
+    predicted = np.empty((len(windows), targets.shape[1]), np.float32)
+    for rows, nearest in _neighbours(train, windows, num_neighbours):
+        predicted[rows] = targets[nearest].mean(axis=1)
+    return predicted
+
+
+def choose_num_neighbours(
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    starts: np.ndarray | None = None,
+    *,
+    candidates: Sequence[int] = NUM_NEIGHBOURS,
+    num_blocks: int = 5,
+) -> int:
+    """Chooses the number of neighbours for `nearest_windows` by the cross-validation of `fit_ridge`.
+
+    Args:
+        inputs: Training windows of shape `(windows, samples)` or `(windows, samples, columns)`.
+        targets: Their targets, shape `(windows, outputs)`.
+        starts: Position of each window in time, in samples; see `fit_ridge`.
+        candidates: Numbers to choose from. Those above the number of training windows are left out, except the smallest.
+        num_blocks: Number of blocks of time.
+
+    Returns:
+        The number with the smallest squared error; the smallest of those with the same error.
+
+    Raises:
+        InputError: If shapes do not match or values are not finite.
+    """
+    windows, targets, starts = _checked(inputs, targets, starts)
+    blocks = time_blocks(starts, num_blocks, windows.shape[1])
+    least = min((len(training) for training, _ in blocks), default=0)
+    tried = [number for number in sorted(candidates) if number <= least] or [min(candidates)]
+    squares = np.zeros(len(tried))
+    for training, held_out in blocks:
+        learnt = targets[training]
+        for rows, nearest in _neighbours(windows[training], windows[held_out], tried[-1]):
+            wanted = targets[held_out[rows]]
+            for position, number in enumerate(tried):
+                squares[position] += np.sum((learnt[nearest[:, :number]].mean(axis=1) - wanted) ** 2)
+    return tried[int(np.argmin(squares))]
+
+
+def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Splits windows into blocks of time for cross-validation.
+
+    Training windows that overlap the time of the held-out block are left out, if at least a quarter of the windows outside
+    the block remains.
+
+    Args:
+        starts: Position of each window, in samples, shape `(windows,)`.
+        num_blocks: Number of blocks; at most as many as windows.
+        window: Length of a window in samples.
+
+    Returns:
+        `(training, held_out)` for each block: indices of windows in the order of time. Empty for a single window.
+    """
+    order = np.argsort(starts, kind="stable")
+    if len(order) < 2:
+        return []
+    blocks = []
+    for held_out in np.array_split(order, max(2, min(num_blocks, len(order)))):
+        rest = order[~np.isin(order, held_out)]
+        first, last = starts[held_out[0]], starts[held_out[-1]]
+        apart = rest[(starts[rest] <= first - window) | (starts[rest] >= last + window)]
+        blocks.append((apart if len(apart) >= max(1, _LEAST_SHARE * len(rest)) else rest, held_out))
+    return blocks
+
+
+class _Solution:
+    """Ridge regression at every penalty, from one eigendecomposition.
+
+    The smaller of the two Gram matrices is decomposed: that of the inputs, or that of the windows if there are fewer windows.
+    """
+
+    def __init__(self, windows: np.ndarray, targets: np.ndarray):
+        self.input_mean, self.target_mean = windows.mean(axis=0), targets.mean(axis=0)
+        self.scale = np.tile(_column_deviations(windows), windows.shape[1])
+        design, outputs = self._standardised(windows), targets - self.target_mean
+        if len(design) >= design.shape[1]:
+            self.values, self.basis = np.linalg.eigh(design.T @ design)
+            self.moments = self.basis.T @ (design.T @ outputs)
+        else:
+            self.values, vectors = np.linalg.eigh(design @ design.T)
+            self.basis, self.moments = design.T @ vectors, vectors.T @ outputs
+
+    def _standardised(self, windows: np.ndarray) -> np.ndarray:
+        return _flat(windows - self.input_mean) / self.scale
+
+    def project(self, windows: np.ndarray) -> np.ndarray:
+        return self._standardised(windows) @ self.basis
+
+    def coefficients(self, penalty: float) -> np.ndarray:
+        return self.moments / (np.maximum(self.values, 0.0) + penalty)[:, None]
+
+    def weights(self, penalty: float) -> np.ndarray:
+        return self.basis @ self.coefficients(penalty) / self.scale[:, None]
+
+
+def _neighbours(train: np.ndarray, windows: np.ndarray, number: int) -> Iterator[tuple[slice, np.ndarray]]:
+    """Yields slices of windows with the indices of the nearest training windows of each, nearest first."""
+    middle = train.mean(axis=0)
+    scale = np.tile(_column_deviations(train), train.shape[1])
+    learnt, number = _flat(train - middle) / scale, min(number, len(train))
+    length = np.einsum("wi,wi->w", learnt, learnt)
+    for first in range(0, len(windows), _ROWS):
+        rows = slice(first, min(first + _ROWS, len(windows)))
+        distance = length - 2 * (_flat(windows[rows] - middle) / scale) @ learnt.T  # less the length of the window itself
+        yield rows, np.argsort(distance, axis=1, kind="stable")[:, :number]
+
+
+def _column_deviations(windows: np.ndarray) -> np.ndarray:
+    """Standard deviation of each column about its mean window, 1 for a constant column, shape `(columns,)`."""
+    deviation = np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=(0, 1)))
+    return np.where(deviation > _ROUNDING * np.abs(windows).max(axis=(0, 1)), deviation, 1.0)
+
+
+def _with_columns(windows: np.ndarray) -> np.ndarray:
+    windows = np.asarray(windows, np.float64)
+    return windows[:, :, None] if windows.ndim == 2 else windows
+
+
+def _flat(windows: np.ndarray) -> np.ndarray:
+    return windows.reshape(len(windows), -1)
+
+
+def _checked(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    windows, targets = _with_columns(inputs), np.asarray(targets, np.float64)
+    starts = np.arange(len(windows)) * windows.shape[1] if starts is None and windows.ndim == 3 else np.asarray(starts)
+    if windows.ndim != 3 or targets.ndim != 2 or not 0 < len(windows) == len(targets) == len(starts):
+        raise InputError(
+            "Expected inputs (windows, samples) or (windows, samples, columns), targets (windows, outputs) and one start per window. "
+            f"Received: {np.shape(inputs)}, {np.shape(targets)} and {np.shape(starts)}. Give the same windows to each."
+        )
+    if not (np.isfinite(windows).all() and np.isfinite(targets).all() and np.isfinite(starts).all()):
+        raise InputError("Expected finite windows. Received: NaN or infinite values. Clean the telemetry before cutting windows.")
+    return windows, targets, starts

@@ -1,0 +1,193 @@
+"""Ridge regression and the nearest training windows: against scikit-learn, by hand, and independent of units."""
+
+import numpy as np
+import pytest
+from sklearn.linear_model import Ridge as SklearnRidge
+from sklearn.neighbors import KNeighborsRegressor
+
+from enhsim_tf.enhancer.ridge import PENALTIES, choose_num_neighbours, fit_ridge, nearest_windows, time_blocks
+
+
+def _linear(num_windows, noise=0.1, seed=0, samples=12, outputs=7, columns=2):
+    """Windows of two columns of different size, a known linear map of them, and noise."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.standard_normal((num_windows, samples, columns)) * np.array([1.0, 30.0])[:columns] + 4
+    matrix = np.random.default_rng(99).standard_normal((samples * columns, outputs)) / np.repeat(
+        [[1.0, 30.0][:columns]], samples, 0
+    ).reshape(-1, 1)
+    clean = inputs.reshape(num_windows, -1) @ matrix + 2
+    return inputs, clean + noise * rng.standard_normal(clean.shape), clean
+
+
+def _standardised(inputs, like):
+    centred = like - like.mean(axis=0)
+    deviation = np.sqrt((centred**2).mean(axis=(0, 1)))
+    return ((inputs - like.mean(axis=0)) / deviation).reshape(len(inputs), -1)
+
+
+# -- ridge regression --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("num_windows", [10, 24, 200])  # fewer windows than inputs, as many, more
+@pytest.mark.parametrize("penalty", [1e-3, 1.0, 1e4])
+def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
+    inputs, targets, _ = _linear(num_windows)
+    new, *_ = _linear(5, seed=1)
+    found = fit_ridge(inputs, targets, penalties=[penalty])
+    expected = SklearnRidge(alpha=penalty).fit(_standardised(inputs, inputs), targets).predict(_standardised(new, inputs))
+    np.testing.assert_allclose(found.predict(new), expected, rtol=1e-5, atol=1e-5)
+    assert found.penalty == penalty and found.is_at_edge and found.predict(new).dtype == np.float32
+
+
+def test_the_chosen_penalty_and_its_errors_are_those_of_a_plain_loop():
+    inputs, targets, _ = _linear(60, noise=3.0)
+    penalties, squares = [0.1, 30.0, 1000.0], np.zeros(3)
+    for held_out in np.array_split(np.arange(60), 5):
+        training = np.setdiff1d(np.arange(60), held_out)
+        for number, penalty in enumerate(penalties):
+            model = SklearnRidge(alpha=penalty).fit(_standardised(inputs[training], inputs[training]), targets[training])
+            squares[number] += np.sum((model.predict(_standardised(inputs[held_out], inputs[training])) - targets[held_out]) ** 2)
+    expected = np.sqrt(squares / np.sum((targets - targets.mean(axis=0)) ** 2))
+    found = fit_ridge(inputs, targets, penalties=penalties)
+    np.testing.assert_allclose(found.errors, expected, rtol=1e-10)
+    assert found.penalty == penalties[np.argmin(expected)] == 30.0 and not found.is_at_edge
+
+
+def test_a_known_linear_map_is_recovered():
+    inputs, _, clean = _linear(300)
+    new, _, expected = _linear(20, seed=1)
+    found = fit_ridge(inputs, clean)
+    np.testing.assert_allclose(found.predict(new), expected, atol=1e-3)
+    assert found.penalty == min(PENALTIES) and found.is_at_edge, "without noise, the smallest penalty is best"
+
+
+def test_more_noise_needs_a_larger_penalty():
+    chosen = [fit_ridge(*_linear(40, noise=noise, samples=20)[:2]).penalty for noise in (0.1, 3.0, 30.0)]
+    assert chosen[0] < chosen[1] < chosen[2]
+
+
+@pytest.mark.parametrize(("factor", "offset"), [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e4), (1e-6, -3.0)])
+def test_the_unit_of_a_column_changes_nothing(factor, offset):
+    inputs, targets, _ = _linear(80, noise=1.0)
+    new, *_ = _linear(5, seed=1)
+
+    def in_other_unit(windows):
+        return np.stack([windows[..., 0], factor * windows[..., 1] + offset], axis=2)
+
+    first, second = fit_ridge(inputs, targets), fit_ridge(in_other_unit(inputs), targets)
+    assert first.penalty == second.penalty
+    np.testing.assert_allclose(first.predict(new), second.predict(in_other_unit(new)), rtol=1e-5, atol=1e-5)
+    in_unit = fit_ridge(inputs, factor * targets + offset)
+    assert in_unit.penalty == first.penalty
+    np.testing.assert_allclose(in_unit.predict(new), factor * first.predict(new) + offset, rtol=1e-4, atol=1e-4 * factor)
+
+
+def test_constant_samples_and_constant_columns_do_no_harm():
+    inputs, targets, _ = _linear(80)
+    new, *_ = _linear(5, seed=1)
+
+    def with_constants(windows):
+        windows = np.concatenate([windows, np.full((len(windows), 12, 1), 0.1, np.float32)], axis=2)
+        return np.concatenate([windows, np.full((len(windows), 1, 3), 1 / 3)], axis=1)
+
+    predicted = fit_ridge(with_constants(inputs), targets, penalties=[1e-3]).predict(with_constants(new))
+    np.testing.assert_allclose(predicted, fit_ridge(inputs, targets, penalties=[1e-3 * 12 / 13]).predict(new), atol=1e-3)
+    constant = fit_ridge(np.full((6, 4), 7.0), np.arange(6.0)[:, None])
+    np.testing.assert_allclose(constant.predict(np.full((1, 4), 7.0)), [[2.5]])
+
+
+def test_one_column_may_be_given_without_its_axis():
+    inputs, targets, _ = _linear(30, columns=1)
+    new, *_ = _linear(3, seed=1, columns=1)
+    found = fit_ridge(inputs[:, :, 0], targets)
+    np.testing.assert_array_equal(found.predict(new[:, :, 0]), fit_ridge(inputs, targets).predict(new))
+
+
+def test_one_window_predicts_itself():
+    found = fit_ridge(np.ones((1, 4)), np.array([[3.0, 5.0]]))
+    np.testing.assert_array_equal(found.predict(np.zeros((2, 4))), [[3, 5], [3, 5]])
+    assert np.isnan(found.errors).all() and found.penalty == max(PENALTIES)
+
+
+def test_the_largest_of_equally_good_penalties_is_chosen():
+    assert fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
+
+
+# -- blocks of time ----------------------------------------------------------------------------------------------------------
+
+
+def test_blocks_of_time_by_hand():
+    starts = np.array([30, 0, 10, 20, 40, 50])  # windows of 10 that share no sample, not in order
+    blocks = [(training.tolist(), held_out.tolist()) for training, held_out in time_blocks(starts, 3, 10)]
+    assert blocks == [([3, 0, 4, 5], [1, 2]), ([1, 2, 4, 5], [3, 0]), ([1, 2, 3, 0], [4, 5])]
+
+
+def test_windows_that_overlap_the_held_out_block_are_left_out():
+    starts = np.arange(0, 60, 5)  # windows of 10: neighbours share 5 samples; blocks begin at 0, 20 and 40
+    training, held_out = time_blocks(starts, 3, 10)[1]
+    assert starts[held_out].tolist() == [20, 25, 30, 35] and starts[training].tolist() == [0, 5, 10, 45, 50, 55]
+    training, held_out = time_blocks(starts, 3, 18)[1]
+    assert starts[training].tolist() == [0, 55], "a quarter of eight remains"
+    training, _ = time_blocks(starts, 3, 21)[1]
+    assert len(training) == 8, "where less than a quarter would remain, all are kept"
+
+
+def test_there_are_at_most_as_many_blocks_as_windows():
+    assert time_blocks(np.array([5]), 5, 10) == []
+    assert [held_out.tolist() for _, held_out in time_blocks(np.array([5, 0, 99]), 5, 1)] == [[1], [0], [2]]
+
+
+def test_the_order_in_which_windows_are_given_does_not_matter():
+    inputs, targets, _ = _linear(60, noise=10.0)
+    starts, order = 5 * np.arange(60), np.random.default_rng(3).permutation(60)
+    first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
+    np.testing.assert_allclose(first.errors, second.errors, rtol=1e-9)
+    assert np.abs(first.errors / fit_ridge(inputs, targets).errors - 1).max() > 1e-3, "without starts, no window is left out"
+    assert choose_num_neighbours(inputs, targets, starts) == choose_num_neighbours(inputs[order], targets[order], starts[order])
+
+
+# -- nearest windows ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [1, 5, 300, 999])
+def test_nearest_windows_are_scikit_learns(number):
+    inputs, targets, _ = _linear(600)
+    new, *_ = _linear(300, seed=1)
+    model = KNeighborsRegressor(min(number, 600)).fit(_standardised(inputs, inputs), targets)
+    np.testing.assert_allclose(nearest_windows(inputs, targets, new, number), model.predict(_standardised(new, inputs)), atol=1e-5)
+
+
+def test_nearest_windows_by_hand():
+    train, targets = np.array([[0.0], [1.0], [5.0]]), np.array([[10.0], [20.0], [60.0]])
+    np.testing.assert_array_equal(nearest_windows(train, targets, np.array([[0.2], [4.0]]), 2), [[15], [40]])
+
+
+def test_the_number_of_neighbours_grows_with_the_noise_and_does_not_depend_on_units():
+    rng = np.random.default_rng(0)
+    inputs = rng.uniform(size=(400, 1))
+    chosen = {}
+    for noise in (0.0, 0.5, 50.0):
+        targets = np.sin(20 * inputs) + noise * rng.standard_normal((400, 3))
+        chosen[noise] = choose_num_neighbours(inputs, targets)
+        assert chosen[noise] == choose_num_neighbours(1e6 * inputs - 3, 1e-6 * targets)
+    assert chosen[0.0] < chosen[0.5] < chosen[50.0]
+    assert choose_num_neighbours(inputs[:2], targets[:2]) == choose_num_neighbours(inputs[:1], targets[:1]) == 1
+
+
+# -- what cannot be used -----------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_used_is_refused(refused):
+    inputs, targets, _ = _linear(10)
+    with refused("one start per window", "(10, 12, 2), (9, 7)"):
+        fit_ridge(inputs, targets[:9])
+    with refused("one start per window"):
+        choose_num_neighbours(inputs, targets, np.arange(9))
+    with refused("finite windows"):
+        fit_ridge(np.where(inputs > 5, np.nan, inputs), targets)
+    with refused("penalties above 0"):
+        fit_ridge(inputs, targets, penalties=[0.0, 1.0])
+    with refused("as in training", "(11, 2)"):
+        fit_ridge(inputs, targets).predict(inputs[:, 1:])
+    with refused("at least 1 neighbour"):
+        nearest_windows(inputs, targets, inputs, 0)
