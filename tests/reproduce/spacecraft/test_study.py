@@ -8,8 +8,10 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.__main__ import main
 from enhsim_tf.reproduce.publish.report import findings_of
+from enhsim_tf.reproduce.spacecraft import study
 from enhsim_tf.reproduce.spacecraft.enhancement import METHODS
 from enhsim_tf.reproduce.spacecraft.figures import FIGURES
 from enhsim_tf.reproduce.spacecraft.findings import CONTROLS, KEPT, summarise
@@ -49,6 +51,14 @@ def data(tmp_path_factory):
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("stages")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick_detectors():
+    """Leaves out the detectors whose training takes seconds; tests of their own package cover them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual", "nearest neighbours")})
+        yield
 
 
 @pytest.fixture(scope="module")
