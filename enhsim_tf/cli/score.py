@@ -57,10 +57,15 @@ def run_score(options: argparse.Namespace) -> int:
                 f"{printable(channel)}: without --coarse, the values are judged, not their difference from an enhanced run of the same time"
             )
         left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
-        scored = len(frame) - left
+        scored, rate = len(frame) - left, frame.attrs["expected_false_alarm_rate"]
         tell(
             f"{printable(channel)}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector}, "
-            f"set to flag {chosen.false_alarm_rate:.1%} of generated nominal samples"
+            f"set to flag {rate:.1%} of generated nominal samples"
+            + (
+                f" (too few windows for {chosen.false_alarm_rate:.2g}: the threshold is their largest score)"
+                if rate > chosen.false_alarm_rate
+                else ""
+            )
             + (f"; {counted(left, 'sample')} not scored, in parts shorter than a window" if left else "")
             + f"; in {paths[channel]}"
         )

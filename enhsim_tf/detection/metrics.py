@@ -1,7 +1,8 @@
 """Thresholds and performance measures of anomaly detectors, as functions of their scores (title and abstract of the paper).
 
-Higher scores are more anomalous. A score raises an alarm if it is strictly above the threshold. Scores are never adjusted by
-the labels ("point adjustment"), because that makes even random scores look good.
+Higher scores are more anomalous. A score raises an alarm if it is strictly above the threshold. Every threshold of this project
+comes from `threshold`, or from `finite_threshold` where a finite one is needed. Scores are never adjusted by the labels ("point
+adjustment"), because that makes even random scores look good.
 """
 
 import numpy as np
@@ -31,6 +32,33 @@ def threshold(scores: np.ndarray, rate: float) -> float:
         raise InputError(f"Expected a rate between 0 and 1, and at least one score. Received: rate={rate} and {len(scores)} scores.")
     rank = int(np.ceil((len(scores) + 1) * (1 - rate) - 1e-9))  # the rounding of 1 - rate must not increase the rank
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
+
+
+def smallest_rate(num_scores: int) -> float:
+    """Returns the smallest false-alarm rate for which the conformal threshold of so many scores is finite: `1 / (num_scores + 1)`."""
+    return 1 / (num_scores + 1)
+
+
+def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | None = None) -> tuple[float, float]:
+    """Computes the conformal threshold, or the largest score if there are too few scores for the rate.
+
+    An infinite threshold would silence a detector without a word. With the largest of `n` scores as threshold, the expected
+    false-alarm rate is at most `1 / (n + 1)`, which is returned so that it can be stated instead of the rate asked for.
+
+    Args:
+        scores: Scores of held-out nominal windows.
+        rate: Largest acceptable false-alarm rate, between 0 and 1.
+        num_independent: Number of independent scores, if the scores of overlapping windows are correlated. None: all of them.
+
+    Returns:
+        The threshold and the false-alarm rate that it is set for, which is `rate` or larger.
+
+    Raises:
+        InputError: As for `threshold`.
+    """
+    conformal = threshold(scores, rate)
+    smallest = smallest_rate(num_independent or len(scores))
+    return (float(np.max(scores)), smallest) if rate < smallest * (1 - 1e-9) else (conformal, rate)
 
 
 def false_alarm_rate(nominal_scores: np.ndarray, threshold: float) -> float:

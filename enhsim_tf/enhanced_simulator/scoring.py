@@ -1,7 +1,7 @@
 """Scores real telemetry with a detector that was trained on generated nominal telemetry only.
 
-The threshold is a quantile of the detector's scores on another generated series, which is scored in the same way as real
-telemetry. The chosen false-alarm rate holds for real nominal telemetry as far as the simulation is accurate.
+The threshold is the conformal threshold of the detector's scores on another generated series, which is scored in the same way as
+real telemetry. The chosen false-alarm rate holds for real nominal telemetry as far as the simulation is accurate.
 """
 
 import dataclasses
@@ -14,6 +14,7 @@ import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection import metrics
 from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import DETECTORS
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
-_THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; long, because neighbouring scores are correlated
+_THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent
 _STRIDES = 8  # number of scored windows that begin within one window length
 
 
@@ -36,7 +37,8 @@ class ScoreOptions:
     Args:
         detector: Name of a detector in `detectors.DETECTORS`.
         num_windows: Number of generated nominal windows for training the detector.
-        false_alarm_rate: Share of generated nominal samples that the threshold flags.
+        false_alarm_rate: Share of generated nominal samples that the threshold flags. The threshold is set on a generated
+            series of 1,000 windows; for a rate below 1 / 1,001, it is the largest score of that series.
         seed: Random seed.
 
     Raises:
@@ -67,8 +69,9 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     Returns:
         A data frame with the index of `sources.to_series` and the columns `value`, `score` (scaled so that the threshold is
         1; NaN in parts shorter than a window) and `flag` (whether the score is above 1). `frame.attrs` contains
-        `expected_false_alarm_rate`, `events` (the rows of `events_table`), and `false_alarms_per_day`: the number that is
-        expected on nominal telemetry, with the limits of its 95 % interval, from a further generated series.
+        `expected_false_alarm_rate` (the rate of the options, or 1 / 1,001 if that is larger), `events` (the rows of
+        `events_table`), and `false_alarms_per_day`: the number that is expected on nominal telemetry, with the limits of its
+        95 % interval, from a further generated series.
 
     Raises:
         InputError: If the sampling interval differs from the simulator's, or if every part is shorter than a window.
@@ -90,7 +93,8 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     training = simulator.generate(options.num_windows, seed=options.seed)
     detector = DETECTORS[options.detector](options.seed).fit(training)
     nominal = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 1)
-    threshold = float(np.quantile(score_trace(detector, nominal, window, stride), 1 - options.false_alarm_rate))
+    nominal_scores = score_trace(detector, nominal, window, stride)
+    threshold, rate = metrics.finite_threshold(nominal_scores, options.false_alarm_rate, _THRESHOLD_WINDOWS)
     further = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 2)  # on it the alarms are counted
     further_scores = _relative(score_trace(detector, further, window, stride), threshold)
     frames, events = [], []
@@ -102,7 +106,7 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
         events += _event_rows(scores, sum(map(len, frames)), further_scores, window, simulator.interval_s)
         frames.append(pd.DataFrame({"value": series, "score": scores, "flag": scores > 1}, index=series.index))
     frame = pd.concat(frames)
-    frame.attrs["expected_false_alarm_rate"] = options.false_alarm_rate
+    frame.attrs["expected_false_alarm_rate"] = rate
     num_alarms = len(events_of(further_scores > 1, gap=window))
     frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(further) * simulator.interval_s))
     frame.attrs["events"] = events

@@ -233,11 +233,15 @@ class FactorialSettings:
 class LabelledSettings:
     """The study of real telemetry with labelled anomalies: `python -m enhsim_tf.reproduce --experiment labelled`."""
 
+    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with the seeds 0, 1, ...", smoke=2)
     num_windows: int = setting(2_500, "windows", f"{OUR_CHOICE}: about every offset in a channel of the data set once", smoke=60)
     epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
     num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
     num_arm_windows: int = setting(
         2_000, "windows", f"{OUR_CHOICE}: training windows of each arm; as many held-out windows set its threshold", smoke=200
+    )
+    num_folds: int = setting(
+        5, "blocks of time", f"{OUR_CHOICE}: real windows set thresholds in the block that a detector was not fitted to", smoke=3
     )
     false_alarm_rate: float = setting(0.01, "share", f"{OUR_CHOICE}: as in the experiment on robustness")
     max_order: int = setting(60, "samples", f"{OUR_CHOICE}: largest order of the fitted autoregression; AIC selects the order", smoke=20)

@@ -270,7 +270,9 @@ def test_inject_writes_one_timeeval_file_or_one_file_for_each_channel(told, tmp_
 
 
 def test_a_single_channel_and_a_single_simulator_match_whatever_their_names(told, tmp_path):
-    code, _, errors = told("score", "WORLD/single", "WORLD/two.csv", "--column", "amps", "--windows", 30, "--out", "scores.parquet")
+    command = ["score", "WORLD/single", "WORLD/two.csv", "--column", "amps", "--windows", 30, "--out", "scores.parquet"]
+    code, out, errors = told(*command, "--false-alarm-rate", "1e-4")  # smaller than the generated windows support
+    assert "set to flag 0.1% of generated nominal samples (too few windows for 0.0001" in out
     assert (code, errors) == (0, []) and len(pd.read_parquet(tmp_path / "scores.parquet")) == 1_500
 
 

@@ -10,9 +10,11 @@ from enhsim_tf.detection.metrics import (
     auc_pr_at_prevalence,
     auc_roc,
     false_alarm_rate,
+    finite_threshold,
     gap_closed,
     recall,
     recall_at_real_rate,
+    smallest_rate,
     threshold,
     vus_pr,
 )
@@ -30,6 +32,28 @@ def test_threshold_is_the_score_of_the_conformal_rank(number, rate, rank):
 def test_threshold_of_too_few_scores_never_alarms():
     assert threshold(np.arange(98), 0.01) == np.inf
     assert false_alarm_rate(np.arange(98), np.inf) == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "independent", "rate", "expected"),
+    [
+        (99, None, 0.01, (99, 0.01)),  # just enough scores: the conformal threshold is the largest score
+        (98, None, 0.01, (98, 1 / 99)),  # one score too few
+        (199, None, 0.01, (198, 0.01)),
+        (990, 98, 0.01, (990, 1 / 99)),  # correlated scores count as fewer
+        (990, 99, 0.01, (982, 0.01)),  # rank ceil(991 * 0.99)
+    ],
+)
+def test_a_finite_threshold_states_the_rate_that_it_is_set_for(number, independent, rate, expected):
+    scores = np.random.default_rng(0).permutation(np.arange(1.0, number + 1))
+    assert finite_threshold(scores, rate, independent) == pytest.approx(expected)
+
+
+def test_the_largest_score_keeps_the_smallest_rate():
+    # uniform scores: the rate of the largest of n is 1 - max, whose mean is 1 / (n + 1)
+    rates = 1 - np.array([finite_threshold(scores, 0.001)[0] for scores in np.random.default_rng(2).random((4_000, 19))])
+    assert smallest_rate(19) == 0.05
+    assert np.mean(rates) == pytest.approx(0.05, abs=5 * np.std(rates) / np.sqrt(4_000))
 
 
 @pytest.mark.parametrize(("number", "rate"), [(50, 0.05), (99, 0.01), (130, 0.01)])

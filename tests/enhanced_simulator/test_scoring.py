@@ -75,6 +75,13 @@ def test_samples_with_a_score_above_one_are_flagged(known, short):
     assert frame.attrs["expected_false_alarm_rate"] == 0.2
 
 
+def test_a_rate_that_the_series_cannot_support_is_replaced_by_the_smallest(known, short):
+    # a series of 100 windows supports no rate below 1 / 101: the threshold is its largest score, whatever smaller rate is asked for
+    frames = [score_channel(known, [telemetry(known)], ScoreOptions(num_windows=100, false_alarm_rate=rate)) for rate in (1e-3, 1e-6)]
+    pd.testing.assert_frame_equal(*frames)
+    assert all(frame.attrs["expected_false_alarm_rate"] == pytest.approx(1 / 101) for frame in frames)
+
+
 def test_scores_keep_their_order_if_the_threshold_is_not_positive():
     # a limit check scores below zero inside its limits, and dividing by a negative threshold would reverse the order
     scores = np.array([-3.0, -1.0, 0.5])

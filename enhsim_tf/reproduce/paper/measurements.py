@@ -8,6 +8,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.console import SILENT, Progress
+from enhsim_tf.detection import metrics
 from enhsim_tf.detection.autoencoders import DenseAutoencoder
 from enhsim_tf.detection.detectors import IsolationForestOnFeatures, PCAResidual
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, fit_ridge, nearest_windows
@@ -120,7 +121,7 @@ def false_alarms(
     for number, (training, threshold_windows) in enumerate(arms.values()):
         detectors = make_detectors(settings, seed)
         for done, detector in enumerate(detectors.values(), 1):
-            threshold = np.quantile(detector.fit(training).score(threshold_windows), 1 - settings.false_alarm_rate)
+            threshold = metrics.threshold(detector.fit(training).score(threshold_windows), settings.false_alarm_rate)
             rate.append(np.mean(detector.score(test) > threshold))
             found.append(np.mean([np.mean(detector.score(windows) > threshold) for windows in degraded.values()]))
             told(number + done / len(detectors))

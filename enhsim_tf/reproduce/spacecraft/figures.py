@@ -5,34 +5,37 @@ from typing import Any
 
 import matplotlib.figure
 import numpy as np
+from matplotlib.lines import Line2D
 
 from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, SINGLE, new_sheet, panels
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.figure import Figure
-from enhsim_tf.reproduce.spacecraft.study import ARMS, GENERATED_ARM
+from enhsim_tf.reproduce.spacecraft.rates import PRIMARY
+from enhsim_tf.reproduce.spacecraft.study import ARMS, GENERATED_ARM, RIDGE_ARM
 
 Findings = Mapping[str, Any]
 _MOST = 12  # channels that a figure names
 
 
 def _colour(arm: str) -> str:
-    colours = {"real": REAL, "coarse": COARSE, GENERATED_ARM: ENHANCED, "real + generated": ENHANCED}
+    colours = {"real": REAL, "coarse": COARSE, GENERATED_ARM: ENHANCED, RIDGE_ARM: AVERAGE}
     return colours.get(arm, GENERATED)
 
 
 def errors(found: Findings) -> matplotlib.figure.Figure:
     """Error of the coarse signal, ridge regression and the enhanced signal on nominal test windows, one row per channel."""
     channels = dict(list(found["channels"].items())[:_MOST])
-    all_errors = [about["nrmse"] for about in found["channels"].values()]
+    compared = ("coarse", "ridge", "ridge, own clock", "enhanced")
+    all_errors = [{method: about["nrmse"][method] for method in compared} for about in found["channels"].values()]
     nearest = [min(each, key=each.get) for each in all_errors]
     figure, down = new_sheet(
         SINGLE,
-        2.3 + 0.2 * len(channels),
-        f"The enhanced signal has the smallest error on {nearest.count('enhanced')} of {len(nearest)} channels; ridge regression with the enhancer's clock "
-        f"on {nearest.count('ridge, same clock')}",
+        2.5 + 0.2 * len(channels),
+        f"The enhanced signal has the smallest error on {nearest.count('enhanced')} of {len(nearest)} channels; tuned ridge regression "
+        f"on {nearest.count('ridge') + nearest.count('ridge, own clock')}",
         "Median error over nominal test windows, in standard deviations of each window, after phase, offset and gain are aligned to that window. "
-        "Hollow: ridge regression aligned with the phase that the enhanced signal finds.",
+        "Hollow: ridge regression aligned by its own waveform, as the enhanced signal is; full: by the edges of the square wave.",
     )
     axes = panels(figure, down + 0.4, 1, 1)[0, 0]
     place = axes.get_position()
@@ -41,7 +44,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
         ("coarse", "s", COARSE, COARSE, 0.0),
         ("enhanced", "o", ENHANCED, ENHANCED, 0.0),
         ("ridge", "^", AVERAGE, AVERAGE, 0.3),  # offset from the row, so that no other mark covers it
-        ("ridge, same clock", "^", AVERAGE, "none", -0.3),
+        ("ridge, own clock", "^", AVERAGE, "none", -0.3),
     )
     for method, marker, colour, inside, beside in marks:
         values = [about["nrmse"][method] for about in channels.values()]
@@ -54,36 +57,52 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
 
 
 def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
-    """False alarms on nominal test windows and labelled sequences found, for each training arm."""
-    arms = found["arms"]
-    generated, real = arms[GENERATED_ARM], arms["real"]
-    number = len(found["channels"])
+    """False alarms at own thresholds, and labelled sequences found at matched false-alarm rates, for each training arm and control."""
+    rows = {arm: (found["arms"][arm], _colour(arm)) for arm in ARMS}
+    rows |= {f"one line: {name}": (about, QUIET) for name, about in found["controls"].items()}
+    finds = {name: next(each["mean"] for each in about["matched"] if each["rate"] == PRIMARY) for name, (about, _) in rows.items()}
+    best = max((name for name in rows if name.startswith("one line") and "random" not in name), key=finds.get)
     figure, down = new_sheet(
         DOUBLE,
-        3.6,
-        f"On a real spacecraft, detectors trained on generated telemetry raise false alarms on {100 * generated['false_alarms']['mean']:.0f} % of nominal windows "
-        f"and find {100 * generated['found']['mean']:.0f} % of the labelled anomalies; trained on the channel's own past, on {100 * real['false_alarms']['mean']:.0f} % "
-        f"and {100 * real['found']['mean']:.0f} %",
-        f"Vertical line: the rate that thresholds are set for, 1 %. Dot and bar: mean over {in_words(len(DETECTORS))} detectors and {number} "
-        f"channels, with its 95 % interval over channels; small marks: single detectors. {found['num_sequences']} labelled sequences.",
+        4.6,
+        f"At {100 * PRIMARY:.0f} % false alarms, detectors trained on generated telemetry find {100 * finds[GENERATED_ARM]:.0f} % of the labelled anomalies of a real "
+        f"spacecraft, trained on the channel's own past {100 * finds['real']:.0f} %, without a network {100 * finds[RIDGE_ARM]:.0f} %; {best.removeprefix('one line: ')}, "
+        f"one line, finds {100 * finds[best]:.0f} %",
+        f"Left: thresholds set for 1 % (vertical line) on held-out windows of the arm (dot, with its 95 % interval) and on the channel's past (hollow). Right: thresholds "
+        f"matched on nominal test windows; the vertical mark is what chance finds at {100 * PRIMARY:.0f} %. Means over {in_words(len(DETECTORS))} detectors (one line: one), "
+        f"{len(found['channels'])} channels, {len(found['seeds'])} seeds and {found['num_sequences']} labelled sequences.",
     )
-    grid = panels(figure, down + 0.12, 1, 2, gap=(0.3, 0.12), sharey=True)
-    left, width = 1.75 / DOUBLE, (1 - 1.9 / DOUBLE) / 2
-    words = (("false_alarms", "false alarms on nominal test windows (%)"), ("found", "labelled sequences found (%)"))
-    for number, (axes, (key, label)) in enumerate(zip(grid[0], words, strict=True)):
+    grid = panels(figure, down + 0.3, 1, 2, gap=(0.3, 0.12), sharey=True)
+    left, width = 1.85 / DOUBLE, (1 - 2.0 / DOUBLE) / 2
+    for number, axes in enumerate(grid[0]):
         place = axes.get_position()
-        axes.set_position([left + number * width, place.y0 + 0.02, width - 0.03, place.height - 0.02])
-        for height, arm in enumerate(ARMS):
-            about, colour = arms[arm], _colour(arm)
-            each = [100 * rates[key] for rates in about["by_detector"].values()]
-            axes.plot(each, np.full(len(each), -height), "|", color=colour, markersize=6)
-            axes.plot([100 * about[key]["low"], 100 * about[key]["high"]], [-height] * 2, color=colour, linewidth=2.2, alpha=0.45)
-            axes.plot(100 * about[key]["mean"], -height, "o", color=colour, markersize=4)
+        axes.set_position([left + number * width, place.y0 + 0.01, width - 0.03, place.height - 0.01])
         axes.set_xlim(-3, 103)
-        axes.set_xlabel(label)
-    grid[0, 0].axvline(1, color=QUIET, linewidth=0.6, zorder=0)
-    grid[0, 0].set_yticks(-np.arange(len(ARMS)), list(ARMS))
-    grid[0, 1].tick_params(labelleft=False)
+    alarms, shares = grid[0]
+    for height, (about, colour) in enumerate(rows.values()):
+        rate = about["false_alarms"]
+        alarms.plot([100 * rate["low"], 100 * rate["high"]], [-height] * 2, color=colour, linewidth=2.2, alpha=0.45)
+        alarms.plot(100 * about["false_alarms_past"]["mean"], -height, "D", color=colour, markerfacecolor="white", markersize=4)
+        alarms.plot(100 * rate["mean"], -height, "o", color=colour, markersize=4)
+        for each, marker in zip(about["matched"], ("v", "o", "^"), strict=True):
+            inside = colour if each["rate"] == PRIMARY else "white"
+            shares.plot(100 * each["mean"], -height, marker, color=colour, markerfacecolor=inside, markersize=4.5)
+            if each["rate"] == PRIMARY:
+                shares.plot(100 * each["chance"], -height, "|", color=colour, markersize=9)
+    alarms.axvline(1, color=QUIET, linewidth=0.6, zorder=0)
+    alarms.set_xlabel("false alarms on nominal test windows (%)")
+    shares.set_xlabel("labelled sequences found (%)")
+    marks = [*zip(("v", "o", "^"), found["rates"], strict=True)]
+    handles = [
+        Line2D([], [], ls="", marker=m, color=REAL, mfc=REAL if r == PRIMARY else "white", ms=4.5, label=f"at {100 * r:.0f} %")
+        for m, r in marks
+    ]
+    handles.append(Line2D([], [], ls="", marker="|", color=REAL, ms=9, label="chance"))
+    shares.legend(
+        handles=handles, frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(-0.02, 1.0), handletextpad=0.1, columnspacing=0.9
+    )
+    alarms.set_yticks(-np.arange(len(rows)), list(rows))
+    shares.tick_params(labelleft=False)
     return figure
 
 
@@ -92,15 +111,15 @@ FIGURES = {
         15,
         "Enhancement of real telemetry",
         "A row for each channel with four marks: the median error of the coarse signal, of ridge regression aligned in two ways and of the enhanced signal on "
-        "nominal test windows. The title counts the channels on which the enhanced signal has the smallest error.",
+        "nominal test windows. The title counts the channels on which the enhanced signal and ridge regression have the smallest error.",
         errors,
     ),
     "alarms_and_finds": Figure(
         16,
         "Detectors on real telemetry",
-        "Two panels with a row for each training arm. Left: the false alarms on nominal test windows. Right: the share of "
-        "labelled anomalies found; means with intervals over channels, and a mark for each detector. The title gives the two means for "
-        "generated and for real training.",
+        "Two panels with a row for each training arm and each detector of one line. Left: the false alarms on nominal test windows, with thresholds set "
+        "on the arm's own windows and on the channel's past. Right: the share of labelled anomalies found at matched false-alarm rates of 1, 5 and 10 %, with what "
+        "chance finds. The title gives the finds at 5 %.",
         alarms_and_finds,
     ),
 }

@@ -6,22 +6,36 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.reproduce import statistics
-from enhsim_tf.reproduce.spacecraft.study import ARMS, DEGRADED_ARM, GENERATED_ARM, TABLES
+from enhsim_tf.reproduce.spacecraft.matched import RATES, chance_of
+from enhsim_tf.reproduce.spacecraft.rates import PRIMARY, Rates, rates_of
+from enhsim_tf.reproduce.spacecraft.study import ARMS, DEGRADED_ARM, GENERATED_ARM, RIDGE_ARM, TABLES
 from enhsim_tf.reproduce.tables import KeptTables
 
 if TYPE_CHECKING:
     import pandas as pd
 
-LARGEST_RATIO = 1.5
-"""Largest ratio of false alarms, trained on generated to trained on real telemetry; fixed before the first run."""
 NEARER = 2 / 3
 """Largest ratio of the errors of the enhanced and the coarse signal for an error that is lower by a third."""
-SATURATED = 0.9
-"""If detectors of both trainings alarm on more than this share of nominal windows, their ratio is not informative."""
-_CONTROLS = ("random score", "largest step", "moving deviation", "oracle")
+SATURATED = 0.5
+"""A channel is told apart if, for the median noisy arm, detectors alarm on more than this share of its nominal windows; fixed before the run."""
+CLEAN_ARMS = ("coarse", "enhanced")
+"""Arms without noise. Their detectors alarm on most windows of every channel, so they do not tell channels apart."""
+CONTROLS = ("random score", "largest step", "moving deviation", "limit check")
+"""Detectors of one line, trained on the channel's own past."""
+CONTRASTS = (
+    (GENERATED_ARM, "real"),
+    (GENERATED_ARM, RIDGE_ARM),
+    (GENERATED_ARM, "enhanced + bootstrap"),
+    (GENERATED_ARM, "enhanced + AR"),
+    (GENERATED_ARM, "enhanced + GAN"),
+    (RIDGE_ARM, "real"),
+    ("moving deviation", GENERATED_ARM),
+    ("largest step", GENERATED_ARM),
+)
+"""Differences between arms or controls that were declared before the run."""
 KEPT = KeptTables(
     TABLES,
-    labels=("arm", "detector", "channel", "class", "method"),
+    labels=("arm", "detector", "channel", "class", "method", "rule"),
     digits=5,
     kind="study",
     command="python -m enhsim_tf.reproduce --experiment labelled --data FOLDER",
@@ -34,114 +48,137 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     Args:
         tables: As `KEPT.read` returns them.
     """
-    channels = {name: _channel(tables, name) for name in dict.fromkeys(tables["alarms"]["channel"])}
-    arms = {arm: _arm(tables, arm) for arm in (*ARMS, DEGRADED_ARM)}
-    both = [
-        min(about["false_alarms"][GENERATED_ARM][detector], about["false_alarms"]["real"][detector])
-        for about in channels.values()
-        for detector in about["ratios"]
-    ]
+    rates = rates_of(tables)
+    channels = {name: _channel(tables, rates, name) for name in rates.names}
+    usable = [name for name, about in channels.items() if not about["told_apart"]]
+    arms = {arm: _arm(tables, rates, rates.of_arm(arm), usable) for arm in (*ARMS, DEGRADED_ARM)}
+    for arm, about in arms.items():
+        rows = {detector: rates.of_arm(arm) & (rates.cells["detector"] == detector).to_numpy() for detector in rates.detectors(arm)}
+        about["by_detector"] = {detector: _short(tables, rates, chosen) for detector, chosen in rows.items()}
+    controls = {name: _arm(tables, rates, rates.of_control(name), usable) for name in CONTROLS}
+    oracle = tables["ranking"].query("detector == 'oracle'")
     return {
         "channels": channels,
-        "pairs": {"number": len(both), "saturated": sum(rate > SATURATED for rate in both), "above": SATURATED},
+        "told_apart": [name for name in channels if name not in usable],
         "arms": arms,
-        "controls": {name: _control(tables, name) for name in _CONTROLS},
-        "num_sequences": sum(len(about["sequences"]) for about in channels.values()),
-        "seeds": sorted(set(tables["alarms"]["seed"].tolist())),
+        "controls": controls,
+        "oracle": {"vus_pr": float(oracle["vus_pr"].mean()), "auc_pr": float(oracle["auc_pr"].mean())},
+        "contrasts": [_contrast(rates, *pair) for pair in CONTRASTS],
+        "num_sequences": rates.num_sequences,
+        "seeds": rates.seeds,
+        "rates": list(RATES),
         "bars": _bars(channels),
     }
 
 
-def _rates(tables: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
-    by = ["channel", "arm", "detector"]
-    counts = tables["alarms"].groupby(by, as_index=False, sort=False)[["alarms", "windows"]].sum()
-    return counts.assign(rate=counts["alarms"] / counts["windows"])
-
-
-def _channel(tables: "Mapping[str, pd.DataFrame]", name: str) -> dict[str, Any]:
-    enhancement = tables["enhancement"].query("channel == @name").set_index("method")
-    rates = _rates(tables).query("channel == @name and detector not in @_CONTROLS")
-    false_alarms = {arm: dict(zip(rows["detector"], rows["rate"], strict=True)) for arm, rows in rates.groupby("arm", sort=False)}
-    counts = rates.set_index(["arm", "detector"])
-    ratios = {
-        detector: float(
-            # half an alarm is added on both sides, because zero alarms do not prove a rate of zero
-            (counts.loc[(GENERATED_ARM, detector), "alarms"] + 0.5) / (counts.loc[("real", detector), "alarms"] + 0.5)
-        )
-        for detector in false_alarms["real"]
+def _channel(tables: "Mapping[str, pd.DataFrame]", rates: Rates, name: str) -> dict[str, Any]:
+    about = tables["channels"].query("channel == @name").iloc[0]
+    enhancement = tables["enhancement"].query("channel == @name").groupby("method", sort=False)
+    cells = rates.cells.query("channel == @name")
+    by_arm = {arm: cells[rates.of_arm(arm)[cells.index]]["own"].mean() for arm in ARMS}
+    noisy = float(np.median([rate for arm, rate in by_arm.items() if arm not in CLEAN_ARMS]))
+    by_detector = {
+        arm: cells[rates.of_arm(arm)[cells.index]].groupby("detector", sort=False)["own"].mean().to_dict() for arm in (*ARMS, DEGRADED_ARM)
     }
-    found = tables["sequences"].query("channel == @name and detector not in @_CONTROLS")
-    sequences = []
-    for number, rows in found.groupby("sequence"):
-        by_arm = {arm: dict(zip(each["detector"], map(bool, each["found"]), strict=True)) for arm, each in rows.groupby("arm", sort=False)}
-        delays = rows.query("arm == @GENERATED_ARM and found")["delay"]
-        about = {"sequence": int(number), "class": rows["class"].iloc[0], "length": int(rows["length"].iloc[0]), "found": by_arm}
-        sequences.append(about | {"median_delay": float(delays.median()) if len(delays) else None})
     return {
-        "window": int(enhancement["window"].iloc[0]),
-        "period": float(enhancement["period"].iloc[0]),
-        "num_windows": int(enhancement["windows"].iloc[0]),
-        "num_scored": int(rates["windows"].iloc[0]),
-        "nrmse": {method: float(value) for method, value in enhancement["nrmse"].items()},
-        "false_alarms": false_alarms,
-        "ratios": ratios,
-        "median_ratio": float(np.median(list(ratios.values()))),
-        "sequences": sequences,
+        "window": int(about["window"]),
+        "period": float(about["period"]),
+        "num_train_windows": int(about["train_samples"] // about["window"]),
+        "num_windows": int(enhancement["windows"].first().iloc[0]),
+        "num_scored": rates.num_nominal[name],
+        "penalty": float(about["penalty"]),
+        "nrmse": {method: float(value) for method, value in enhancement["nrmse"].mean().items()},
+        "false_alarms": by_detector,
+        "false_alarms_by_arm": {arm: float(rate) for arm, rate in by_arm.items()},
+        "median_arm": noisy,
+        "told_apart": noisy > SATURATED,
+        "found": {arm: rates.found(rates.of_arm(arm), PRIMARY, [name]) for arm in ARMS},
+        "sequences": [
+            {"sequence": int(row["sequence"]), "class": row["class"], "length": int(row["stop"] - row["start"]), "found": found}
+            for row, found in rates.by_sequence(name, [*ARMS, *CONTROLS])
+        ],
     }
 
 
-def _arm(tables: "Mapping[str, pd.DataFrame]", arm: str) -> dict[str, Any]:
-    rates = _rates(tables).query("arm == @arm and detector not in @_CONTROLS")
-    sequences = tables["sequences"].query("arm == @arm and detector not in @_CONTROLS")
-    ranking = tables["ranking"].query("arm == @arm and detector not in @_CONTROLS")
-    by_sequence = sequences.assign(found=sequences["found"].astype(float))
-    delays = sequences[sequences["found"]]["delay"]
+def _arm(tables: "Mapping[str, pd.DataFrame]", rates: Rates, rows: np.ndarray, usable: list[str]) -> dict[str, Any]:
+    """Results of the detectors of one arm, or of one control; `rows` selects them among the cells."""
+    cells = rates.cells[rows]
+    ranking = _ranking_of(tables, cells)
     return {
-        "false_alarms": _interval(rates, "rate", ["channel"]),
-        "median_false_alarms": float(rates["rate"].median()),
-        "found": _interval(by_sequence, "found", ["channel", "sequence"]),
-        "median_delay": float(delays.median()) if len(delays) else None,
+        "false_alarms": _crossed(cells, "own"),
+        "false_alarms_past": _crossed(cells, "past"),
+        "median_false_alarms": float(cells["own"].median()),
+        "found": _found(rates, rows, "own"),
+        "found_past": _found(rates, rows, "past"),
+        "matched": [{"rate": rate, **_found(rates, rows, rate)} for rate in RATES],
+        "usable": {
+            "false_alarms": float(cells[cells["channel"].isin(usable)]["own"].mean()) if usable else None,
+            "found": rates.found(rows, PRIMARY, usable) if usable else None,
+        },
+        "median_delay": rates.median_delay(rows),
         "vus_pr": float(ranking["vus_pr"].mean()),
         "auc_pr": float(ranking["auc_pr"].mean()),
-        "by_detector": {
-            detector: {
-                "false_alarms": float(rows["rate"].mean()),
-                "found": float(by_sequence.query("detector == @detector")["found"].mean()),
-                "vus_pr": float(ranking.query("detector == @detector")["vus_pr"].mean()),
-                "auc_pr": float(ranking.query("detector == @detector")["auc_pr"].mean()),
-            }
-            for detector, rows in rates.groupby("detector", sort=False)
-        },
     }
 
 
-def _control(tables: "Mapping[str, pd.DataFrame]", name: str) -> dict[str, Any]:
-    ranking = tables["ranking"].query("detector == @name")
-    rates, sequences = _rates(tables).query("detector == @name"), tables["sequences"].query("detector == @name")
-    about: dict[str, Any] = {"vus_pr": float(ranking["vus_pr"].mean()), "auc_pr": float(ranking["auc_pr"].mean())}
-    if len(rates):
-        about |= {"false_alarms": float(rates["rate"].mean()), "found": float(sequences["found"].astype(float).mean())}
-    return about
+def _short(tables: "Mapping[str, pd.DataFrame]", rates: Rates, rows: np.ndarray) -> dict[str, float]:
+    cells = rates.cells[rows]
+    ranking = _ranking_of(tables, cells)
+    return {
+        "false_alarms": float(cells["own"].mean()),
+        "found": rates.found(rows, PRIMARY),
+        "vus_pr": float(ranking["vus_pr"].mean()),
+        "auc_pr": float(ranking["auc_pr"].mean()),
+    }
 
 
-def _interval(table: "pd.DataFrame", value: str, levels: list[str]) -> dict[str, float]:
-    """Mean with its bootstrap interval over channels, or over sequences within channels; detectors stay together."""
-    found = statistics.hierarchical_interval(table, value, levels)
+def _ranking_of(tables: "Mapping[str, pd.DataFrame]", cells: "pd.DataFrame") -> "pd.DataFrame":
+    return tables["ranking"].merge(cells[["channel", "seed", "arm", "detector"]], on=["channel", "seed", "arm", "detector"])
+
+
+def _crossed(cells: "pd.DataFrame", value: str) -> dict[str, float]:
+    """Mean over detectors, channels and seeds, with its interval by the crossed bootstrap over channels and seeds."""
+    means = cells.groupby(["channel", "seed"], as_index=False)[value].mean()
+    found = statistics.crossed_interval(means, value, ["channel", "seed"])
     return {"mean": found.estimate, "low": found.low, "high": found.high}
 
 
-def _bars(channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """For each channel, which of the targets that were set before the first run are reached."""
-    errors = {name: about["nrmse"] for name, about in channels.items()}
-    found_by = {name: [_found_by(sequence) for sequence in about["sequences"]] for name, about in channels.items()}
+def _found(rates: Rates, rows: np.ndarray, rule: float | str) -> dict[str, float]:
+    """Share of the labelled sequences that is found, its interval over channels and sequences in them, and chance."""
+    interval = statistics.hierarchical_interval(rates.shares(rows, rule), "found", ["channel", "sequence"])
+    chance, p_value = chance_of(rates.counts_by_shift(rows, rule))
     return {
-        "best_of_three": {name: each["enhanced"] < min(each["coarse"], each["ridge"]) for name, each in errors.items()},
-        "nearer_by_a_third": {name: each["enhanced"] <= NEARER * each["coarse"] for name, each in errors.items()},
-        "false_alarms": {name: about["median_ratio"] <= LARGEST_RATIO for name, about in channels.items()},
-        "found": found_by,
+        "mean": interval.estimate,
+        "low": interval.low,
+        "high": interval.high,
+        "chance": chance / rates.num_sequences,
+        "p_value": p_value,
     }
 
 
-def _found_by(sequence: Mapping[str, Any]) -> list[str]:
-    """Detectors trained on generated telemetry that find a sequence."""
-    return [detector for detector, is_found in sequence["found"][GENERATED_ARM].items() if is_found]
+def _contrast(rates: Rates, first: str, second: str) -> dict[str, Any]:
+    """Differences of two arms in false alarms and in finds at the primary matched rate, with the channels as replicates."""
+    rows = [rates.of_control(name) if name in CONTROLS else rates.of_arm(name) for name in (first, second)]
+    alarms = [rates.cells[each].groupby(["channel", "seed"])["own"].mean() for each in rows]
+    difference = (alarms[0] - alarms[1]).rename("difference").reset_index()
+    interval = statistics.crossed_interval(difference, "difference", ["channel", "seed"])
+    shares = [rates.shares(each, PRIMARY).set_index(["channel", "sequence"])["found"] for each in rows]
+    finds = (shares[0] - shares[1]).reset_index()
+    found = statistics.hierarchical_interval(finds, "found", ["channel", "sequence"])
+    return {
+        "first": first,
+        "second": second,
+        "false_alarms": {"mean": interval.estimate, "low": interval.low, "high": interval.high},
+        "false_alarms_p_value": statistics.wilcoxon_signed_rank(difference.groupby("channel")["difference"].mean()),
+        "found": {"mean": found.estimate, "low": found.low, "high": found.high},
+        "found_p_value": statistics.wilcoxon_signed_rank(finds.groupby("channel")["found"].mean()),
+    }
+
+
+def _bars(channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """For each channel, which of the targets for the enhanced signal are reached."""
+    errors = {name: about["nrmse"] for name, about in channels.items()}
+    return {
+        "best": {name: each["enhanced"] < min(each["coarse"], each["ridge"], each["ridge, own clock"]) for name, each in errors.items()},
+        "nearer_by_a_third": {name: each["enhanced"] <= NEARER * each["coarse"] for name, each in errors.items()},
+    }
