@@ -19,7 +19,7 @@ from enhsim_tf.noise.resampled import ResampledNoise
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
 
-_MOST_BYTES = 2**31  # maximum size of the nominal run, and of residual windows
+_MOST_BYTES = 2**28  # maximum size of the nominal run, and of residual windows
 
 
 def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
@@ -99,6 +99,8 @@ def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str
     coarse = SquareWaveSimulator.from_config(kept["config"]) if kept.get("kind") == "square waves" else None
     rung = Rung(str(settings["rung"]), networks["enhancer"], scaling)
     columns = len(nominal.columns)
+    if isinstance(noise, ResampledNoise) and noise.windows.shape[1] != window:
+        raise ValueError("noise of another window length than the settings say")
     shapes = rung.network.input_shape[1:], rung.network.output_shape[1:], np.shape(scaling.input_scale)
     if shapes != ((window * columns,), (window,), (columns,)) or not (np.isfinite(coverage.limit) and coverage.limit > 0):
         raise ValueError("an enhancer of another shape than the settings say")

@@ -158,6 +158,22 @@ def test_copies_differ_in_their_noise_only(fitted):
     np.testing.assert_array_equal(again, first)
 
 
+def test_the_noise_of_a_copy_has_the_same_scale_everywhere(fitted):
+    model, _ = fitted
+    run = recording(coarse_run(150, seed=3))
+    copies = np.stack([copy for (copy,) in model.generate_copies(run, 2_500, seed=2)]) - model.enhance(run.parts[0].values)
+    scale = copies.std(axis=0)
+    assert np.abs(scale / scale.mean() - 1).max() < 0.08  # more than five standard errors of 2,500 draws
+    steps = np.diff(copies, axis=1).std(axis=0)
+    assert np.abs(steps / steps.mean() - 1).max() < 0.1  # and no steps where two windows meet
+
+
+def test_without_held_out_telemetry_the_report_says_so():
+    run = coarse_run(1_500)
+    _, report = fit_run_model(telemetry(run), recording(run), dataclasses.replace(FAST, held_out=0.0))
+    assert not report.is_held_out and report.num_samples == 1_500 and "none was held out" in report.verdict[1]
+
+
 def test_columns_may_be_in_any_order_and_further_ones_are_ignored(fitted):
     model, _ = fitted
     values = coarse_run(200, seed=3)
