@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from enhsim_tf.common.errors import InputError, printable
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
@@ -100,6 +102,23 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
             raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Give another --out.")
     make_folder(out)
     return paths
+
+
+def events_line(frame: "pd.DataFrame", path: Path) -> str:
+    """Says how many events the scores of a channel have, and how many are expected on nominal telemetry.
+
+    Args:
+        frame: Scores with the attributes that `scoring.note_alarms` sets.
+        path: Path of the scores.
+    """
+    from enhsim_tf.enhanced_simulator.scoring import events_path
+
+    number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
+    unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
+    return (
+        f"{counted(number, 'event')} in {events_path(path)}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "
+        f"(95 % interval {low:.3g} to {high:.3g})"
+    )
 
 
 def load(folder: Path) -> "EnhancedSimulator | RunModel":

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths
+from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, output_paths
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
-_OTHERS = ("windows", "continuous", "start", "scenario", "nominal_share", "workers", "engine", "scenarios")
+_OTHERS = "windows continuous start scenario at number gap timeeval nominal_share workers engine scenarios".split()
 
 
 def refuse_without_coarse(options: argparse.Namespace, *names: str) -> None:
@@ -43,7 +43,7 @@ def generate_copies(options: argparse.Namespace) -> int:
         options: Parsed options of `generate`.
     """
     for name in _OTHERS:
-        if getattr(options, name) not in (None, []):
+        if getattr(options, name) not in (None, [], False):
             word = name.replace("_", "-")
             raise InputError(
                 f"Expected --{word} without --coarse, or --coarse without it. Received: both. The run gives length, times and labels."
@@ -113,7 +113,7 @@ def score_runs(
         scored, outside = len(frame) - left, float((frame["out_of_range"] > 1).sum())
         tell(
             f"{name}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector} on the difference "
-            f"from the enhanced run, set to flag {chosen.false_alarm_rate:.1%} of generated noise"
+            f"from the enhanced run, set to flag {frame.attrs['expected_false_alarm_rate']:.1%} of generated noise"
             + (
                 f"; {counted(left, 'sample')} not scored, without a coarse run of the same time or in stretches shorter than a window"
                 if left
@@ -122,6 +122,7 @@ def score_runs(
             + (f"; {outside / scored:.1%} of them outside the training range" if outside else "")
             + f"; in {paths[channel]}"
         )
+        tell(f"{name}: {events_line(frame, paths[channel])}")
 
     return for_each(series, write)
 

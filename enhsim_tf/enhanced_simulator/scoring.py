@@ -103,18 +103,42 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
         if len(part) >= window:
             scores = _relative(score_trace(detector, part.values, window, stride), threshold)
         series = to_series(part)
-        events += _event_rows(scores, sum(map(len, frames)), further_scores, window, simulator.interval_s)
+        events += event_rows(scores, sum(map(len, frames)), further_scores, window, simulator.interval_s)
         frames.append(pd.DataFrame({"value": series, "score": scores, "flag": scores > 1}, index=series.index))
     frame = pd.concat(frames)
-    frame.attrs["expected_false_alarm_rate"] = rate
-    num_alarms = len(events_of(further_scores > 1, gap=window))
-    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(further) * simulator.interval_s))
-    frame.attrs["events"] = events
+    note_alarms(frame, rate, events, further_scores, window, simulator.interval_s)
     return frame
 
 
-def _event_rows(scores: np.ndarray, before: int, nominal_scores: np.ndarray, window: int, interval_s: float) -> list[dict]:
-    """Returns the events of a part in plain JSON types. Flags within a window of each other are one event, as they share windows."""
+def note_alarms(
+    frame: "pd.DataFrame", rate: float, events: Sequence[dict], nominal_scores: np.ndarray, window: int, interval_s: float
+) -> None:
+    """Notes the expected false alarms and the events of a channel in `frame.attrs`, see `score_channel`.
+
+    Args:
+        frame: Scores of the channel.
+        rate: Expected share of flagged nominal samples.
+        events: The events, as returned by `event_rows`.
+        nominal_scores: Scores of a generated nominal series, scaled so that the threshold is 1, shape `(samples,)`.
+        window: Length of a window in samples.
+        interval_s: Sampling interval in seconds.
+    """
+    num_alarms = len(events_of(nominal_scores > 1, gap=window))
+    frame.attrs["expected_false_alarm_rate"] = rate
+    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(nominal_scores) * interval_s))
+    frame.attrs["events"] = list(events)
+
+
+def event_rows(scores: np.ndarray, before: int, nominal_scores: np.ndarray, window: int, interval_s: float) -> list[dict]:
+    """Returns the events of a part in plain JSON types. Flags within a window of each other are one event, as they share windows.
+
+    Args:
+        scores: Scores of the part, scaled so that the threshold is 1, shape `(samples,)`.
+        before: Number of samples before the part.
+        nominal_scores: Scores of a generated nominal series, shape `(samples,)`.
+        window: Length of a window in samples.
+        interval_s: Sampling interval in seconds.
+    """
     flags, rows = scores > 1, []
     found = events_of(flags, scores, window)
     peaks = [scores[event.peak] for event in found]

@@ -124,10 +124,11 @@ def test_scores_are_those_of_the_difference(world, tmp_path, capsys):
     code, out, _ = run_command(
         ["score", world / "models", world / "new.csv", "--coarse", world / "fault.csv", "--windows", 300, "--out", path], capsys
     )
-    assert code == 0 and "on the difference from the enhanced run" in out[-1]
+    assert code == 0 and "on the difference from the enhanced run" in out[-2] and "events.csv" in out[-1]
     frame = pd.read_csv(path)
     assert list(frame.columns)[1:] == ["value", "enhanced", "score", "flag", "out_of_range"] and len(frame) == 300
     assert np.corrcoef(frame["value"], frame["enhanced"])[0, 1] > 0.98
+    assert list(pd.read_csv(tmp_path / "scores.events.csv").columns)[:3] == ["begin", "end", "peak"]
 
 
 def test_without_a_run_a_model_generates_and_scores_as_before(world, tmp_path, capsys):
@@ -196,13 +197,6 @@ def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
     assert not list((tmp_path / "models").iterdir())
 
 
-def test_a_failed_fit_is_one_line_and_exit_code_2(world, tmp_path, capsys):
-    arguments = ["fit", world / "telemetry.csv", "--coarse", world / "later.csv", "--out", tmp_path / "models", *TINY]
-    code, out, errors = run_command(arguments, capsys)
-    assert code == 2 and len(errors) == 1 and errors[0].startswith("error: celsius: Expected ") and not out
-    assert not list((tmp_path / "models").iterdir())
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -212,7 +206,10 @@ def test_a_failed_fit_is_one_line_and_exit_code_2(world, tmp_path, capsys):
         (["generate", "models", "--copies", "3", "--windows", "2"], ["--copies", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--windows", "2"], ["--windows", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--scenario", "stuck:0.5"], ["--scenario", "--coarse"]),
+        (["generate", "models", "--coarse", "fault.csv", "--timeeval"], ["--timeeval", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--copies", "0"], ["at least one copy"]),
+        (["generate", "models", "--continuous", "1h", "--scenario", "stuck:0.5"], ["generate MODEL_DIR --coarse"]),
+        (["generate", "models", "--continuous", "1h", "--at", "stuck:0.5@10/20"], ["generate MODEL_DIR --coarse"]),
         (["generate", "models", "--windows", "4", "--scenario", "stuck:0.5"], ["generate MODEL_DIR --coarse"]),
         (["generate", "models", "--windows", "4", "--workers", "1"], ["a model of recorded runs"]),
         (["generate", "models", "--coarse", "short.csv"], ["at least one window of 32 samples"]),

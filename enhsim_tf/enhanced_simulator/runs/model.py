@@ -204,6 +204,18 @@ class RunModel:
                 coarse[here] = cut_run(parts[number].values, chosen[here] - firsts[number], self.window)
             yield self.rung.predict(coarse) + self.noise.generate(len(chosen), noise_rng)
 
+    def generate_labelled_chunks(self, num_windows: int, scenario: Any = None, seed: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yields the windows of `generate_chunks` with masks of changed samples, which are False because the windows are nominal."""
+        for windows in self.generate_chunks(num_windows, scenario, seed):
+            yield windows, np.zeros(windows.shape, bool)
+
+    def generate_labelled_series(
+        self, num_samples: int, scenario: Any = None, seed: int = 0, start_s: float = 0.0, schedule: Sequence[Any] = ()
+    ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
+        """Returns the series of `generate_series`, a mask of changed samples, which is False, and no events."""
+        self._refuse_scenario(scenario if scenario is not None else (tuple(schedule) or None))
+        return self.generate_series(num_samples, None, seed, start_s), np.zeros(num_samples, bool), []
+
     def generate_series(self, num_samples: int, scenario: Any = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
         """Generates one nominal series along the saved nominal run, which is repeated if the series is longer.
 

@@ -11,7 +11,7 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
+from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, event_rows, note_alarms
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -27,7 +27,7 @@ _STRIDES = 8  # number of scored windows that begin within one window length
 class ResidualDetector:
     """A detector of differences between telemetry and enhanced run. It is trained on generated noise only.
 
-    The threshold is the conformal one of the scores of another generated series, see `detection.metrics.threshold`. The chosen
+    The threshold is the conformal one of the scores of another generated series, see `detection.metrics.finite_threshold`. The chosen
     false-alarm rate holds for real nominal telemetry as far as the generated noise has the properties of the real residual.
 
     Args:
@@ -39,9 +39,13 @@ class ResidualDetector:
         self.window, self.stride = model.window, max(1, model.window // _STRIDES)
         noise = model.noise.generate(options.num_windows, np.random.default_rng([options.seed, 3]))
         self.detector: Detector = DETECTORS[options.detector](options.seed).fit(noise)
-        series = model.noise.generate_series(_THRESHOLD_WINDOWS * self.window, np.random.default_rng([options.seed, 4]))
+        series, further = (
+            model.noise.generate_series(_THRESHOLD_WINDOWS * self.window, np.random.default_rng([options.seed, number]))
+            for number in (4, 6)
+        )
         scores = score_trace(self.detector, series, self.window, self.stride)
-        self.threshold = metrics.threshold(scores, options.false_alarm_rate)
+        self.threshold, self.rate = metrics.finite_threshold(scores, options.false_alarm_rate, _THRESHOLD_WINDOWS)
+        self.nominal_scores = self.score(further)  # on it the alarms are counted
 
     def score(self, residual: np.ndarray) -> np.ndarray:
         """Scores every sample of a residual; scores above 1 are anomalous.
@@ -69,7 +73,7 @@ def score_run(model: "RunModel", parts: Sequence[Telemetry], recording: Recordin
         A data frame with the index of `sources.to_series` and the columns `value`, `enhanced`, `score` (scaled so that the
         threshold is 1), `flag` (whether the score is above 1) and `out_of_range` (above 1, the coarse run is outside the
         training range). Samples without a coarse run, or in stretches shorter than a window, have NaN in place of numbers.
-        `frame.attrs` contains `expected_false_alarm_rate`.
+        `frame.attrs` is that of `scoring.score_channel`.
 
     Raises:
         InputError: If the sampling interval differs from the model's, or telemetry and run share no window.
@@ -84,7 +88,7 @@ def score_run(model: "RunModel", parts: Sequence[Telemetry], recording: Recordin
         )
     pairs = model.pair(parts, recording)
     detector = ResidualDetector(model, options)
-    frames = []
+    frames, events = [], []
     for part in parts:
         columns = {name: np.full(len(part), np.nan) for name in ("enhanced", "score", "out_of_range")}
         for pair in pairs:
@@ -95,8 +99,9 @@ def score_run(model: "RunModel", parts: Sequence[Telemetry], recording: Recordin
                 columns["score"][here] = detector.score(pair.telemetry.values - columns["enhanced"][here].astype(np.float32))
                 columns["out_of_range"][here] = model.coverage.score(pair.coarse)
         series = to_series(part)
+        events += event_rows(columns["score"], sum(map(len, frames)), detector.nominal_scores, model.window, model.interval_s)
         order = {"value": series, "enhanced": columns["enhanced"], "score": columns["score"], "flag": columns["score"] > 1}
         frames.append(pd.DataFrame(order | {"out_of_range": columns["out_of_range"]}, index=series.index))
     frame = pd.concat(frames)
-    frame.attrs["expected_false_alarm_rate"] = options.false_alarm_rate
+    note_alarms(frame, detector.rate, events, detector.nominal_scores, model.window, model.interval_s)
     return frame
