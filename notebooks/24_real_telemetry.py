@@ -88,8 +88,8 @@ show_finding(found, "errors")
 
 # %% [markdown]
 # *What to see:* the blue dot lies left of the grey square on every channel: what the enhancer makes of a square wave is nearer to the
-# telemetry. A tuned linear regression that finds its own clock (hollow) comes close to it on most channels: there, most of the gain over the square wave
-# does not need a network.
+# telemetry. A tuned linear regression that finds its own clock (hollow) is as good on most channels, so
+# the gain over the square wave does not need a network there.
 
 # %%
 for about in found["channels"].values():
@@ -114,8 +114,13 @@ show_finding(found, "alarms_and_finds")
 # %%
 for arm, about in (found["arms"] | found["controls"]).items():
     matched = "  ".join(f"{each['mean']:4.0%} at {each['rate']:.0%}" for each in about["matched"])
-    print(f"{arm:25} false alarms {about['false_alarms']['mean']:6.1%}  found {matched}  chance at 5%: {about['matched'][1]['chance']:.0%}")
-assert found["arms"]["enhanced + convolutional"]["false_alarms"]["mean"] < found["arms"]["coarse"]["false_alarms"]["mean"]
+    print(
+        f"{arm:25} false alarms {about['false_alarms']['mean']:6.1%}  found {matched}  chance at 5%: {about['matched'][1]['chance']:.0%}"
+    )
+assert (
+    found["arms"]["enhanced + convolutional"]["false_alarms"]["mean"]
+    < found["arms"]["coarse"]["false_alarms"]["mean"]
+)
 
 # %% [markdown]
 # ## Exercises
