@@ -107,9 +107,9 @@ show_finding(found, "alarms_and_finds")
 
 # %% [markdown]
 # *What to see:* on the left, most arms alarm far more often than the one per cent they were set for (the line), because the channel has
-# moved on. A detector that alarms always finds everything, so the right panel compares finds at the same share of false alarms, and with what chance
-# finds (the vertical marks): a window that shares one sample with a long anomaly counts, so chance finds some too. The last rows are
-# detectors of one line.
+# moved on. A detector that alarms always finds everything, so the right panel compares finds at the same share of false alarms, and with
+# what chance finds (the vertical marks): a window that shares one sample with a long anomaly counts, so chance finds some too. The last
+# rows are detectors of one line.
 
 # %%
 for arm, about in (found["arms"] | found["controls"]).items():
@@ -146,7 +146,9 @@ print({name: round(about["auc_pr"], 3) for name, about in arms.items()})
 # %% [markdown]
 # <details><summary>What to say about it</summary>
 #
-# 1. Look for few false alarms and many finds in one row, and compare it with the controls: a moving standard deviation has nothing to train.
-# 2. With eight labelled sequences a ranking by area is coarse. A perfect score has an area of one, the random score the share of labelled samples.
+# 1. Look for few false alarms and many finds in one row, and compare it with the controls: a moving standard deviation has nothing to
+#    train.
+# 2. With eight labelled sequences a ranking by area is coarse. A perfect score has an area of one, the random score the share of
+#    labelled samples.
 #
 # </details>

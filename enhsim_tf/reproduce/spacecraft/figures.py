@@ -65,12 +65,14 @@ def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
         (name for name in rows if name.startswith("one line") and "random" not in name),
         key=lambda name: (finds[name], -rows[name][0]["false_alarms"]["mean"]),
     )
+    generated, past, no_network, one_line = (
+        f"{100 * finds[name]:.0f}\N{NO-BREAK SPACE}%" for name in (GENERATED_ARM, "real", RIDGE_ARM, best)
+    )
     figure, down = new_sheet(
         DOUBLE,
         4.6,
-        f"At {100 * PRIMARY:.0f} % false alarms, detectors trained on generated telemetry find {100 * finds[GENERATED_ARM]:.0f}\N{NO-BREAK SPACE}% of the labelled anomalies of a real "
-        f"spacecraft, trained on the channel's own past {100 * finds['real']:.0f}\N{NO-BREAK SPACE}%, without a network {100 * finds[RIDGE_ARM]:.0f}\N{NO-BREAK SPACE}%; {best.removeprefix('one line: ')}, "
-        f"one line, finds {100 * finds[best]:.0f}\N{NO-BREAK SPACE}%",
+        f"At {100 * PRIMARY:.0f}\N{NO-BREAK SPACE}% false alarms, detectors trained on generated telemetry find {generated} of the labelled anomalies of a real spacecraft, "
+        f"trained on the channel's own past {past}, without a network {no_network}; the {best.removeprefix('one line: ')}, one line, finds {one_line}",
         f"Left: thresholds set for 1 % (vertical line) on held-out windows of the arm (dot, with its 95 % interval) and on the channel's past (hollow). Right: thresholds "
         f"matched on nominal test windows; the vertical mark is what chance finds at {100 * PRIMARY:.0f} %. Means over {in_words(len(DETECTORS))} detectors (one line: one), "
         f"{len(found['channels'])} channels, {len(found['seeds'])} training seed{'s' * (len(found['seeds']) > 1)} and {found['num_sequences']} labelled sequences.",
