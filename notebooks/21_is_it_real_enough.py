@@ -137,6 +137,7 @@ assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 # directions that the components do not know.
 
 # %%
+from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import PCAResidual
 
 chosen, simulator = experiment.settings.detectors, experiment.simulator
@@ -152,7 +153,7 @@ for name, noise in added.items():
     training, held_back = np.split(clean + noise, 2)
     detector = PCAResidual(chosen.num_components).fit(training)
     scores[name] = {f"enhanced + {name} noise": detector.score(held_back), "real": detector.score(healthy)}
-    thresholds[name] = np.quantile(detector.score(held_back), 1 - chosen.false_alarm_rate)
+    thresholds[name] = metrics.threshold(detector.score(held_back), chosen.false_alarm_rate)
 
 # %%
 alt = "What the principal components leave of windows like those trained on and of real ones, for both noises"
@@ -215,7 +216,7 @@ for share in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
     mixed = clean + np.sqrt(1 - share) * added["GAN"] + np.sqrt(share) * added["Gaussian"]
     training, held_back = np.split(mixed, 2)
     detector = PCAResidual(chosen.num_components).fit(training)
-    threshold = np.quantile(detector.score(held_back), 1 - chosen.false_alarm_rate)
+    threshold = metrics.threshold(detector.score(held_back), chosen.false_alarm_rate)
     alarm = np.mean(detector.score(healthy) > threshold)
     print(f"Gaussian share {share:.0%}: alarms on {alarm:.1%} of healthy real windows")
 

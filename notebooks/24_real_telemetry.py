@@ -88,8 +88,8 @@ show_finding(found, "errors")
 
 # %% [markdown]
 # *What to see:* the blue dot lies left of the grey square on every channel: what the enhancer makes of a square wave is nearer to the
-# telemetry. A tuned linear regression that finds its own clock (hollow) comes close to it on most channels: there, most of the gain over the square wave
-# does not need a network.
+# telemetry. A tuned linear regression that finds its own clock (hollow) is as good on most channels, so
+# the gain over the square wave does not need a network there.
 
 # %%
 for about in found["channels"].values():
@@ -107,15 +107,20 @@ show_finding(found, "alarms_and_finds")
 
 # %% [markdown]
 # *What to see:* on the left, most arms alarm far more often than the one per cent they were set for (the line), because the channel has
-# moved on. A detector that alarms always finds everything, so the right panel compares finds at the same share of false alarms, and with what chance
-# finds (the vertical marks): a window that shares one sample with a long anomaly counts, so chance finds some too. The last rows are
-# detectors of one line.
+# moved on. A detector that alarms always finds everything, so the right panel compares finds at the same share of false alarms, and with
+# what chance finds (the vertical marks): a window that shares one sample with a long anomaly counts, so chance finds some too. The last
+# rows are detectors of one line.
 
 # %%
 for arm, about in (found["arms"] | found["controls"]).items():
     matched = "  ".join(f"{each['mean']:4.0%} at {each['rate']:.0%}" for each in about["matched"])
-    print(f"{arm:25} false alarms {about['false_alarms']['mean']:6.1%}  found {matched}  chance at 5%: {about['matched'][1]['chance']:.0%}")
-assert found["arms"]["enhanced + convolutional"]["false_alarms"]["mean"] < found["arms"]["coarse"]["false_alarms"]["mean"]
+    print(
+        f"{arm:25} false alarms {about['false_alarms']['mean']:6.1%}  found {matched}  chance at 5%: {about['matched'][1]['chance']:.0%}"
+    )
+assert (
+    found["arms"]["enhanced + convolutional"]["false_alarms"]["mean"]
+    < found["arms"]["coarse"]["false_alarms"]["mean"]
+)
 
 # %% [markdown]
 # ## Exercises
@@ -141,7 +146,9 @@ print({name: round(about["auc_pr"], 3) for name, about in arms.items()})
 # %% [markdown]
 # <details><summary>What to say about it</summary>
 #
-# 1. Look for few false alarms and many finds in one row, and compare it with the controls: a moving standard deviation has nothing to train.
-# 2. With eight labelled sequences a ranking by area is coarse. A perfect score has an area of one, the random score the share of labelled samples.
+# 1. Look for few false alarms and many finds in one row, and compare it with the controls: a moving standard deviation has nothing to
+#    train.
+# 2. With eight labelled sequences a ranking by area is coarse. A perfect score has an area of one, the random score the share of
+#    labelled samples.
 #
 # </details>

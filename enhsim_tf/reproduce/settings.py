@@ -233,7 +233,7 @@ class FactorialSettings:
 class LabelledSettings:
     """The study of real telemetry with labelled anomalies: `python -m enhsim_tf.reproduce --experiment labelled`."""
 
-    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with the seeds 0, 1, ...", smoke=2)
+    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with the seeds 0, 1, ...", smoke=1)
     num_windows: int = setting(2_500, "windows", f"{OUR_CHOICE}: about every offset in a channel of the data set once", smoke=60)
     epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
     num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)

@@ -71,10 +71,11 @@ def _labelled(labelled: Findings | None) -> str:
         return f"Not settled here: the study has to be run again with equal data. Detectors trained on the real past alarm on {real} of later nominal windows."
     controls = {name: about["matched"][1] for name, about in labelled["controls"].items()}
     best = max(controls, key=lambda name: controls[name]["mean"])
-    arms = {name: about["matched"][1] for name, about in labelled["arms"].items()}
+    arms = {name: about["matched"][1] for name, about in labelled["arms"].items() if len(about["by_detector"]) > 1}
     strongest = max(arms, key=lambda name: arms[name]["mean"])
     return (
-        "Right. Every arm now learns from all of the training part and sets its thresholds in the same cross-fitted way. Detectors trained on the real past "
+        "Right. Every arm now learns from all of the training part and sets its thresholds on windows that the detector did not learn from, cross-fitted over "
+        "blocks of time where they are real. Detectors trained on the real past "
         f"alarm on {real} of later nominal windows. At matched false-alarm rates of {per_cent(labelled['rates'][1], 0)}, the best arm ({strongest}) finds "
         f"{interval(arms[strongest], 0)} of the labelled sequences, the best score of one line ({best}) {interval(controls[best], 0)}, and chance "
         f"{per_cent(arms[strongest]['chance'], 0)}."

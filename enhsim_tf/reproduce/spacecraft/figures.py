@@ -61,16 +61,21 @@ def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
     rows = {arm: (found["arms"][arm], _colour(arm)) for arm in ARMS}
     rows |= {f"one line: {name}": (about, QUIET) for name, about in found["controls"].items()}
     finds = {name: next(each["mean"] for each in about["matched"] if each["rate"] == PRIMARY) for name, (about, _) in rows.items()}
-    best = max((name for name in rows if name.startswith("one line") and "random" not in name), key=finds.get)
+    best = max(
+        (name for name in rows if name.startswith("one line") and "random" not in name),
+        key=lambda name: (finds[name], -rows[name][0]["false_alarms"]["mean"]),
+    )
+    generated, past, no_network, one_line = (
+        f"{100 * finds[name]:.0f}\N{NO-BREAK SPACE}%" for name in (GENERATED_ARM, "real", RIDGE_ARM, best)
+    )
     figure, down = new_sheet(
         DOUBLE,
         4.6,
-        f"At {100 * PRIMARY:.0f} % false alarms, detectors trained on generated telemetry find {100 * finds[GENERATED_ARM]:.0f} % of the labelled anomalies of a real "
-        f"spacecraft, trained on the channel's own past {100 * finds['real']:.0f} %, without a network {100 * finds[RIDGE_ARM]:.0f} %; {best.removeprefix('one line: ')}, "
-        f"one line, finds {100 * finds[best]:.0f} %",
+        f"At {100 * PRIMARY:.0f}\N{NO-BREAK SPACE}% false alarms, detectors trained on generated telemetry find {generated} of the labelled anomalies of a real spacecraft, "
+        f"trained on the channel's own past {past}, without a network {no_network}; the {best.removeprefix('one line: ')}, one line, finds {one_line}",
         f"Left: thresholds set for 1 % (vertical line) on held-out windows of the arm (dot, with its 95 % interval) and on the channel's past (hollow). Right: thresholds "
         f"matched on nominal test windows; the vertical mark is what chance finds at {100 * PRIMARY:.0f} %. Means over {in_words(len(DETECTORS))} detectors (one line: one), "
-        f"{len(found['channels'])} channels, {len(found['seeds'])} seeds and {found['num_sequences']} labelled sequences.",
+        f"{len(found['channels'])} channels, {len(found['seeds'])} training seed{'s' * (len(found['seeds']) > 1)} and {found['num_sequences']} labelled sequences.",
     )
     grid = panels(figure, down + 0.3, 1, 2, gap=(0.3, 0.12), sharey=True)
     left, width = 1.85 / DOUBLE, (1 - 2.0 / DOUBLE) / 2

@@ -104,6 +104,7 @@ def collect(
 
 def table(found: dict[str, Any]) -> str:
     """The tables of the README: one row per training arm and control, and one row per channel."""
+    from enhsim_tf.reproduce.publish.wording import p_value
     from enhsim_tf.reproduce.spacecraft.rates import PRIMARY
     from enhsim_tf.reproduce.spacecraft.study import DEGRADED_ARM, GENERATED_ARM, RIDGE_ARM
 
@@ -117,7 +118,7 @@ def table(found: dict[str, Any]) -> str:
         primary = next(each for each in about["matched"] if each["rate"] == PRIMARY)
         cells = [f"{_percent(about['false_alarms']['mean'])} ({low} to {high})", _percent(about["false_alarms_past"]["mean"])]
         cells += [_percent(each["mean"]) for each in about["matched"]]
-        cells += [_percent(primary["chance"]), f"{primary['p_value']:.3f}", f"{about['auc_pr']:.2f}"]
+        cells += [_percent(primary["chance"]), p_value(primary["p_value"]), f"{about['auc_pr']:.2f}"]
         rows.append(f"| {name} | {' | '.join(cells)} |")
     rows += [
         "",
@@ -131,7 +132,8 @@ def table(found: dict[str, Any]) -> str:
     num_windows = [about["num_train_windows"] for about in found["channels"].values()]
     return "\n".join(rows) + (
         f"\n\nFalse alarms and finds are means over {in_words(len(DETECTORS))} detectors (one for each of the last rows), {in_words(len(found['channels']))} channels with "
-        f"{in_words(found['num_sequences'])} labelled sequences, and {in_words(len(found['seeds']))} training seeds. Every arm learns from all of the *train* part. The *own "
+        f"{in_words(found['num_sequences'])} labelled sequences, and {in_words(len(found['seeds']))} training "
+        f"seed{'s' * (len(found['seeds']) > 1)}. Every arm learns from all of the *train* part. The *own "
         "threshold* is set for 1 % on held-out windows of the arm: other generated windows, or windows of the *train* part from blocks of time that the detector did not "
         f"learn from. The *train* part has {min(num_windows)} to {max(num_windows)} windows that share no sample, too few for a reliable threshold of 1 %. *Found at 5 % false "
         "alarms* is the share of the sequences found when each threshold is set such that 5 % of the nominal test windows are above it, so that all rows can be compared; "

@@ -40,7 +40,7 @@ ARMS = {
     "enhanced + Gaussian": "plus Gaussian noise of the same standard deviation",
     "enhanced + AR": "plus a fitted autoregression",
     "enhanced + bootstrap": "plus blocks of the extracted noise itself",
-    "enhanced + convolutional": "plus noise of the convolutional GAN: what `fit` and `generate` make",
+    "enhanced + convolutional": "plus noise of the convolutional GAN, which `fit` trains",
     "ridge + residual windows": "no network: tuned ridge regression, plus whole windows of its residuals, drawn again",
 }
 """Training windows of detectors, in the order of the figures."""
@@ -73,7 +73,7 @@ class ChannelStudy:
 
     @functools.cached_property
     def simulator(self) -> "EnhancedSimulator":
-        """The simulator that `python -m enhsim_tf fit --held-out 0` fits to the train part."""
+        """The simulator that `python -m enhsim_tf fit --held-out 0 --enhancer network` fits to the train part."""
         depends = (*self._data, self._options)
         folder = self.stages.run(f"fit {self.name}", self._make_simulator, ("enhanced_simulator.fitting",), depends)
         from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
