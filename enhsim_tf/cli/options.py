@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from enhsim_tf.common.errors import InputError, printable
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
@@ -100,6 +102,21 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
             raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Give another --out.")
     make_folder(out)
     return paths
+
+
+def alarm_text(frame: "pd.DataFrame", path: Path) -> str:
+    """Says how many alarms there are, and how many would be expected on nominal telemetry.
+
+    Args:
+        frame: Scores, as returned by `scoring.score_channel`.
+        path: File of the events.
+    """
+    number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
+    unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
+    return (
+        f"{counted(number, 'event')} in {path}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "
+        f"(95 % interval {low:.3g} to {high:.3g})"
+    )
 
 
 def load(folder: Path) -> "EnhancedSimulator | RunModel":

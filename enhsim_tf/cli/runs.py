@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths
+from enhsim_tf.cli.options import alarm_text, cleaning_options, counted, for_each, output_paths
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -96,7 +96,7 @@ def score_runs(
     """
     from enhsim_tf.coarse_simulator.recording_files import read_recording
     from enhsim_tf.enhanced_simulator.runs.scoring import score_run
-    from enhsim_tf.enhanced_simulator.scoring import write_scores
+    from enhsim_tf.enhanced_simulator.scoring import events_path, write_scores
     from enhsim_tf.telemetry.cleaning.clean import clean
 
     refuse_same_file(paths, options.coarse)
@@ -122,6 +122,7 @@ def score_runs(
             + (f"; {outside / scored:.1%} of them outside the training range" if outside else "")
             + f"; in {paths[channel]}"
         )
+        tell(f"{name}: {alarm_text(frame, events_path(paths[channel]))}")
 
     return for_each(series, write)
 

@@ -3,7 +3,7 @@
 import argparse
 import os
 
-from enhsim_tf.cli.options import cleaning_options, counted, for_each, load, output_paths
+from enhsim_tf.cli.options import alarm_text, cleaning_options, counted, for_each, load, output_paths
 from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
@@ -69,11 +69,6 @@ def run_score(options: argparse.Namespace) -> int:
             + (f"; {counted(left, 'sample')} not scored, in parts shorter than a window" if left else "")
             + f"; in {paths[channel]}"
         )
-        number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
-        unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
-        tell(
-            f"{printable(channel)}: {counted(number, 'event')} in {events_path(paths[channel])}; on generated nominal telemetry "
-            f"{expected:.3g} false alarms per {unit} (95 % interval {low:.3g} to {high:.3g})"
-        )
+        tell(f"{printable(channel)}: {alarm_text(frame, events_path(paths[channel]))}")
 
     return for_each(series, write)

@@ -97,20 +97,36 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
     threshold, rate = metrics.finite_threshold(nominal_scores, options.false_alarm_rate, _THRESHOLD_WINDOWS)
     further = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 2)  # on it the alarms are counted
     further_scores = _relative(score_trace(detector, further, window, stride), threshold)
-    frames, events = [], []
+    frames = []
     for part in parts:
         scores = np.full(len(part), np.nan)
         if len(part) >= window:
             scores = _relative(score_trace(detector, part.values, window, stride), threshold)
         series = to_series(part)
-        events += _event_rows(scores, sum(map(len, frames)), further_scores, window, simulator.interval_s)
         frames.append(pd.DataFrame({"value": series, "score": scores, "flag": scores > 1}, index=series.index))
     frame = pd.concat(frames)
     frame.attrs["expected_false_alarm_rate"] = rate
-    num_alarms = len(events_of(further_scores > 1, gap=window))
-    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(further) * simulator.interval_s))
-    frame.attrs["events"] = events
+    describe_alarms(frame, list(map(len, parts)), further_scores, window, simulator.interval_s)
     return frame
+
+
+def describe_alarms(frame: "pd.DataFrame", lengths: Sequence[int], nominal_scores: np.ndarray, window: int, interval_s: float) -> None:
+    """Adds `events` and `false_alarms_per_day` to the attributes of scores.
+
+    Args:
+        frame: Scores with the column `score`, whose threshold is 1.
+        lengths: Number of samples of each part of the telemetry.
+        nominal_scores: Scores of further generated nominal telemetry, which set neither detector nor threshold.
+        window: Length of a window in samples.
+        interval_s: Sampling interval in seconds.
+    """
+    events, before = [], 0
+    for scores in np.split(frame["score"].to_numpy(), np.cumsum(lengths)[:-1]):
+        events += _event_rows(scores, before, nominal_scores, window, interval_s)
+        before += len(scores)
+    num_alarms = len(events_of(nominal_scores > 1, gap=window))
+    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(nominal_scores) * interval_s))
+    frame.attrs["events"] = events
 
 
 def _event_rows(scores: np.ndarray, before: int, nominal_scores: np.ndarray, window: int, interval_s: float) -> list[dict]:

@@ -235,6 +235,18 @@ class RunModel:
         series = np.concatenate(pieces)[skipped : skipped + num_samples]
         return series + self.noise.generate_series(num_samples, np.random.default_rng([seed, 1]))
 
+    def generate_labelled_chunks(self, num_windows: int, scenario: Any = None, seed: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yields the windows of `generate_chunks` with masks, which are false, as recorded runs are nominal."""
+        for windows in self.generate_chunks(num_windows, scenario, seed):
+            yield windows, np.zeros(windows.shape, bool)
+
+    def generate_labelled_series(
+        self, num_samples: int, scenario: Any = None, seed: int = 0, start_s: float = 0.0, schedule: Sequence[Any] = ()
+    ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
+        """Generates the series of `generate_series` with a mask, which is false, and without events."""
+        self._refuse_scenario(schedule[0] if schedule else scenario)
+        return self.generate_series(num_samples, scenario, seed, start_s), np.zeros(num_samples, bool), []
+
     def _nominal_parts(self) -> tuple[Run, ...]:
         return self.usable(self.nominal).parts
 

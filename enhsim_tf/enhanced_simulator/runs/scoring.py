@@ -11,7 +11,7 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
+from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, describe_alarms
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -42,6 +42,8 @@ class ResidualDetector:
         series = model.noise.generate_series(_THRESHOLD_WINDOWS * self.window, np.random.default_rng([options.seed, 4]))
         scores = score_trace(self.detector, series, self.window, self.stride)
         self.threshold = metrics.threshold(scores, options.false_alarm_rate)
+        further = model.noise.generate_series(_THRESHOLD_WINDOWS * self.window, np.random.default_rng([options.seed, 5]))
+        self.nominal_scores = self.score(further)  # on them the alarms are counted
 
     def score(self, residual: np.ndarray) -> np.ndarray:
         """Scores every sample of a residual; scores above 1 are anomalous.
@@ -69,7 +71,7 @@ def score_run(model: "RunModel", parts: Sequence[Telemetry], recording: Recordin
         A data frame with the index of `sources.to_series` and the columns `value`, `enhanced`, `score` (scaled so that the
         threshold is 1), `flag` (whether the score is above 1) and `out_of_range` (above 1, the coarse run is outside the
         training range). Samples without a coarse run, or in stretches shorter than a window, have NaN in place of numbers.
-        `frame.attrs` contains `expected_false_alarm_rate`.
+        `frame.attrs` contains `expected_false_alarm_rate`, and `events` and `false_alarms_per_day` as for `score_channel`.
 
     Raises:
         InputError: If the sampling interval differs from the model's, or telemetry and run share no window.
@@ -99,4 +101,5 @@ def score_run(model: "RunModel", parts: Sequence[Telemetry], recording: Recordin
         frames.append(pd.DataFrame(order | {"out_of_range": columns["out_of_range"]}, index=series.index))
     frame = pd.concat(frames)
     frame.attrs["expected_false_alarm_rate"] = options.false_alarm_rate
+    describe_alarms(frame, list(map(len, parts)), detector.nominal_scores, model.window, model.interval_s)
     return frame
