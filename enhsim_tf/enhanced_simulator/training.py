@@ -129,6 +129,11 @@ def train(
         _train_enhancer(simulator, learnt, settings, verbose, progress)
     else:
         ladder = choose_enhancer(simulator, learnt, settings)
+        if not is_finite(simulator.enhancer.get_weights()):
+            raise InputError(
+                f"Expected telemetry from which the enhancer can learn. Received: {parts[0].name}, on which no rung of the ladder is finite. "
+                "Look for values far from all others, or give another channel."
+            )
     if settings.follow:
         seen = simulator.pairs(parts, evenly_spaced_starts(parts, settings.window, _NUM_LEVELS)).drop_flat()
         simulator.levels = np.stack([seen.shift, seen.gain], axis=1)

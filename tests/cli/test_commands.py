@@ -282,7 +282,7 @@ def test_a_channel_that_fails_does_not_stop_the_others(told, world, tmp_path):
     rows.to_csv(tmp_path / "new.csv", index=False)
     code, out, errors = told("score", "WORLD/models", tmp_path / "new.csv", "--windows", 30, "--out", "scores")
     assert code == 2 and len(errors) == 1 and errors[0].startswith("error: volts: Expected a part of at least one window")
-    assert [path.name for path in (tmp_path / "scores").iterdir()] == ["amps.parquet"] and "amps: " in out
+    assert {path.name for path in (tmp_path / "scores").iterdir()} == {"amps.parquet", "amps.events.csv"} and "amps: " in out
 
 
 def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_path):
@@ -316,7 +316,7 @@ def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 60)
     made = {}
     exec(snippet, made)
-    assert made["windows"].shape == (20, 64) and made["day"].shape == (8_640, 3) and made["scores"].shape == (1_500, 3)
+    assert made["windows"].shape == (20, 64) and made["day"].shape == (8_640, 6) and made["scores"].shape == (1_500, 3)
     assert all(isinstance(made[name].index, pd.DatetimeIndex) for name in ("day", "scores", "series"))
     assert (tmp_path / "model_dir" / "manifest.json").is_file() and "Anomalies of 4 standard" in capsys.readouterr().out
 

@@ -124,7 +124,8 @@ def test_scores_are_those_of_the_difference(world, tmp_path, capsys):
     code, out, _ = run_command(
         ["score", world / "models", world / "new.csv", "--coarse", world / "fault.csv", "--windows", 300, "--out", path], capsys
     )
-    assert code == 0 and "on the difference from the enhanced run" in out[-2] and "events.csv" in out[-1]
+    assert code == 0 and "on the difference from the enhanced run" in out[-2]
+    assert "events.csv" in out[-1] and "false alarms per day" in out[-1]
     frame = pd.read_csv(path)
     assert list(frame.columns)[1:] == ["value", "enhanced", "score", "flag", "out_of_range"] and len(frame) == 300
     assert np.corrcoef(frame["value"], frame["enhanced"])[0, 1] > 0.98
