@@ -6,9 +6,13 @@ All numbers come from the findings of the experiments. Where a number is missing
 from collections.abc import Mapping
 from typing import Any
 
+from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import WITHOUT_NETWORK
 from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, mean_of, per_cent, points
 from enhsim_tf.reproduce.robustness.targets import MARGIN
+
+LEAST_SEEDS = 3
+"""Number of seeds below which a difference is reported without a conclusion."""
 
 
 def sentences(found: Findings, factorial: Findings | None = None, labelled: Findings | None = None) -> dict[str, str]:
@@ -78,11 +82,9 @@ def _network(found: Findings, factorial: Findings | None) -> str:
     nominal = _difference(factorial, "network, ridge")
     if nominal is None:
         return f"**A network pays**, as far as is known, where the map is not linear: {degraded}; on nominal telemetry the comparison is not measured yet."
-    pays = nominal["high"] < 0
-    said = "It lowers" if pays else "It does not lower"
     return (
-        f"**A network pays** where the map is not linear: {degraded}. {said} false alarms on nominal telemetry: with the same windows and resampled residuals, "
-        f"replacing ridge regression by the network changes them by {points(nominal)} points."
+        f"**A network pays** where the map is not linear: {degraded}. On nominal telemetry it {_effect(factorial, 'network, ridge')}: with the same windows and "
+        f"resampled residuals, replacing ridge regression by the network changes them by {points(nominal)} points ({_seeds(factorial, 'network, ridge')})."
     )
 
 
@@ -95,13 +97,10 @@ def _noise(factorial: Findings | None) -> str:
             "never contain anything new. The comparison of its false alarms with those of whole residual windows is not measured yet."
         )
     name, enhancer = chosen
-    difference = _difference(factorial, name)
-    number = len(factorial["contrasts"][name]["seeds"])
-    verdict = "lowers" if difference["high"] < 0 else "raises" if difference["low"] > 0 else "does not detectably change"
     return (
         f"**Generated noise pays** where more or longer stretches of noise are needed than were recorded, because resampled residuals never contain anything "
-        f"new. It {verdict} false alarms here: with {enhancer} and the same residuals, replacing whole windows by the convolutional GAN changes them by "
-        f"{points(difference)} points ({number} {'seed' if number == 1 else 'seeds'})."
+        f"new. It {_effect(factorial, name)} here: with {enhancer} and the same residuals, replacing whole windows by the convolutional GAN changes them by "
+        f"{points(_difference(factorial, name))} points ({_seeds(factorial, name)})."
     )
 
 
@@ -124,3 +123,20 @@ def _nothing(labelled: Findings | None) -> str:
 def _difference(factorial: Findings | None, name: str) -> Mapping[str, Any] | None:
     contrast = (factorial or {}).get("contrasts", {}).get(name)
     return None if contrast is None else contrast["false_alarms"]
+
+
+def _seeds(factorial: Findings, name: str) -> str:
+    return in_seeds(factorial["contrasts"][name]["seeds"])
+
+
+def _effect(factorial: Findings, name: str) -> str:
+    """Says whether the first arm of a contrast has fewer false alarms than the second, by more than the margin; few seeds settle nothing."""
+    contrast = factorial["contrasts"][name]
+    about = contrast["false_alarms"]
+    if len(contrast["seeds"]) < LEAST_SEEDS:
+        return "has no settled effect on false alarms yet"
+    if about["low"] >= -MARGIN and about["high"] <= MARGIN:
+        return f"does not change false alarms by more than {points(MARGIN)} points"
+    if about["low"] <= 0 <= about["high"]:
+        return "does not detectably change false alarms"
+    return f"{'lowers' if about['high'] < 0 else 'raises'} false alarms"
