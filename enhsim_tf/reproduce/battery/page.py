@@ -52,7 +52,7 @@ def _scope(found: Findings) -> str:
     return (
         f"The numbers on this page come from {'one seed' if len(seeds) == 1 else f'{len(seeds)} seeds'} with PyBaMM {found['versions']['pybamm']}, "
         f"budget {found['budget']}. Of {runs['number']:,} recorded runs, {runs['reduced']} were recorded with a reduced current because a solver failed "
-        f"at the full one (at most {most} reductions of a tenth); none was left out."
+        f"at the full one (at most {most} reductions of a tenth); none was left out. The runs that the classifiers learn from are not counted here."
     )
 
 
