@@ -1,7 +1,7 @@
 """Detectors that are trained on simulated or real telemetry and judged on the fine simulator with noise."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.ladder import fit_rung
 from enhsim_tf.noise.surrogates import GaussianAutoregression
-from enhsim_tf.realism.window_features import window_features
 from enhsim_tf.reproduce.battery.errors import about, fault_windows
 from enhsim_tf.reproduce.battery.faults import ALL, Fault
 from enhsim_tf.reproduce.battery.orbits import ORBIT_SAMPLES
@@ -27,17 +26,14 @@ ARMS = (COARSE, CLEAN, ENHANCED, RESAMPLED, AUTOREGRESSION, CONVOLUTIONAL, REAL_
 simulator was fitted to, two thirds and one third."""
 RESIDUALS = {"residual of the enhanced run": True, "residual of the coarse run": False}
 """The simulator as a detector: the difference between the telemetry and the run of the planned orbits, enhanced or not."""
-LABELLED = ("logistic regression", "boosted trees")
-"""Classifiers that are trained on nominal windows and on windows of simulated faults."""
 NETWORKS = ("dense autoencoder", "convolutional autoencoder")
 RATE = 0.01
 """False-alarm rate for which every threshold is set."""
-_NUM = 1_000  # windows for training, and as many for the threshold
+NUM = 1_000  # windows for training, and as many for the threshold
 _ORDER = 60  # largest order of the autoregression
 _PART_ORBITS = 15  # of the smallest real arm
 _NUM_FOLDS = 3
 
-Score = Callable[[np.ndarray], np.ndarray]
 Arms = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
@@ -82,7 +78,8 @@ class Judge:
         return cross_fitted_residuals(self.pairs, self.enhancer.name, self.seed)
 
     @functools.cached_property
-    def _test(self) -> dict[Fault | None, PairWindows]:
+    def test(self) -> dict[Fault | None, PairWindows]:
+        """Windows of the fine simulator on which detectors are judged: nominal (None) and under each fault."""
         return {fault: fault_windows(self.recorded, fault, self.seed) for fault in (None, *ALL)}
 
     def noise(self, number: int, stream: int) -> np.ndarray:
@@ -91,10 +88,10 @@ class Judge:
 
     def arms(self) -> Arms:
         """Training windows and threshold windows of each arm, except for the GAN's."""
-        coarse, _ = coarse_windows(self.recorded, "coarse", 2 * _NUM)
+        coarse, _ = coarse_windows(self.recorded, "coarse", 2 * NUM)
         enhanced = self.enhancer.predict(coarse)
         autoregression = GaussianAutoregression.fit(self.residuals, _ORDER)
-        fit, more = (pair_windows(self.recorded, part, _NUM, self.seed) for part in ("fit", "more"))
+        fit, more = (pair_windows(self.recorded, part, NUM, self.seed) for part in ("fit", "more"))
         part_samples = (_PART_ORBITS + 1) * ORBIT_SAMPLES
         halves = {
             COARSE: coarse[:, :, 0],
@@ -102,11 +99,11 @@ class Judge:
             RESAMPLED: enhanced + self.noise(len(enhanced), 1),
             AUTOREGRESSION: enhanced + autoregression.generate(len(enhanced), np.random.default_rng([self.seed, 2])),
         }
-        arms = {name: _apart(windows, 1 / 2, self.num_coarse) for name, windows in halves.items()}
+        arms = {name: apart(windows, 1 / 2, self.num_coarse) for name, windows in halves.items()}
         arms[CLEAN] = fit.fine, more.fine
-        dense = pair_windows(self.recorded, "fit", 2 * _NUM, self.seed)
-        arms[REAL_15] = _apart(dense.telemetry[dense.starts + WINDOW <= part_samples], 2 / 3, _PART_ORBITS)
-        arms[REAL_60] = _apart(dense.telemetry, 2 / 3, self.num_fit)
+        dense = pair_windows(self.recorded, "fit", 2 * NUM, self.seed)
+        arms[REAL_15] = apart(dense.telemetry[dense.starts + WINDOW <= part_samples], 2 / 3, _PART_ORBITS)
+        arms[REAL_60] = apart(dense.telemetry, 2 / 3, self.num_fit)
         arms[REAL_120] = fit.telemetry, more.telemetry
         return {name: arms[name] for name in ARMS if name in arms}
 
@@ -116,8 +113,8 @@ class Judge:
 
         gan = convolutional_noise_gan(self.residuals, num_iterations, self.seed)
         gan.fit(self.residuals, num_iterations, verbose=verbose)
-        coarse, _ = coarse_windows(self.recorded, "coarse", 2 * _NUM)
-        return {CONVOLUTIONAL: _apart(self.enhancer.predict(coarse) + gan.generate(2 * _NUM, self.seed), 1 / 2, self.num_coarse)}
+        coarse, _ = coarse_windows(self.recorded, "coarse", 2 * NUM)
+        return {CONVOLUTIONAL: apart(self.enhancer.predict(coarse) + gan.generate(2 * NUM, self.seed), 1 / 2, self.num_coarse)}
 
     def rows(self, arms: Mapping[str, tuple[np.ndarray, np.ndarray]], names: tuple[str, ...]) -> list[dict[str, Any]]:
         """Trains detectors on each arm and judges them; see `judge`."""
@@ -125,7 +122,7 @@ class Judge:
         for arm, (training, held_out) in arms.items():
             for name in names:
                 detector = DETECTORS[name](self.seed).fit(training)
-                scores = {fault: detector.score(pairs.telemetry) for fault, pairs in self._test.items()}
+                scores = {fault: detector.score(pairs.telemetry) for fault, pairs in self.test.items()}
                 found += judge(arm, name, detector.score(held_out), scores, self.num_stretches)
         return found
 
@@ -135,28 +132,11 @@ class Judge:
         for arm, is_enhanced in RESIDUALS.items():
             fitted = self.residuals if is_enhanced else self.pairs.telemetry - self.pairs.coarse[:, :, 0]
             scores = {}
-            for fault in self._test:
+            for fault in self.test:
                 pairs = fault_windows(self.recorded, fault, self.seed, is_planned=True)
                 run = self.enhancer.predict(pairs.coarse) if is_enhanced else pairs.coarse[:, :, 0]
                 scores[fault] = _rms(pairs.telemetry - run)
             found += judge(arm, "residual", _rms(fitted), scores, self.num_stretches)
-        return found
-
-    def labelled_rows(self) -> list[dict[str, Any]]:
-        """Judges classifiers that learn simulated faults, from the coarse simulator and from enhanced windows with noise."""
-        nominal, _ = coarse_windows(self.recorded, "coarse", 2 * _NUM)
-        each = _NUM // len(ALL)
-        faulty = np.concatenate([coarse_windows(self.recorded, "coarse_fault", each, fault)[0] for fault in ALL])
-        windows = np.concatenate([nominal, faulty])
-        found = []
-        for arm, values in ((COARSE, windows[:, :, 0]), (RESAMPLED, self.enhancer.predict(windows) + self.noise(len(windows), 3))):
-            training, held_out = _apart(values[: 2 * _NUM], 1 / 2, self.num_coarse)
-            learnt = np.concatenate([training, values[2 * _NUM :]])
-            labels = np.repeat([0, 1], [len(training), len(faulty)])
-            for name in LABELLED:
-                score = _classifier(name, learnt, labels, self.seed)
-                scores = {fault: score(pairs.telemetry) for fault, pairs in self._test.items()}
-                found += judge(f"{arm}, faults in training", name, score(held_out), scores, self.num_stretches)
         return found
 
 
@@ -197,28 +177,10 @@ def judge(
     return rows
 
 
-def _apart(windows: np.ndarray, share: float, orbits: int) -> tuple[np.ndarray, np.ndarray]:
+def apart(windows: np.ndarray, share: float, orbits: int) -> tuple[np.ndarray, np.ndarray]:
     """Splits windows of so many orbits, in the order of time, and leaves out an orbit between both parts, so that none overlap."""
     cut = round(share * len(windows))
     return windows[:cut], windows[cut + -(-len(windows) // orbits) :]
-
-
-def _classifier(name: str, windows: np.ndarray, labels: np.ndarray, seed: int) -> Score:
-    """Fits a classifier that gives the probability of a fault."""
-    from threadpoolctl import threadpool_limits
-
-    if name == "boosted trees":
-        from sklearn.ensemble import HistGradientBoostingClassifier
-
-        trees = HistGradientBoostingClassifier(random_state=seed).fit(window_features(windows), labels)
-        return lambda each: trees.predict_proba(window_features(each))[:, 1]
-    from sklearn.linear_model import LogisticRegression
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
-    with threadpool_limits(1):
-        machine = make_pipeline(StandardScaler(), LogisticRegression(C=0.01, max_iter=300)).fit(windows, labels)
-    return machine.decision_function
 
 
 def _rms(windows: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ def _reached(nominal: Mapping[str, Any]) -> str:
     names = {
         "the paper's network": "paper's network",
         "ridge regression": "ridge, all columns",
-        "with a network on top": "ridge and network",
+        "ridge and a network": "ridge and network",
     }
     whole = nominal["coarse itself"]["mean"]
     return ", ".join(f"{words} {100 * nominal[name]['mean'] / whole:.0f} %" for words, name in names.items())
@@ -45,11 +45,11 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.7,
-        f"Error of a coarse battery simulator that is enhanced to a fine one, as a share of the coarse simulator's own error ({said})",
+        f"Error left by enhancers of a coarse battery simulator, as a share of its own error ({said})",
         "Error of the voltage (NRMSE) on orbits that no enhancer has learnt from. Dot and bar: nominal orbits, mean and standard error over "
         f"{in_seeds(found['seeds'])}. Crosses: mean over five severities of each of the five faults. Last row: the sensor's noise alone.",
     )
-    grid = panels(figure, down + 0.2, 1, len(regimes), gap=(0.3, 0.12), sharey=True)
+    grid = panels(figure, down + 0.2, 1, len(regimes), gap=(0.3, 0.12), sharey=True, sharex=True)
     left = 1.75 / DOUBLE
     width = (1 - left - 0.03) / len(regimes)
     order = _enhancers(first)
@@ -146,12 +146,14 @@ def alarms(found: Findings) -> matplotlib.figure.Figure:
         f"{regime}: {100 * np.mean(each[RESAMPLED]):.1f} %, and {100 * np.mean(each[REAL_120]):.1f} % from as many real orbits"
         for regime, each in rates.items()
     )
+    fewer = any("dense autoencoder" in each for about in regimes.values() for each in about["detectors"].values())
     figure, down = new_sheet(
         DOUBLE,
         3.9,
         f"False alarms of detectors trained on the enhanced simulator with its residuals drawn again ({said})",
         "Vertical line: the rate that thresholds are set for, 1 %. Dot: mean over detectors and seeds; small marks: single detectors; rates below 0.1 % are "
-        "drawn at 0.1 %. The autoencoders and the GAN ran for fewer seeds, and the autoencoders for three of the trainings.",
+        "drawn at 0.1 %."
+        + (" The autoencoders and the GAN ran for fewer seeds, and the autoencoders for three of the trainings." if fewer else ""),
     )
     grid = panels(figure, down + 0.2, 1, len(regimes), gap=(0.3, 0.12), sharey=True, sharex=True)
     left = 1.95 / DOUBLE
@@ -169,6 +171,7 @@ def alarms(found: Findings) -> matplotlib.figure.Figure:
             axes.plot(max(np.mean(each[arm]), 1e-3), -height, "o", color=colour, markersize=4)
         axes.axvline(0.01, color=QUIET, linewidth=0.6, zorder=0)
         axes.set_xscale("log")
+        axes.set_xlim(0.0008, 1.4)
         axes.set_xticks((0.001, 0.01, 0.1, 1.0), ("0.1", "1", "10", "100"))
         axes.minorticks_off()
         axes.set_title(f"{regime} regime", weight="bold")

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
-from enhsim_tf.reproduce.battery.detectors import ARMS, RESIDUALS
+from enhsim_tf.reproduce.battery.detectors import ARMS, COARSE, REAL_15, REAL_60, REAL_120, RESAMPLED, RESIDUALS
 from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
 from enhsim_tf.reproduce.battery.findings import C9_RATIO, LARGEST_GAP, LARGEST_SHARE, LEAST_DETECTORS, LEAST_SPEED, TRUSTED
+from enhsim_tf.reproduce.battery.labelled import DIFFERENCE
 from enhsim_tf.reproduce.publish.results import fill_parts
 
 Findings = Mapping[str, Any]
@@ -34,6 +35,7 @@ def parts_of(found: Findings) -> dict[str, str]:
     """The generated parts of the page by the names of their markers."""
     return {
         "scope": _scope(found),
+        "summary": _summary(found),
         "targets": _targets(found),
         "errors": _errors(found),
         "faults": _faults(found),
@@ -50,8 +52,44 @@ def _scope(found: Findings) -> str:
     return (
         f"The numbers on this page come from {'one seed' if len(seeds) == 1 else f'{len(seeds)} seeds'} with PyBaMM {found['versions']['pybamm']}, "
         f"budget {found['budget']}. Of {runs['number']:,} recorded runs, {runs['reduced']} were recorded with a reduced current because a solver failed "
-        f"at the full one (at most {most} reductions of a tenth); none was left out."
+        f"at the full one (at most {most} reductions of a tenth); none was left out. The runs that the classifiers learn from are not counted here."
     )
+
+
+def _summary(found: Findings) -> str:
+    return "\n".join(f"- {line}" for regime, about in found["regimes"].items() for line in _sentences(regime, about))
+
+
+def _sentences(regime: str, about: Mapping[str, Any]) -> list[str]:
+    nominal, detectors = {name: each["mean"] for name, each in about["nominal"].items()}, about["detectors"]
+    paper = nominal["paper's network"]
+    said = [
+        f"*{regime}*, error on nominal orbits: the coarse simulator {nominal['coarse itself']:.3f}, with a level and a gain {nominal['level and gain']:.3f}, "
+        f"the paper's network {paper:.3f}; ridge regression on the voltage {nominal['ridge, voltage']:.3f}, on voltage and current "
+        f"{nominal['ridge, voltage and current']:.3f}, on all columns {nominal['ridge, all columns']:.3f}, and with a network on what it leaves "
+        f"{nominal['ridge and network']:.3f}; floor {nominal[FLOOR]:.3f}."
+    ]
+    arms = [arm for arm in (COARSE, RESAMPLED, REAL_15, REAL_60, REAL_120) if arm in detectors]
+    rates = ", ".join(f"{arm} {_percent(detectors[arm], 'false_alarms')}" for arm in arms)
+    said.append(f"*{regime}*, false alarms by training, means over the detectors that ran in every seed: {rates}.")
+    ways = {
+        "detectors trained on enhanced windows with residuals drawn again": RESAMPLED,
+        "detectors trained on as many real orbits": REAL_120,
+        "classifiers with simulated faults in training": f"{RESAMPLED}, faults in training",
+        "the residual of the enhanced run": next(iter(RESIDUALS)),
+        "classifiers of that residual with simulated faults in training": DIFFERENCE,
+    }
+    recalls = "; ".join(
+        f"{words} {_percent(detectors[arm], 'recall')} (false alarms {_percent(detectors[arm], 'false_alarms')})"
+        for words, arm in ways.items()
+        if arm in detectors
+    )
+    return [*said, f"*{regime}*, fault windows found: {recalls}."]
+
+
+def _percent(detectors: Mapping[str, Any], key: str) -> str:
+    most = max(each["num_seeds"] for each in detectors.values())
+    return f"{100 * _mean({name: each for name, each in detectors.items() if each['num_seeds'] == most}, key):.1f} %"
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

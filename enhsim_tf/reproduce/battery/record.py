@@ -25,7 +25,6 @@ class Counts:
         test: Nominal orbits of both, on which everything is judged.
         coarse: Nominal orbits of the coarse simulator alone, from which training data are generated.
         fault: Orbits of both simulators under each fault at each severity.
-        coarse_fault: Orbits of the coarse simulator alone under each fault at each severity.
     """
 
     fit: int
@@ -33,7 +32,6 @@ class Counts:
     test: int
     coarse: int
     fault: int
-    coarse_fault: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,7 +68,6 @@ _PARTS = {
     "test": ((None,), MODELS),
     "fault": ((None, *ALL), MODELS),
     "coarse": ((None,), ("coarse",)),
-    "coarse_fault": (ALL, ("coarse",)),
 }
 
 

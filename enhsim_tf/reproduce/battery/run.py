@@ -88,7 +88,12 @@ def replicate(settings: Settings, stages: Stages, regime: str, seed: int) -> "di
     runs = recorded(settings, stages, regime, seed)
     chosen, found = settings.battery, []
     first, after = None, [name_of(regime, seed)]
-    for step, depends in {"errors": (chosen.paper_epochs,), "detectors": (), "networks": (chosen.num_iterations,)}.items():
+    for step, depends in {
+        "errors": (chosen.paper_epochs,),
+        "detectors": (),
+        "labelled": (chosen.fault_orbits,),
+        "networks": (chosen.num_iterations,),
+    }.items():
         if step == "networks" and seed >= chosen.first_seed + chosen.num_network_seeds:
             continue
 
@@ -122,9 +127,7 @@ def recorded(settings: Settings, stages: Stages, regime: str, seed: int) -> Path
     """
     check_installed()
     chosen = settings.battery
-    counts = record.Counts(
-        chosen.fit_orbits, chosen.more_orbits, chosen.test_orbits, chosen.coarse_orbits, chosen.fault_orbits, chosen.fault_orbits
-    )
+    counts = record.Counts(chosen.fit_orbits, chosen.more_orbits, chosen.test_orbits, chosen.coarse_orbits, chosen.fault_orbits)
 
     def make(folder: Path) -> None:
         record.record(folder, counts, REGIMES[regime], seed, stages.progress)

@@ -1,4 +1,4 @@
-"""The steps of a replicate: errors of the enhancers, detectors, and the detectors and noise that are networks."""
+"""The steps of a replicate: errors of the enhancers, detectors, classifiers of faults, and what needs networks."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Any
 
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.battery import detectors, errors
+from enhsim_tf.reproduce.battery.labelled import labelled_rows, simulate_faults
 from enhsim_tf.reproduce.battery.orbits import REGIMES
 from enhsim_tf.reproduce.battery.record import Recorded
 from enhsim_tf.reproduce.battery.speed import speed_rows
@@ -62,10 +63,16 @@ def _judge(recorded: Recorded, seed: int, before: Path | None) -> detectors.Judg
 
 
 def make_detectors(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings, before: Path | None) -> None:
-    """Writes the table `alarms` of the detectors without networks, of residuals and of classifiers; see `make_errors`."""
+    """Writes the table `alarms` of the detectors without networks and of residuals; see `make_errors`."""
     judge = _judge(recorded, seed, before)
     names = tuple(name for name in DETECTORS if name not in detectors.NETWORKS)
-    _write(folder, "alarms", judge.rows(judge.arms(), names) + judge.residual_rows() + judge.labelled_rows())
+    _write(folder, "alarms", judge.rows(judge.arms(), names) + judge.residual_rows())
+
+
+def make_labelled(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings, before: Path | None) -> None:
+    """Writes the table `alarms` of the classifiers that learn simulated faults; see `make_errors`."""
+    faults = simulate_faults(settings.battery.fault_orbits, REGIMES[regime], seed)
+    _write(folder, "alarms", labelled_rows(_judge(recorded, seed, before), faults))
 
 
 def make_networks(folder: Path, recorded: Recorded, regime: str, seed: int, settings: Settings, before: Path | None) -> None:
@@ -80,6 +87,7 @@ def make_networks(folder: Path, recorded: Recorded, regime: str, seed: int, sett
 STEPS: dict[str, Callable[[Path, Recorded, str, int, Settings, Path | None], None]] = {
     "errors": make_errors,
     "detectors": make_detectors,
+    "labelled": make_labelled,
     "networks": make_networks,
 }
 """The steps of a replicate by name, in their order."""

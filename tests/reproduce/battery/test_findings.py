@@ -1,6 +1,7 @@
 """The summary, the targets, the page and the figures, from tables made by hand."""
 
 import functools
+import importlib.util
 import json
 from pathlib import Path
 
@@ -126,6 +127,27 @@ def test_the_figures_are_drawn_from_the_findings(found, tmp_path):
     paths = save_all(FIGURES, found, tmp_path, KEPT.command)
     assert {path.name for path in paths} == {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
     assert "seeds 1 to 2" in (tmp_path / "errors.svg").read_text()
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pybamm") is None, reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'")
+def test_the_command_writes_tables_findings_figures_and_the_page_of_the_whole_study_alone(tmp_path, monkeypatch, capsys):
+    from enhsim_tf.reproduce.__main__ import main
+    from enhsim_tf.reproduce.battery import run, simulate
+
+    page = tmp_path / "docs" / "battery.md"
+    page.parent.mkdir()
+    names = ("scope", "summary", "targets", "errors", "faults", "speed", "detectors", "recall")
+    empty = "".join(f"<!-- {name}: generated -->\n<!-- end of {name} -->\n" for name in names)
+    page.write_text(empty)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulate, "check_installed", lambda: None)
+    monkeypatch.setattr(run, "collect", lambda settings, cache, fresh, tell: _tables(range(settings.battery.num_seeds)))
+    assert main(["--experiment", "battery", "--seeds", "2"]) == 0
+    assert page.read_text() == empty and "chosen 0.0" in capsys.readouterr().out
+    assert main(["--experiment", "battery"]) == 0
+    folder = tmp_path / "figures" / "battery"
+    assert json.loads((folder / "findings.json").read_text())["seeds"] == list(range(10)) and "10 seeds" in page.read_text()
+    assert {path.stem for path in folder.glob("*.png")} == set(FIGURES)
 
 
 def test_the_committed_page_belongs_to_the_committed_tables():

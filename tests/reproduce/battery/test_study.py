@@ -6,7 +6,7 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.ladder import RIDGE
 from enhsim_tf.reproduce.__main__ import main, parse
-from enhsim_tf.reproduce.battery import detectors, errors, simulate, windows
+from enhsim_tf.reproduce.battery import detectors, errors, labelled, simulate, windows
 from enhsim_tf.reproduce.battery.detectors import RESIDUALS, Judge
 from enhsim_tf.reproduce.battery.faults import ALL
 from enhsim_tf.reproduce.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, battery_current, draw_load
@@ -26,16 +26,18 @@ def _run(load, added=0.0):
     return coarse.astype(np.float32), fine.astype(np.float32)
 
 
+def _added(fault):
+    return 0.5 * fault.severity if fault is not None and fault.kind == "raised resistance" else 0.0
+
+
 @pytest.fixture(scope="module")
 def recorded():
     runs, rng = {}, np.random.default_rng(0)
     for part, orbits in (("fit", 16), ("more", 8), ("test", 8), ("coarse", 16)):
         runs[f"{part}/nominal/coarse"], runs[f"{part}/nominal/fine"] = _run(draw_load(orbits + 1, GENTLE, rng))
-    for part in ("fault", "coarse_fault"):
-        load = draw_load(3, GENTLE, rng)
-        for fault in (None, *ALL):
-            added = 0.5 * fault.severity if fault is not None and fault.kind == "raised resistance" else 0.0
-            runs[f"{part}/{key_of(fault)}/coarse"], runs[f"{part}/{key_of(fault)}/fine"] = _run(load, added)
+    load = draw_load(3, GENTLE, rng)
+    for fault in (None, *ALL):
+        runs[f"fault/{key_of(fault)}/coarse"], runs[f"fault/{key_of(fault)}/fine"] = _run(load, _added(fault))
     return Recorded(runs, {})
 
 
@@ -43,7 +45,7 @@ def recorded():
 def small_numbers(monkeypatch):
     counted = {
         errors: {"NUM_WINDOWS": 300, "NUM_TEST": 80, "NUM_FAULT": 10},
-        detectors: {"_NUM": 100, "WINDOW": 100},
+        detectors: {"NUM": 100, "WINDOW": 100},
         windows: {"WINDOW": 100},  # shorter than the study's, so that few orbits are enough to learn from
     }
     for module, counts in counted.items():
@@ -113,6 +115,23 @@ def test_arms_hold_what_they_say_and_training_and_threshold_share_no_orbit(recor
         assert not (training[:, None, :50] == held_out[None, :, :50]).all(axis=2).any()
     again = Judge(recorded, pairs, RIDGE, 0).arms()
     np.testing.assert_array_equal(again[detectors.AUTOREGRESSION][1], arms[detectors.AUTOREGRESSION][1])
+
+
+def test_a_classifier_learns_simulated_faults_and_each_has_orbits_of_its_own(recorded, pairs, monkeypatch):
+    def made_up(load, regime, faults, models):
+        return [(simulate.Run(_run(load, _added(fault))[0], 1.0),) for fault in faults]
+
+    monkeypatch.setattr(labelled, "simulate_all", made_up)
+    monkeypatch.setattr(labelled, "NUM", 200)
+    faulty, planned = faults = labelled.simulate_faults(2, GENTLE, 5)
+    each = len(faulty) // len(ALL)
+    assert not np.array_equal(planned[0], planned[each]) and np.array_equal(faulty, labelled.simulate_faults(2, GENTLE, 5)[0])
+    changed = np.abs(faulty - planned).max(axis=(1, 2)).reshape(len(ALL), each).min(axis=1) > 0.01
+    assert [bool(value) for value in changed] == [fault.kind == "raised resistance" for fault in ALL]
+    rows = labelled.labelled_rows(Judge(recorded, pairs, RIDGE, 0), faults)
+    assert {row["arm"] for row in rows} >= {labelled.DIFFERENCE} and len(rows) == 3 * 2 * (1 + len(ALL))
+    worst = {row["detector"]: row["alarms"] for row in rows if row["arm"] == labelled.DIFFERENCE and row["fault"] == "raised resistance"}
+    assert worst["boosted trees"] > 0.5
 
 
 def test_without_pybamm_the_command_says_what_to_install(monkeypatch, capsys, tmp_path):
