@@ -18,7 +18,7 @@ def visit_inline(writer: "HTML5Translator", node: nodes.math) -> None:
 
 def visit_block(writer: "HTML5Translator", node: nodes.math_block) -> None:
     """Writes a formula in a paragraph of its own."""
-    writer.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
+    writer.body.append(f'<div class="formula">{tex2mathml(node.astext(), as_block=True)}</div>')
     raise nodes.SkipNode
 
 
