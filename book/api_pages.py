@@ -15,7 +15,7 @@ import enhsim_tf
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-_CODE = re.compile(r"(?<![`:])`([^`]+)`(?!`)")
+_CODE, _LITERAL = re.compile(r"(?<![`:])`([^`]+)`(?!`)"), r"``\1``"
 FOLDER = Path(__file__).parent / "api"
 _LEFT_OUT = ("enhsim_tf.__main__", "enhsim_tf.cli", "enhsim_tf.reproduce.__main__")  # commands, whose reference is `--help`
 
@@ -50,7 +50,7 @@ def public_names() -> str:
         value = getattr(enhsim_tf, name)
         role = "class" if isinstance(value, type) else "func"
         first = " ".join((value.__doc__ or "").strip().split("\n\n")[0].split())
-        lines += [f"   * - :py:{role}:`~{value.__module__}.{name}`", f"     - {first}"]
+        lines += [f"   * - :py:{role}:`~{value.__module__}.{name}`", f"     - {_CODE.sub(_LITERAL, first)}"]
     return "\n".join(lines) + "\n"
 
 
@@ -73,7 +73,7 @@ def prepare_docstring(what: str, lines: list[str]) -> list[str]:
         what: Kind of the object, as Sphinx calls it.
         lines: Lines of the docstring.
     """
-    marked = _CODE.sub(r"``\1``", "\n".join(lines)).split("\n")
+    marked = _CODE.sub(_LITERAL, "\n".join(lines)).split("\n")
     return ["", *marked] if what in ("data", "attribute", "property") else marked
 
 
