@@ -62,9 +62,10 @@ def complete_labelled_batch(
     Raises:
         InputError: If a value is not finite.
     """
-    changed, tolerance = coarse != nominal, tolerance_of(simulator.noise_sd, simulator.scale)
+    changed = coarse != nominal
     changed[[row for row, *_ in held]] = False
     windows, mask = complete_batch(simulator, nominal, levels, None), np.zeros(coarse.shape, bool)
+    tolerance = tolerance_of(simulator.noise_sd, simulator.scale) if held or changed.any() else 0.0
     if changed.any():
         degraded = complete_batch(simulator, coarse, levels, None)
         windows, mask = blend_changes(windows, degraded, spans(changed), fade_length(coarse.shape[1]), tolerance)
