@@ -35,7 +35,7 @@ def linear_noise(noise_windows: np.ndarray) -> NoiseGAN:
         power = np.cumsum(response**2)
         response = response[: int(np.searchsorted(power, (1 - _LEFT_OUT) * power[-1])) + 1]
         response, bias = response / np.sqrt(np.sum(response**2)), mean / scale
-    convolution = keras.layers.Conv1D(1, len(response), name="Impulse_Response")
+    convolution = keras.layers.Conv1D(1, len(response), kernel_initializer="zeros", name="Impulse_Response")
     generator = keras.Sequential([keras.Input((None, 1)), convolution], name="generator")
     convolution.set_weights([response[::-1, None, None].astype(np.float32), np.array([bias], np.float32)])
     return NoiseGAN(generator, build_discriminator(window, filters=8), scale=scale or 1.0)

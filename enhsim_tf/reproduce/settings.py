@@ -214,7 +214,7 @@ class ModesSettings:
 class LadderSettings:
     """The experiment on noise that no generator was designed for: `python -m enhsim_tf.reproduce --experiment noise`."""
 
-    num_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: fourteen families take hours for each seed; --seeds asks for more", smoke=1)
+    num_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: fourteen families take hours for each seed; --seeds asks for more")
     first_seed: int = setting(3_000, "seed", f"{OUR_CHOICE}: no design was chosen on these seeds")
     num_windows: int = setting(5_000, "windows", f"{OUR_CHOICE}: windows of true noise that the models learn", smoke=120)
     num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
