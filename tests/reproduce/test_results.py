@@ -192,6 +192,13 @@ def test_a_value_lies_in_its_range_and_a_verdict_is_counted_whatever_the_seed_ha
     assert "| 3.5 (1 to 3.5) | **partly** (over seeds: 2 partly, 1 reproduced)" in text
 
 
+def test_a_tie_is_said(filled):
+    spread = _spread(0.12345)
+    assert "divided equally" not in filled(spread=spread)
+    spread["claims"]["C2"]["verdicts"] = ["partly", "not reproduced", "reproduced"]
+    assert "On C2 the seeds are divided equally, and the worse verdict counts." in filled(spread=spread)
+
+
 def test_of_a_claim_that_the_paper_does_not_test_what_holds_is_counted(filled, found):
     spread = _spread(0.12345)
     spread["claims"]["C9"] |= {"verdicts": ["not tested by the paper"] * 3, "holds": [None, "holds", "does not hold"]}

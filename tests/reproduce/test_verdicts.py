@@ -1,5 +1,9 @@
 """Tests the page that compares the earlier and the present verdicts."""
 
+import json
+import shutil
+from pathlib import Path
+
 import pytest
 
 from enhsim_tf.common.atomic_files import write_json
@@ -7,6 +11,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce.paper.claims import CLAIMS
 from enhsim_tf.reproduce.publish import verdicts
 
+ROOT = Path(__file__).parents[2]
 PAGE = "# Verdicts\n" + "".join(f"<!-- {name}: generated -->\n<!-- end of {name} -->\n" for name in ("verdicts", "rules", "seeds"))
 DETAILS = {
     "C1": {"ridge_nrmse": [0.03, 0.031], "nearest_nrmse": [0.05, 0.05], "nrmse": [0.09, 0.1]},
@@ -75,3 +80,12 @@ def test_a_page_without_its_markers_is_refused(folder):
     (folder / "verdicts.md").write_text("no markers")
     with pytest.raises(InputError, match="Expected the markers of 'verdicts' once in verdicts.md"):
         verdicts.fill_verdicts(folder / "verdicts.md", folder / "before.json", folder)
+
+
+def test_the_repositorys_page_is_up_to_date(tmp_path):
+    page = tmp_path / "verdicts.md"
+    shutil.copy(ROOT / verdicts.PATH, page)
+    verdicts.fill_verdicts(page, ROOT / verdicts.BEFORE, ROOT / "figures")
+    assert page.read_text(encoding="utf-8") == (ROOT / verdicts.PATH).read_text(encoding="utf-8")
+    seeds = json.loads((ROOT / "figures" / "spread.json").read_text(encoding="utf-8"))["seeds"]
+    assert len(seeds) >= 10

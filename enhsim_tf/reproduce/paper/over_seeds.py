@@ -29,6 +29,12 @@ def of_most(verdicts: Sequence[str]) -> str:
     return max(worst_first, key=verdicts.count)
 
 
+def is_tie(verdicts: Sequence[str]) -> bool:
+    """Whether two verdicts share the largest number of seeds, so that the worse of them counts."""
+    counts = sorted((verdicts.count(verdict) for verdict in set(verdicts)), reverse=True)
+    return len(counts) > 1 and counts[0] == counts[1]
+
+
 def verdict_over(record: Mapping[str, Any], spread: Mapping[str, Any] | None) -> str:
     """The verdict on a claim by most seeds, or that of its record if only one seed was run."""
     return record["verdict"] if spread is None else of_most(spread["claims"][record["id"]]["verdicts"])

@@ -13,7 +13,7 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.reproduce.paper.over_seeds import title_verdict, titles_of_seeds, verdict_over
+from enhsim_tf.reproduce.paper.over_seeds import is_tie, title_verdict, titles_of_seeds, verdict_over
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import deviations
 from enhsim_tf.reproduce.stages import VERSIONS
@@ -95,10 +95,12 @@ def _holds(about: Mapping[str, Any]) -> list[str | None]:
 
 
 def titles_line(found: Mapping[str, Any], spread: Mapping[str, Any]) -> str:
-    """One sentence on the verdict in the title: by most seeds, and by each seed alone."""
+    """Sentences on the verdict in the title: by most seeds, by each seed alone, and on which claims the seeds are divided equally."""
     alone = collections.Counter(titles_of_seeds(found["claims"], spread))
     counted = ", ".join(f"{title} with {number}" for title, number in alone.most_common())
-    return f"By the verdicts of most of {len(spread['seeds'])} seeds: {title_verdict(found['claims'], spread)}; by those of one seed alone: {counted}."
+    said = f"By the verdicts of most of {len(spread['seeds'])} seeds: {title_verdict(found['claims'], spread)}; by those of one seed alone: {counted}."
+    ties = [claim["id"] for claim in found["claims"] if is_tie(spread["claims"][claim["id"]]["verdicts"])]
+    return f"{said} On {', '.join(ties)} the seeds are divided equally, and the worse verdict counts." if ties else said
 
 
 def fill_readme(path: Path, folder: Path) -> None:

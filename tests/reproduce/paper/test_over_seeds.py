@@ -2,7 +2,7 @@
 
 import pytest
 
-from enhsim_tf.reproduce.paper.over_seeds import of_most, ranges, title_verdict, titles_of_seeds, verdict_over
+from enhsim_tf.reproduce.paper.over_seeds import is_tie, of_most, ranges, title_verdict, titles_of_seeds, verdict_over
 
 YES, PARTLY, NO, NOT_TESTED, NOT_MEASURED = "reproduced", "partly", "not reproduced", "not tested by the paper", "not measured"
 
@@ -31,6 +31,10 @@ def test_title_follows_the_verdict_of_most_seeds_and_the_worse_on_a_tie():
 
     assert title_verdict(records) == title_verdict(records, spread(PARTLY, PARTLY, NO)) == "[Re, in part]"
     assert title_verdict(records, spread(PARTLY, NO, NO)) == "[¬Re]" and title_verdict(records, spread(PARTLY, YES, YES)) == "[Re]"
+
+
+def test_a_tie_is_of_the_largest_counts():
+    assert is_tie([YES, NO]) and is_tie([YES, YES, NO, NO, PARTLY]) and not is_tie([YES, YES, NO, PARTLY]) and not is_tie([YES] * 3)
 
 
 def test_the_title_by_each_seed_alone():
