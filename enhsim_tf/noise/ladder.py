@@ -30,7 +30,7 @@ def _autoregression(noise: np.ndarray, signal: np.ndarray | None, num_iterations
 
 
 def _residual_windows(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int) -> Any:
-    from enhsim_tf.noise.surrogates import WindowBootstrap
+    from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
     return WindowBootstrap.fit(noise)
 

@@ -165,30 +165,3 @@ class BlockBootstrap:
         places = np.arange(samples) + rng.integers(0, self.block, (num_rows, 1))  # a window starts at a random position of its first block
         rows, blocks = np.arange(num_rows)[:, None], places // self.block
         return self.windows[sources[rows, blocks], begins[rows, blocks] + places % self.block]
-
-
-class WindowBootstrap:
-    """Whole windows of the real noise, drawn again with replacement (Efron 1979), without a seam inside a window.
-
-    Windows that are generated contain nothing that the given ones do not, so many given windows are better than few.
-
-    Args:
-        windows: Noise windows of shape `(windows, samples)`.
-
-    Raises:
-        InputError: If there is no window.
-    """
-
-    def __init__(self, windows: np.ndarray):
-        self.windows = np.asarray(windows, np.float32)
-        if self.windows.ndim != 2 or not len(self.windows):
-            raise InputError(f"Expected noise of shape (windows, samples). Received: shape {np.shape(windows)}. Give at least one window.")
-
-    @classmethod
-    def fit(cls, windows: np.ndarray) -> "WindowBootstrap":
-        """Stores noise windows of shape `(windows, samples)`."""
-        return cls(windows)
-
-    def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise."""
-        return self.windows[np.random.default_rng(seed).integers(0, len(self.windows), num_windows)]

@@ -9,7 +9,7 @@ import pytest
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
 from enhsim_tf.enhanced_simulator.runs.model import RunModel
-from enhsim_tf.noise.resampled import ResampledNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 START = "2024-01-01T00:00:00+00:00"
 
@@ -17,7 +17,7 @@ START = "2024-01-01T00:00:00+00:00"
 def model(window=8, delay_s=0.0, interval_s=10.0):
     """A run model without networks: the telemetry is twice the coarse run, and coarse values above 1 are out of range."""
     rung = SimpleNamespace(predict=lambda windows: 2 * windows[:, :, 0], name="twice")
-    noise = ResampledNoise(0.1 * np.random.default_rng(0).standard_normal((50, window)))
+    noise = WindowBootstrap(0.1 * np.random.default_rng(0).standard_normal((50, window)))
     coverage = SimpleNamespace(score=lambda coarse: np.where(coarse[:, 0] > 1, 2, 0.5).astype(np.float32))
     nominal = Recording((Run(np.zeros((40, 1), np.float32)),), ("volts",), interval_s, START)
     return RunModel(rung, noise, coverage, nominal, window, delay_s, trained={"telemetry": "celsius"})

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
-from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise, WindowBootstrap
+from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 
 def gain(width, frequency):
@@ -208,9 +209,3 @@ def test_whole_windows_are_drawn_unchanged_and_equally_often():
     assert np.array_equal(numbers, np.arange(8)) and np.abs(counts - 1_000).max() < 150  # five standard deviations
     assert np.array_equal(noise, source[(noise[:, 0] / 5).astype(int)])
     assert np.array_equal(noise, WindowBootstrap(source).generate(8_000, seed=3))
-
-
-def test_whole_windows_need_a_window(refused):
-    for windows in (np.ones(5), np.ones((0, 5))):
-        with refused("at least one window"):
-            WindowBootstrap.fit(windows)

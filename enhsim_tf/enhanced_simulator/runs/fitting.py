@@ -23,7 +23,7 @@ from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train_noise
 from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, fit_ladder, fit_rung
 from enhsim_tf.enhancer.overlapping import enhance_run
-from enhsim_tf.noise.resampled import ResampledNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, random_window_starts
 
@@ -168,7 +168,7 @@ def _fit_noise(residuals: Sequence[Telemetry], window: int, options: RunOptions,
     starts = random_window_starts(residuals, window, options.num_windows, np.random.default_rng([options.seed, 1]))
     windows, _ = cut_windows_from_parts(residuals, starts, window)
     if not np.std(windows, dtype=np.float64) > 0 or options.noise == "resampled":  # networks cannot learn noise of size 0
-        return ResampledNoise(windows)
+        return WindowBootstrap(windows)
     settings = TrainingSettings(seed=options.seed, num_iterations=options.num_iterations, window=window, noise=options.noise)
     return train_noise(windows, settings, verbose, progress)
 

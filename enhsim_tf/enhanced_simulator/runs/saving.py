@@ -14,7 +14,7 @@ from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, read_saved, write_saved
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.scaling import Scaling
-from enhsim_tf.noise.resampled import ResampledNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
@@ -38,7 +38,7 @@ def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
         "nominal.npz": lambda path: _write_arrays(path, {f"part_{number}": part.values for number, part in enumerate(model.nominal.parts)}),
     }
     noise: Mapping[str, Any]
-    if isinstance(model.noise, ResampledNoise):
+    if isinstance(model.noise, WindowBootstrap):
         noise = {"kind": "resampled"}
         others["noise.npz"] = lambda path: _write_arrays(path, {"windows": model.noise.windows})
     else:
@@ -87,7 +87,7 @@ def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str
 
     scaling, window = Scaling.from_config(settings["scaling"]), int(settings["window"])
     if settings["noise"]["kind"] == "resampled":
-        noise = ResampledNoise(load_npz(folder / "noise.npz", _MOST_BYTES)["windows"])
+        noise = WindowBootstrap(load_npz(folder / "noise.npz", _MOST_BYTES)["windows"])
     else:
         config = {name: value for name, value in settings["noise"].items() if name != "kind"}
         noise = NoiseGAN(networks["generator"], networks["discriminator"], **config)
@@ -99,7 +99,7 @@ def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str
     coarse = SquareWaveSimulator.from_config(kept["config"]) if kept.get("kind") == "square waves" else None
     rung = Rung(str(settings["rung"]), networks["enhancer"], scaling)
     columns = len(nominal.columns)
-    if isinstance(noise, ResampledNoise) and noise.windows.shape[1] != window:
+    if isinstance(noise, WindowBootstrap) and noise.windows.shape[1] != window:
         raise ValueError("noise of another window length than the settings say")
     shapes = rung.network.input_shape[1:], rung.network.output_shape[1:], np.shape(scaling.input_scale)
     if shapes != ((window * columns,), (window,), (columns,)) or not (np.isfinite(coverage.limit) and coverage.limit > 0):

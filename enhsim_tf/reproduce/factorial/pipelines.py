@@ -9,7 +9,8 @@ import numpy as np
 
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.enhancer.training_pairs import paired_windows
-from enhsim_tf.noise.surrogates import GaussianAutoregression, WindowBootstrap
+from enhsim_tf.noise.surrogates import GaussianAutoregression
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.reproduce.factorial.cells import (
     AUTOREGRESSION,
     CONVOLUTIONAL_GAN,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.noise.resampled import ResampledNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 
 def ar1(num_windows, window, coefficient=0.9, seed=0):
@@ -17,12 +17,12 @@ def ar1(num_windows, window, coefficient=0.9, seed=0):
 
 def test_windows_are_real_ones():
     windows = ar1(20, 40)
-    drawn = ResampledNoise(windows).generate(100, 3)
+    drawn = WindowBootstrap(windows).generate(100, 3)
     assert drawn.shape == (100, 40) and {row.tobytes() for row in drawn} <= {row.tobytes() for row in windows}
 
 
 def test_the_scale_is_constant_across_seams():
-    noise = ResampledNoise(ar1(3_000, 40))
+    noise = WindowBootstrap(ar1(3_000, 40))
     series = np.stack([noise.generate_series(120, seed) for seed in range(4_000)])
     scale = series.std(axis=0)
     assert scale.mean() == pytest.approx(noise.scale, rel=0.02)
@@ -30,18 +30,18 @@ def test_the_scale_is_constant_across_seams():
 
 
 def test_a_series_has_no_steps_at_seams():
-    noise = ResampledNoise(np.random.default_rng(0).standard_normal((500, 1)) * np.ones((500, 40)))  # each window is one level
+    noise = WindowBootstrap(np.random.default_rng(0).standard_normal((500, 1)) * np.ones((500, 40)))  # each window is one level
     series = noise.generate_series(20_000, 0)
     assert np.abs(np.diff(series)).max() < 0.7 and series.std() == pytest.approx(1, abs=0.1)
 
 
 def test_neighbouring_samples_are_correlated_as_in_the_windows():
-    series = ResampledNoise(ar1(500, 200)).generate_series(100_000, 1)
+    series = WindowBootstrap(ar1(500, 200)).generate_series(100_000, 1)
     assert np.corrcoef(series[1:], series[:-1])[0, 1] == pytest.approx(0.9, abs=0.01)
 
 
 def test_same_seed_same_noise():
-    noise = ResampledNoise(ar1(20, 40))
+    noise = WindowBootstrap(ar1(20, 40))
     for draw in (noise.generate, noise.generate_series):
         np.testing.assert_array_equal(draw(77, 5), draw(77, 5))
         assert not np.array_equal(draw(77, 5), draw(77, 6))
@@ -50,4 +50,4 @@ def test_same_seed_same_noise():
 @pytest.mark.parametrize("windows", [np.zeros((0, 40)), np.zeros(40), np.full((2, 40), np.nan), np.zeros((3, 2))])
 def test_unusable_windows_are_refused(refused, windows):
     with refused("windows of noise"):
-        ResampledNoise(windows)
+        WindowBootstrap(windows)

@@ -5,8 +5,8 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 
 
-class ResampledNoise:
-    """Draws whole windows of real noise, with replacement.
+class WindowBootstrap:
+    """Draws whole windows of real noise, with replacement (Efron 1979).
 
     Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
     and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
@@ -25,6 +25,11 @@ class ResampledNoise:
             raise InputError(
                 f"Expected finite windows of noise of at least 4 samples. Received: shape {self.windows.shape}. Extract noise first."
             )
+
+    @classmethod
+    def fit(cls, windows: np.ndarray) -> "WindowBootstrap":
+        """Stores noise windows of shape `(windows, samples)`."""
+        return cls(windows)
 
     @property
     def scale(self) -> float:
