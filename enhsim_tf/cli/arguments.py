@@ -113,7 +113,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="generate labelled training data",
         description="Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
         "the scenario (nominal or the mode), its severity, onset and end.",
-        epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1; onset is the start\n"
+        epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1. The onset is the start\n"
         "of the degraded mode as a share of the window or series (default: 0.25). A channel without times counts as one sample per second.\n"
         + EXIT,
         **form,
@@ -245,7 +245,9 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--column", action="append", metavar="NAME", help="only this column; may be repeated (default: all numeric columns)"
     )
-    parser.add_argument("--time", metavar="NAME", help="the time column (default: detected); with none, the sample number is the time")
+    parser.add_argument(
+        "--time", metavar="NAME", help="the time column (default: detected); give 'none' to use the sample number as the time"
+    )
     parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the most frequent one)")
     _add_cleaning(parser)
 
