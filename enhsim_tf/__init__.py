@@ -1,7 +1,7 @@
 """ML-enhanced simulation: realistic telemetry from a coarse simulator (Feldman 2020, arXiv 2008.12082).
 
 The public names below are imported on first use, so `import enhsim_tf` takes milliseconds and only
-modules that hold a network import TensorFlow.
+modules that use a network import TensorFlow.
 """
 
 import importlib

@@ -43,7 +43,7 @@ from enhsim_tf import Degraded
 
 added = {}
 for name, scenario in {"healthy": None, "stuck": Degraded("stuck")}.items():
-    waveform = simulator.enhance(simulator.generate_coarse(num_windows=3, scenario=scenario, seed=7))
+    waveform = simulator.generate_clean(num_windows=3, scenario=scenario, seed=7)
     added[name] = simulator.generate(num_windows=3, scenario=scenario, seed=7) - waveform
 assert np.allclose(added["healthy"], added["stuck"], atol=1e-5)
 

@@ -45,7 +45,7 @@ import numpy as np
 
 from enhsim_tf import Degraded
 
-stuck = simulator.enhance(simulator.generate_coarse(num_windows=4, scenario=Degraded("stuck"), seed=7))
+stuck = simulator.generate_clean(num_windows=4, scenario=Degraded("stuck"), seed=7)
 added = simulator.generate(num_windows=4, scenario=Degraded("stuck"), seed=7) - stuck
 print(f"largest difference between the noises: {np.abs(added - (telemetry - clean)).max():.0e}")
 assert np.allclose(added, telemetry - clean, atol=1e-5) and np.abs(stuck - clean).max() > 0.1

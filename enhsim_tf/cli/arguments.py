@@ -17,12 +17,12 @@ from telemetry to scores:
   python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
   python -m enhsim_tf score models new.csv --out scores.parquet
 
-with a simulator of your own, which recorded simulator.csv beside the telemetry (docs/own_simulator.md):
+with simulator.csv, a recorded run of your own simulator at the times of the telemetry (docs/own_simulator.md):
   python -m enhsim_tf fit telemetry.csv --coarse simulator.csv --out models
   python -m enhsim_tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
-python -m enhsim_tf fit --help shows the options of fit; generate, verify, score and inject have help texts too. The reproduction of the
-paper is a separate command: python -m enhsim_tf.reproduce.
+python -m enhsim_tf fit --help shows the options of fit; generate, verify, score and inject have help texts too. A separate command,
+python -m enhsim_tf.reproduce, reproduces the paper.
 """
 DETECTORS = tuple(map(option_name, registry.DETECTORS))
 KINDS = "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain"
@@ -51,7 +51,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "fit",
         help="fit an enhanced simulator to nominal telemetry",
         description="Fits an enhanced simulator to each channel of nominal, periodic telemetry. The last part of the telemetry is held out,\n"
-        "and the report compares the simulator with it. A fit takes about a minute and a half per channel on two cores.",
+        "and the report evaluates the simulator on it. A fit takes about a minute and a half per channel on two cores.",
         epilog=EXIT,
         **form,
     )
@@ -68,13 +68,14 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     fit.add_argument(
         "--enhancer",
         choices=tuple(name.replace(" ", "-") for name in RUNGS),
-        help="enhancer (default: the simplest that is not measurably worse than the best on held-out time; network is the paper's)",
+        help="enhancer (default: the simplest one whose error on held-out blocks of time is not measurably larger than that of the best one); "
+        "network is the enhancer of the paper",
     )
     fit.add_argument(
         "--noise",
         choices=NOISES,
         default="convolutional",
-        help="what generates the noise (default: %(default)s); resampled, only with --coarse, draws residual windows again",
+        help="noise model (default: %(default)s); paper is the GAN of the paper; resampled (only with --coarse) reuses windows of the residual",
     )
     fit.add_argument(
         "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"
@@ -89,16 +90,21 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         default="local",
         help="run workers on this machine (default) or with Ray (docs/large_data_sets.md)",
     )
-    coarse = fit.add_argument_group("your own simulator", "a recorded run of it, at the time of the telemetry (docs/own_simulator.md)")
+    coarse = fit.add_argument_group(
+        "your own simulator", "fit with a recorded run of your simulator at the times of the telemetry (docs/own_simulator.md)"
+    )
     _add_coarse(coarse)
     coarse.add_argument(
-        "--coarse-column", action="append", metavar="NAME", help="only this coarse column; may be repeated (default: all numeric columns)"
+        "--coarse-column",
+        action="append",
+        metavar="NAME",
+        help="use only this column of the recorded run; may be repeated (default: all numeric columns)",
     )
     coarse.add_argument(
         "--delay",
         type=float,
         metavar="SECONDS",
-        help="how much later the telemetry is than the coarse run, in samples without times (default: estimated)",
+        help="delay of the telemetry relative to the recorded run, in seconds, or in samples if there are no times (default: estimated)",
     )
     _add_seed(fit)
 
@@ -107,8 +113,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="generate labelled training data",
         description="Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
         "the scenario (nominal or the mode), its severity, onset and end.",
-        epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1; onset is the start\n"
-        "of the degraded mode as a share of the window or series (default: 0.25). A channel without times has one sample per second.\n"
+        epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1. The onset is the start\n"
+        "of the degraded mode as a share of the window or series (default: 0.25). A channel without times counts as one sample per second.\n"
         + EXIT,
         **form,
     )
@@ -127,7 +133,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="a degraded mode, such as stuck:0.5; may be repeated",
     )
     series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
-    series.add_argument("--number", type=int, metavar="N", help="number of events at drawn places; the scenarios are used in turn")
+    series.add_argument("--number", type=int, metavar="N", help="number of events at random places; the scenarios are used in turn")
     series.add_argument(
         "--at",
         action="append",
@@ -136,9 +142,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="an event at a given sample or time, such as stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h; may be repeated",
     )
     series.add_argument(
-        "--length", default="100", metavar="N[:N]", help="length of drawn events in samples, or a time, or its range (default: 100)"
+        "--length", default="100", metavar="N[:N]", help="length of events at random places: samples, a time, or a range (default: 100)"
     )
-    series.add_argument("--gap", type=int, metavar="N", help="nominal samples around a drawn event (default: the longest length)")
+    series.add_argument(
+        "--gap", type=int, metavar="N", help="nominal samples around an event at a random place (default: the longest length)"
+    )
     series.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channel, is_anomaly")
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
     generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
@@ -151,7 +159,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     coarse = generate.add_argument_group("your own simulator", "for models that were fitted with --coarse (docs/own_simulator.md)")
     _add_coarse(coarse)
-    coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with another draw of noise (default: 1)")
+    coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with different noise (default: 1)")
     _add_cleaning(coarse)
     large = generate.add_argument_group(
         "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
@@ -174,8 +182,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="score telemetry with a detector trained on generated telemetry",
         description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.\n"
         "Beside SCORES it writes the alarms, one per row, to a file that ends in .events.csv: begin, end, peak, duration_s,\n"
-        "num_flagged, score and confidence. Flags at most one window apart are one alarm. It reports the expected number of false\n"
-        "alarms per day at the threshold, with its 95 % interval.",
+        "num_flagged, score and confidence. Flagged samples at most one window apart form one alarm. The command reports the\n"
+        "expected number of false alarms per day at the threshold, with its 95 % interval.",
         epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False) + f"\n{EXIT}",
         **form,
     )
@@ -188,7 +196,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     score.add_argument(
         "--false-alarm-rate", type=float, default=0.01, metavar="SHARE", help="share of generated nominal samples to flag (default: 0.01)"
     )
-    coarse = score.add_argument_group("your own simulator", "judges the difference between the telemetry and the enhanced run")
+    coarse = score.add_argument_group("your own simulator", "score the difference between the telemetry and the enhanced run")
     _add_coarse(coarse)
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(score)
@@ -196,13 +204,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     inject = commands.add_parser(
         "inject",
         help="put labelled anomalies into nominal telemetry",
-        description="Puts anomalies into nominal telemetry of your own, at drawn or given places, and writes it with labels (docs/inject.md).",
+        description="Puts anomalies into nominal telemetry of your own, at random or given places, and writes it with labels (docs/inject.md).",
         epilog=f"kinds: {KINDS}\n" + EXIT,
         **form,
     )
     _add_source(inject)
-    inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at drawn places, or all; used in turn")
-    inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at drawn places (default: one of each kind)")
+    inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at random places, or all; they are used in turn")
+    inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at random places (default: one of each kind)")
     inject.add_argument(
         "--at",
         action="append",
@@ -211,15 +219,17 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="an anomaly at a given sample or time, such as ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h; may be repeated",
     )
     inject.add_argument(
-        "--severity", default="4", metavar="SD[:SD]", help="severity in standard deviations of the noise, or its range (default: 4)"
+        "--severity", default="4", metavar="SD[:SD]", help="severity in standard deviations of the noise, or a range (default: 4)"
     )
     inject.add_argument(
-        "--length", default="100", metavar="N[:N]", help="length in samples, or a time such as 10min, or its range (default: 100)"
+        "--length", default="100", metavar="N[:N]", help="length in samples, a time such as 10min, or a range (default: 100)"
     )
     inject.add_argument(
-        "--gap", type=int, metavar="N", help="samples around a drawn anomaly that stay nominal (default: the longest length)"
+        "--gap", type=int, metavar="N", help="nominal samples around an anomaly at a random place (default: the longest length)"
     )
-    inject.add_argument("--noise-sd", type=float, metavar="SD", help="standard deviation of the noise (default: from second differences)")
+    inject.add_argument(
+        "--noise-sd", type=float, metavar="SD", help="standard deviation of the noise (default: estimated from second differences)"
+    )
     inject.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
     inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(inject)
@@ -235,7 +245,9 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--column", action="append", metavar="NAME", help="only this column; may be repeated (default: all numeric columns)"
     )
-    parser.add_argument("--time", metavar="NAME", help="the time column (default: detected; none: time is the sample number)")
+    parser.add_argument(
+        "--time", metavar="NAME", help="the time column (default: detected); give 'none' to use the sample number as the time"
+    )
     parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the most frequent one)")
     _add_cleaning(parser)
 
@@ -246,6 +258,8 @@ def _add_coarse(parser: argparse._ArgumentGroup) -> None:
 
 
 def _add_cleaning(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
-    parser.add_argument("--timezone", metavar="ZONE", help="time zone of times that name none, such as Europe/Berlin (default: UTC)")
-    parser.add_argument("--max-fill", type=int, default=5, metavar="N", help="longest gap that is interpolated (default: 5 samples)")
+    parser.add_argument(
+        "--timezone", metavar="ZONE", help="time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
+    )
+    parser.add_argument("--max-fill", type=int, default=5, metavar="N", help="longest gap, in samples, that is interpolated (default: 5)")
     parser.add_argument("--drop-bad", action="store_true", help="drop and count values and times that cannot be read, instead of stopping")

@@ -1,6 +1,6 @@
-"""Coarse simulators from other tools by the Functional Mock-up Interface (FMI); needs the optional extra `fmi` (FMPy).
+"""Coarse simulators from other tools, by the Functional Mock-up Interface (FMI). Needs the optional extra `fmi` (FMPy).
 
-An FMU contains compiled code of the tool that exported it, which runs in this process: use only FMUs that you trust.
+A Functional Mock-up Unit (FMU) contains compiled code, which runs in this process. Use only FMUs that you trust.
 """
 
 import os

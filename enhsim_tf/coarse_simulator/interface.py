@@ -1,7 +1,8 @@
-"""What a coarse simulator is to this package: anything that simulates named columns at given times (steps 1 and 2 of the pipeline).
+"""The interface of coarse simulators: objects that simulate named columns at given times (steps 1 and 2 of the pipeline).
 
-The square waves of `square_waves` have this interface, and so has a recorded run of a user's simulator, see `recording`. A
-function becomes a simulator with `FunctionSimulator`; an object of any class is one if it has the attribute and the method.
+The square waves of `square_waves` have this interface, and so have recorded runs of a user's simulator (`recording`).
+`FunctionSimulator` turns a function into a simulator. An object of any class is a simulator if it has the attribute and the method of
+`CoarseSimulator`.
 """
 
 import inspect

@@ -1,6 +1,7 @@
 """Brings telemetry and a recorded run of the coarse simulator to one clock (steps 3 and 4 of the pipeline).
 
-Both are cut to the time that they share. A constant delay between them is estimated by cross-correlation, unless it is given.
+The telemetry and the run are cut to the time that they share. A constant delay between them is estimated by cross-correlation,
+unless it is given.
 """
 
 import dataclasses

@@ -1,6 +1,7 @@
 """Recorded runs of a user's simulator: several columns on one clock (step 3 of the pipeline, "which is also recorded").
 
-A recording is a coarse simulator, too: it returns what was recorded at given times, and refuses times that it does not cover.
+A recording has the interface of a coarse simulator: it returns the recorded values at given times, and refuses times that it does not
+cover.
 """
 
 import dataclasses

@@ -1,4 +1,4 @@
-"""Degraded modes at given places in a series: each begins, ends, and is followed by nominal operation."""
+"""Degraded modes at given places in a series: each mode begins, ends, and is followed by nominal operation."""
 
 import dataclasses
 import itertools

@@ -1,7 +1,7 @@
 """Generates large data sets with worker processes, and resumes them after an interruption.
 
-The main process assigns numbers of shards to workers and records finished shards; it neither holds windows nor loads networks.
-If the folder contains a part of the same data set, its shards are verified, and missing or damaged shards are generated. The
+The main process assigns numbers of shards to workers and records finished shards. It neither holds windows nor loads networks.
+If the folder contains a part of the same data set, the shards in it are verified, and missing or damaged shards are generated. The
 bytes of the result do not depend on the engine, the number of workers or the number of interruptions.
 """
 

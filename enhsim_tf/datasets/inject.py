@@ -1,4 +1,4 @@
-"""Anomalies in a user's own nominal telemetry: a labelled test set without a simulator."""
+"""Makes a labelled test set without a simulator, by adding anomalies to a user's own nominal telemetry."""
 
 import dataclasses
 from collections.abc import Sequence

@@ -1,13 +1,13 @@
-"""The columns of labels, which every labelled table of this package has: series, windows, shards and injected telemetry.
+"""The label columns of every labelled table of this package: series, windows, shards and injected telemetry.
 
 - `scenario`: `nominal`, or the degraded mode or kind of anomaly
-- `severity`: its severity; 0 if nominal
+- `severity`: severity of the mode or anomaly; 0 if nominal
 - `onset`: first changed sample; null if nominal
 - `end`: first sample after the last changed one; null if nominal
 - `mask`: whether the sample was changed
 
 In a table of one row per sample, the labels describe the event that changed the sample, and samples are counted by rows of the
-table. In a table of one row per window, they describe the window, whose samples are counted from 0, and `mask` is a list.
+table. In a table of one row per window, the labels describe the window. Its samples are counted from 0, and `mask` is a list.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Labelled training data from recorded runs: copies of a run, with the columns that label it carried to every row."""
+"""Labelled training data from recorded runs: copies of a run with different noise, whose rows keep the labels of the run."""
 
 import os
 from collections.abc import Mapping

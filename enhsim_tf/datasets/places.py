@@ -1,4 +1,4 @@
-"""Places of events on the command line: `KIND[:SEVERITY]@BEGIN/LENGTH`, and ranges from which events draw their length."""
+"""Parses the places of events on the command line, `KIND[:SEVERITY]@BEGIN/LENGTH`, and the ranges of their random lengths."""
 
 import dataclasses
 import re

@@ -1,4 +1,4 @@
-"""The form of a scenario file, in a module of its own: only who reads such a file needs pydantic."""
+"""The schema of a scenario file. It is a separate module, so that only reading such a file imports pydantic."""
 
 import math
 from collections.abc import Callable

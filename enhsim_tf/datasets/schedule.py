@@ -1,4 +1,4 @@
-"""Schedules of degraded modes in a generated series: events at given and drawn places, each followed by nominal operation."""
+"""Schedules of degraded modes in a generated series: events at given and random places, each followed by nominal operation."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING

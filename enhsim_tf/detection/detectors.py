@@ -1,4 +1,4 @@
-"""Anomaly detectors without neural networks, and trivial controls (title and abstract of the paper, which trains no detector).
+"""Anomaly detectors without neural networks, and trivial detectors as controls (title and abstract of the paper).
 
 All detectors have the interface `Detector`: `fit(windows)` takes nominal windows, and `score(windows)` returns one score for each
 window, where higher is more anomalous. `registry` lists all detectors by name.

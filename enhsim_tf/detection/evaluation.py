@@ -2,8 +2,8 @@
 
 An arm of the experiment is a kind of training data, for example windows of the enhanced simulator. Each detector is trained on
 one arm, and its threshold is set on held-out windows of the same arm. If the arm and real telemetry were exchangeable, the
-false-alarm rate on real nominal windows would be at most the nominal rate. The excess over that rate measures the gap between
-simulation and reality.
+false-alarm rate on real nominal windows would be at most the nominal rate. The excess of the
+false-alarm rate over the nominal rate measures the gap between simulation and reality.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """Alarms as events: runs of flagged samples, event-wise precision and recall, alarm timing, and expected false alarms per day.
 
-An operator counts alarms and not samples. The event-wise measures follow the European Space Agency's Anomaly Detection Benchmark
+An operator counts alarms, not samples. The event-wise measures follow the European Space Agency's Anomaly Detection Benchmark
 (ESA-ADB; Kotowski et al. 2024, arXiv 2406.17826), whose correction of precision is that of Sehili and Zhang (2023, arXiv
 2308.13068). Events are half-open ranges of samples `(begin, end)`.
 """

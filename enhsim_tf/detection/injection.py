@@ -1,4 +1,4 @@
-"""Injects anomalies into a nominal series at given or drawn places, with labels that mark exactly the changed samples.
+"""Injects anomalies into a nominal series at given or random places, with labels that mark exactly the changed samples.
 
 The kinds of anomaly are those of `anomalies.INJECTIONS`, and their severity is in units of the standard deviation of the noise.
 Unlike `anomalies.inject_into_trace`, the functions of this module accept several kinds, severities and lengths in one series,

@@ -1,7 +1,7 @@
-"""Estimates of telemetry windows without a network, for pairs of coarse and telemetry windows (section 2.2).
+"""Baselines for the enhancing network: estimates of telemetry windows from coarse windows without a network (section 2.2).
 
-They get what the network gets: the same pairs without the flat ones, in the units of the simulator. The estimate takes the offset and
-the gain of each window, as that of the network does.
+The baselines receive the same data as the network: the same pairs without the flat ones, in the units of the simulator. Their
+estimates take the offset and the gain of each window, as the estimates of the network do.
 """
 
 from collections.abc import Callable

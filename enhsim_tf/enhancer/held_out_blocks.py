@@ -1,6 +1,6 @@
-"""Contiguous blocks of time, on which an enhancer is judged (an addition to section 2.2 of the paper).
+"""Contiguous blocks of time on which an enhancer is evaluated (an addition to section 2.2 of the paper).
 
-Windows that overlap share samples, so a random split would judge an enhancer on samples that it has learnt. Here, the time is
+Windows that overlap share samples, so a random split would evaluate an enhancer on samples that it was trained on. Here, the time is
 cut into contiguous blocks, some blocks are held out, and training windows that overlap a held-out block are left out.
 """
 

@@ -1,8 +1,9 @@
-"""A ladder of enhancers, from the coarse simulator itself to the paper's network, judged on held-out time (section 2.2).
+"""A ladder of enhancers, from the coarse simulator itself to the paper's network, evaluated on held-out time (section 2.2).
 
 The paper's network is one of several maps from coarse to realistic windows. This module fits several of them, measures the
-error of each on blocks of time that it has not learnt from, and chooses the simplest one that is not measurably worse than the
-best one. Every rung is expressed as a Keras network, so that all of them are saved and loaded in the same way.
+error of each on blocks of time that it was not trained on, and chooses the simplest map that is not measurably worse than the
+best one. Each map is a rung of the ladder. Every rung is expressed as a Keras network, so that all of them are saved and loaded in
+the same way.
 """
 
 import dataclasses

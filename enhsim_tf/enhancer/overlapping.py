@@ -1,4 +1,4 @@
-"""Runs of any length from windows that overlap, without seams (step 5 of the paper's pipeline, for more than one window)."""
+"""Enhances runs of any length, without seams, by averaging overlapping windows (step 5 of the paper's pipeline)."""
 
 from collections.abc import Callable
 

@@ -1,6 +1,6 @@
-"""Ridge regression and the mean of the nearest training windows: what an enhancer has to beat (section 2.2).
+"""Ridge regression and the mean of the nearest training windows: the baselines of an enhancer (section 2.2).
 
-Both map coarse windows to telemetry windows without a network. Their one setting is chosen by cross-validation over blocks of
+Both map coarse windows to telemetry windows without a network. Each has one setting, which is chosen by cross-validation over blocks of
 time, and neither result depends on the units of the windows.
 """
 

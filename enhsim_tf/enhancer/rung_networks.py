@@ -1,4 +1,4 @@
-"""Linear maps, and sums of maps, as Keras networks, so that every enhancer of the ladder is saved in the same way."""
+"""Keras networks that compute linear maps and sums of maps, so that every enhancer of the ladder is saved in the same way."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Units of an enhancer with several coarse columns: each column and the target are centred and divided by one deviation."""
+"""Standardisation for an enhancer with several coarse columns: each column and the target are centred and scaled."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,6 @@
 """Training pairs of the enhancer: coarse windows and telemetry windows of the same times (section 2.2, steps 3 and 4 of the pipeline).
 
-In the paper, the simulator and the telemetry share one clock and one level at all times. The clock and the level of a
+In the paper, the simulator and the telemetry have the same clock and the same level at all times. The clock and the level of a
 real channel drift. For such a channel, the simulator's clock, level and amplitude are fitted to each window, as they would
 be for a simulator that runs beside a vehicle. The fitted values are stored with the pair.
 """

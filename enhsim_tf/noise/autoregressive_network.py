@@ -2,9 +2,10 @@
 
 The probability density of a window is the product of the densities of its samples, each given all samples before it. A network
 that predicts these conditional densities can represent any stationary noise, up to its capacity: no correlation time, no period
-and no pulse is built into it. It sees the last samples one by one, and the whole past of the window as averages of the value and
-of its magnitude over the last 2, 4, 8, ... samples. The density of a sample is a mixture of Student's t distributions, so that it
-can have several modes, a skew and heavy tails. Training maximises the likelihood, which held-out windows measure as well.
+and no pulse is built into the network. The network receives the last samples one by one, and the whole past of the window as
+averages of the value and of its magnitude over the last 2, 4, 8, ... samples. The density of a sample is a mixture of Student's t
+distributions, so that it can have several modes, a skew and heavy tails. Training maximises the likelihood. The likelihood of
+held-out windows measures how well the network fits.
 
 References:
     Bishop, "Mixture density networks", 1994.

@@ -1,9 +1,9 @@
-"""Training of noise networks that cannot end in networks that are not finite (section 2.3).
+"""Guarded training of noise networks: the weights and the outputs of the result are always finite (section 2.3).
 
 Adversarial training may diverge, for example where the noise is zero over long stretches. The weights and the generated noise are
-therefore checked while a network trains. Training that diverges goes on from the last good state with a smaller learning rate. If
-that fails too, the noise is Gaussian noise with the spectrum of the real noise (`linear_noise`), which needs no training. A training
-that does not diverge is not affected: its weights are the same to the bit.
+therefore checked while a network trains. If training diverges, it continues from the last good state with a smaller learning rate.
+If that fails too, the generator is replaced by Gaussian noise with the spectrum of the real noise (`linear_noise`), which needs no
+training. The checks do not affect training that does not diverge: its weights are the same to the bit.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,7 @@
-"""A ladder of noise models, from none to learnt ones (an extension of section 2.3).
+"""A ladder of noise models, from no noise to trained networks (an extension of section 2.3).
 
-Which rung suffices depends on the noise. `enhanced_simulator.noise_choice` judges the rungs on held-out noise.
+Each noise model is a rung of the ladder. The simplest rung that suffices depends on the noise.
+`enhanced_simulator.noise_choice` evaluates the rungs on held-out noise.
 """
 
 from collections.abc import Callable

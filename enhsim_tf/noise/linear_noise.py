@@ -1,4 +1,4 @@
-"""Gaussian noise with the spectrum of real noise, in the form of noise networks, so that it is saved and generated as they are."""
+"""Gaussian noise with the spectrum of real noise, as Keras networks, so that it is saved and generated like a trained noise network."""
 
 import numpy as np
 

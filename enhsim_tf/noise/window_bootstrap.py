@@ -1,4 +1,4 @@
-"""Residual windows drawn again: real noise, in whole windows, as a noise model without a network (a baseline of section 2.3)."""
+"""Resampled residuals: a noise model without a network that draws whole windows of real noise (a baseline of section 2.3)."""
 
 import numpy as np
 

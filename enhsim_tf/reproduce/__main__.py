@@ -20,11 +20,11 @@ examples:
   python -m enhsim_tf.reproduce --experiment factorial
                                                      which part of the pipeline lowers false alarms; takes hours, can be interrupted
   python -m enhsim_tf.reproduce --experiment labelled --data DIR
-                                                     real telemetry with labelled anomalies; some minutes per channel
+                                                     detectors on real telemetry with labelled anomalies; some minutes per channel
   python -m enhsim_tf.reproduce --experiment battery
-                                                     a real pair of simulators: a battery in PyBaMM; some minutes per seed
+                                                     a coarse and a fine simulator of a battery (PyBaMM); some minutes per seed
 
-exit code: 0 every claim has its expected verdict, 1 a verdict changed, 2 the input or an option cannot be used
+exit code: 0 every claim has its expected verdict, 1 at least one claim has another verdict, 2 the input or an option cannot be used
 """
 
 
@@ -57,7 +57,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "--budget", choices=("smoke", "full"), default="full", help="numbers of windows, epochs and iterations (default: full)"
+        "--budget",
+        choices=("smoke", "full"),
+        default="full",
+        help="size of the run: numbers of windows, epochs and iterations (default: full)",
     )
     parser.add_argument("--telemetry", type=Path, metavar="PATH", help="run the pipeline on a real channel: .npy, .csv or .parquet")
     parser.add_argument("--column", help="column with the values: a number for .npy, otherwise a name")
@@ -82,11 +85,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--experiment",
         choices=EXPERIMENTS,
-        help="instead of the paper: robustness trains detectors with each kind of noise; factorial combines windows, extraction, enhancer and "
-        "generator; noise tries noise models on fourteen families; labelled tests detectors on real telemetry with labelled anomalies; battery "
-        "enhances a coarse battery simulator to a fine one",
+        help="run an experiment instead of the paper: robustness trains detectors with each kind of noise; factorial combines windows, extraction, enhancer and "
+        "generator; noise tries noise models on fourteen families of noise; labelled tests detectors on real telemetry with labelled anomalies; battery "
+        "enhances a coarse simulator of a battery with the help of a fine one",
     )
-    parser.add_argument("--data", type=Path, metavar="DIR", help="labelled telemetry: train/, test/ and labeled_anomalies.csv")
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="folder of labelled telemetry, with train/, test/ and labeled_anomalies.csv"
+    )
     parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
     parser.add_argument("--environment", choices=FAMILIES, help="run the experiment with this kind of noise only (default: all)")
     parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds of the experiment (default: 10, factorial: 5)")

@@ -144,14 +144,14 @@ def test_old_content_is_restored_after_a_kill_between_the_two_renames(tmp_path, 
     script = """
 import os, signal, sys
 from enhsim_tf.common import atomic_files
-files._exchange = lambda first, second: False
+atomic_files._exchange = lambda first, second: False
 rename = os.replace
 def killed(source, destination):
     rename(source, destination)
     if str(destination).endswith(".old"):
         os.kill(os.getpid(), signal.SIGKILL)
 os.replace = killed
-with files.replace_folder(sys.argv[1]) as temporary:
+with atomic_files.replace_folder(sys.argv[1]) as temporary:
     (temporary / "inside").write_text("new")
 """
     assert subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT).returncode == -9
@@ -330,8 +330,8 @@ def test_leftovers_of_exchanged_files_and_links_are_removed(tmp_path):
     script = """
 import os, signal, sys
 from enhsim_tf.common import atomic_files
-files._remove = lambda path: os.kill(os.getpid(), signal.SIGKILL)
-with files.replace_folder(sys.argv[1]) as temporary:
+atomic_files._remove = lambda path: os.kill(os.getpid(), signal.SIGKILL)
+with atomic_files.replace_folder(sys.argv[1]) as temporary:
     (temporary / "inside").write_text("new")
 """
     (tmp_path / "file").write_text("old")

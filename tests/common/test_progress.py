@@ -320,7 +320,7 @@ def table(folder):
     return folder / "x.csv"
 
 
-FIT = ("--num-windows", "30", "--epochs", "3", "--iterations", "3", "--noise", "paper")
+FIT = ("--num-windows", "30", "--epochs", "3", "--iterations", "3", "--noise", "paper", "--enhancer", "network")
 
 
 def test_fitting_processes_name_their_channel(tmp_path, environment):

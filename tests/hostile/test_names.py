@@ -129,7 +129,7 @@ def test_scores_and_refusals_of_hostile_channels_stay_in_their_folder(models, tm
     before = files_below(tmp_path)
     assert main(["score", str(models), str(source), "--windows", "40", "--detector", "limit-check", "--out", str(out)]) == 0
     made = files_below(tmp_path) - before
-    assert {path.parent for path in made} == {out} and len(made) == len(names)
+    assert {path.parent for path in made} == {out} and len(made) == 2 * len(names)  # scores and events
     lines_of(capfd)
     table_of(["\x1b[31munknown\nname"]).to_parquet(source)
     assert main(["score", str(models), str(source), "--out", str(out)]) == 2

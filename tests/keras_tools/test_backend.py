@@ -47,7 +47,7 @@ def test_settings_that_mean_nothing_do_no_harm():
 
 def test_another_backend_of_keras_is_refused_in_one_line():
     ended = run(
-        "from enhsim_tf.cli.options import load\nfrom enhsim_tf.common.console import run_command\nexit(run_command(lambda: load('none'), ''))",
+        "import importlib\nfrom enhsim_tf.common.console import run_command\nexit(run_command(lambda: importlib.import_module('enhsim_tf.keras_tools.backend'), ''))",
         KERAS_BACKEND="jax",
     )
     assert ended.returncode == 2 and ended.stdout == ""

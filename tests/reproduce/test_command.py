@@ -105,7 +105,8 @@ def test_results_hold_the_ledger_and_the_table_says_the_same(smoke):
     for claim in found["claims"]:
         assert {"id", "sentence", "section", "figure", "statistic", "value", "tolerance", "verdict", "finding"} <= set(claim)
         assert claim["verdict"] in {"reproduced", "partly", "not reproduced", "not tested by the paper"}
-        assert isinstance(claim["value"], float) and np.isfinite(claim["value"])
+        is_none = claim["value"] is None and claim["id"] == "C4"  # no iteration from which the noise stays within tolerance
+        assert is_none or (isinstance(claim["value"], float) and np.isfinite(claim["value"]))
         assert any(line.startswith(claim["id"]) and claim["verdict"] in line for line in smoke.done.stdout.splitlines())
     assert found["verdict"] in smoke.done.stdout and str(smoke.out) in smoke.done.stdout
 
@@ -138,9 +139,11 @@ def test_another_seed_gives_other_numbers(again):
     spread = json.loads((again.out / "spread.json").read_text(encoding="utf-8"))
     assert (spread["budget"], spread["seeds"]) == ("smoke", [0, 1])
     for claim in again.found["claims"]:
+        if claim["value"] is None:  # C4: no iteration from which the noise stays within tolerance
+            continue
         low, high = spread["claims"][claim["id"]]["range"]
         assert low <= claim["value"] <= high and len(spread["claims"][claim["id"]]["verdicts"]) == 2
-        if claim["id"] in ("C1", "C4", "C6", "C9"):
+        if claim["id"] in ("C1", "C6", "C9"):
             assert low < high
 
 

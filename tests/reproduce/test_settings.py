@@ -61,6 +61,8 @@ COUNTS = {
     "labelled.num_arm_windows",
     "labelled.max_order",
     "battery.num_seeds",
+    "labelled.num_folds",
+    "labelled.num_seeds",
     "ladder.num_windows",
     "ladder.num_iterations",
     "ladder.gan_iterations",

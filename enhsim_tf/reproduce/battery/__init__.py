@@ -1,1 +1,1 @@
-"""A real pair of simulators: a satellite's battery over low orbits, computed by PyBaMM with a coarse and a fine model."""
+"""The experiment with a coarse and a fine simulator: PyBaMM models of a satellite's battery over low orbits."""

@@ -1,1 +1,1 @@
-"""The factorial experiment: which part of the pipeline lowers false alarms: windows, extraction, enhancer or generator."""
+"""The factorial experiment: which part of the pipeline (windows, extraction, enhancer or generator) lowers false alarms."""

@@ -1,1 +1,1 @@
-"""The experiment on noise that no generator was designed for, and on how little telemetry suffices."""
+"""The experiments on noise for which no generator was designed, and on the amount of telemetry that suffices for training."""

@@ -17,12 +17,12 @@ def objections(found: Findings, factorial: Findings | None = None, labelled: Fin
     """
     return [
         {
-            "objection": "Ridge regression, the baseline, has a fixed penalty on unscaled values, so that it depends on the unit of the channel and is too weak.",
-            "outcome": "Right. There is one ridge regression now, on standardised values with a penalty chosen by cross-validation over blocks of time "
+            "objection": "Ridge regression, the baseline, has a fixed penalty on unscaled values, so that it depends on the unit of the channel and is too weak a baseline.",
+            "outcome": "Right. The project now has a single ridge regression, on standardised values with a penalty chosen by cross-validation over blocks of time "
             "(`enhancer/ridge.py`). The README's table of claims compares the enhancer with it.",
         },
         {
-            "objection": "In the study of real telemetry, arms learn from unequal data, and finds have no chance level.",
+            "objection": "In the study of real telemetry, the arms learn from unequal amounts of data, and the share of anomalies found is not compared with chance.",
             "outcome": _labelled(labelled),
         },
         {
@@ -35,8 +35,9 @@ def objections(found: Findings, factorial: Findings | None = None, labelled: Fin
             "`python -m enhsim_tf.reproduce --experiment noise` tries the noise models on families of noise for which no design was chosen.",
         },
         {
-            "objection": "The verdict in the title rests on three seeds.",
-            "outcome": "The claims are judged on ten seeds, and the title follows the majority. [verdicts.md](verdicts.md) compares the earlier and the present verdicts.",
+            "objection": "The verdict in the title of the README rests on three seeds.",
+            "outcome": "The claims are judged on ten seeds, and the verdict in the title follows the majority. "
+            "[verdicts.md](verdicts.md) compares the earlier and the present verdicts.",
         },
         {
             "objection": "Labels of generated anomalies mark samples and windows that are identical to nominal ones.",
@@ -44,13 +45,13 @@ def objections(found: Findings, factorial: Findings | None = None, labelled: Fin
             "labelled if the fault changes it, and a window that no fault changes is nominal.",
         },
         {
-            "objection": "Some claims are judged by a weaker statement than the paper's, and C8 and C9 are worded differently in different places.",
+            "objection": "Some claims are judged by a statement that is weaker than that of the paper, and C8 and C9 are worded differently in different places.",
             "outcome": "The rules were changed before a new run on ten seeds; [verdicts.md](verdicts.md) names each change and its reason. This report uses the criterion "
             f"of C8 for all pairs of environment and detector and says that the claim {verdict_c8(found)}.",
         },
         {
-            "objection": "Log-odds of alarms reward noise that is too loud, and four chosen environments are no population.",
-            "outcome": "Right. Recall and recall at the real rate stand beside every false-alarm rate, and the intervals over environments are described as narrow.",
+            "objection": "Log-odds of alarms reward noise that is too loud, and four chosen environments are not a sample of all environments.",
+            "outcome": "Right. Recall and recall at the real rate are given with every false-alarm rate, and the intervals over environments are described as narrow.",
         },
         {
             "objection": "The most important experiment is missing: a pipeline without any network.",
@@ -64,17 +65,17 @@ def _labelled(labelled: Findings | None) -> str:
         return "The study has not been run."
     real = interval(labelled["arms"]["real"]["false_alarms"])
     if "contrasts" not in labelled:  # findings of the study before its arms had equal data
-        return f"Not settled here: the study has to be run again with equal data. Detectors trained on the real past alarm on {real} of later nominal windows."
+        return f"This objection is not settled here: the study has to be run again with equal data. Detectors trained on the real past flag {real} of later nominal windows."
     controls = {name: about["matched"][1] for name, about in labelled["controls"].items()}
     best = max(controls, key=lambda name: controls[name]["mean"])
     arms = {name: about["matched"][1] for name, about in labelled["arms"].items() if len(about["by_detector"]) > 1}
     strongest = max(arms, key=lambda name: arms[name]["mean"])
     return (
-        "Right. Every arm now learns from all of the training part and sets its thresholds on windows that the detector did not learn from, cross-fitted over "
-        "blocks of time where they are real. Detectors trained on the real past "
-        f"alarm on {real} of later nominal windows. At matched false-alarm rates of {per_cent(labelled['rates'][1], 0)}, the best arm ({strongest}) finds "
-        f"{interval(arms[strongest], 0)} of the labelled sequences, the best score of one line ({best}) {interval(controls[best], 0)}, and chance "
-        f"{per_cent(arms[strongest]['chance'], 0)}."
+        "Right. Every arm now learns from all of the training part, and thresholds are set on windows that the detector did not learn from. Where these windows "
+        "are real, they come from blocks of time that are held out in turn (cross-fitting). Detectors trained on the real past "
+        f"flag {real} of later nominal windows. At a false-alarm rate of {per_cent(labelled['rates'][1], 0)} for all detectors, the best arm ({strongest}) finds "
+        f"{interval(arms[strongest], 0)} of the labelled sequences, the best score of one line of code ({best}) finds {interval(controls[best], 0)}, and chance "
+        f"finds {per_cent(arms[strongest]['chance'], 0)}."
     )
 
 
@@ -99,6 +100,6 @@ def _without_network(factorial: Findings | None) -> str:
     if about is None:
         return "The factorial experiment contains it; it has not been run yet."
     return (
-        f"It was run: ridge regression with whole windows of its residuals gives {interval(about['false_alarms'])} false alarms and closes "
+        f"This experiment was run: ridge regression with whole windows of its residuals gives {interval(about['false_alarms'])} false alarms and closes "
         f"{per_cent(about['gap_closed'], 0)} of the gap."
     )

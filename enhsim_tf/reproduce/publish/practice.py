@@ -47,10 +47,11 @@ def _clean(found: Findings) -> str:
         else f"It met the criterion of C8 in {kept} of {2 * truth['c8']['of']} pairs here"
     )
     return (
-        f"**A clean simulator suffices**, if at all, where noise is negligible. {where}: detectors trained on a perfect but noiseless signal alarm on "
-        f"{per_cent(truth['false_alarms']['mean'])} of real nominal windows and those trained on the coarse simulator on "
-        f"{per_cent(coarse['false_alarms']['mean'])}; even with thresholds set on real windows, they find {per_cent(truth['recall_at_real_rate'])} and "
-        f"{per_cent(coarse['recall_at_real_rate'])} of the anomalies, against {per_cent(real['recall_at_real_rate'])} after training on real telemetry."
+        f"**A clean simulator suffices**, if at all, where noise is negligible. {where}. Detectors trained on a perfect but noiseless signal flag "
+        f"{per_cent(truth['false_alarms']['mean'])} of real nominal windows, and detectors trained on the coarse simulator flag "
+        f"{per_cent(coarse['false_alarms']['mean'])}. Even with thresholds set on real windows, these detectors find "
+        f"{per_cent(truth['recall_at_real_rate'])} and {per_cent(coarse['recall_at_real_rate'])} of the anomalies, against "
+        f"{per_cent(real['recall_at_real_rate'])} after training on real telemetry."
     )
 
 
@@ -65,10 +66,10 @@ def _linear(factorial: Findings | None) -> str:
     everywhere = len(within) == len(against["by_environment"])
     where = "in every environment" if everywhere else f"on {in_list(within)} noise" if within else "in none of the environments"
     return (
-        f"**A linear map and resampled residuals suffice** {where} here, to within {points(MARGIN)} points of false alarms: ridge regression plus whole "
-        f"windows of its residuals, without any network, gives {interval(about['false_alarms'])} false alarms, against {interval(real['false_alarms'])} after "
-        f"training on real telemetry, and meets the criterion of C8 in {about['kept']} of {about['pairs']} pairs of environment and detector{others}. "
-        "Start with this, and keep what beats it."
+        f"**A linear map and resampled residuals suffice** {where} here, to within {points(MARGIN)} percentage points of false alarms. This method adds whole "
+        "windows of the residuals to the output of ridge regression, without any network. Detectors trained in this way meet the criterion of claim C8 in "
+        f"{about['kept']} of {about['pairs']} pairs of environment and detector. They flag {interval(about['false_alarms'])} of real nominal windows, against "
+        f"{interval(real['false_alarms'])} after training on real telemetry{others}. Start with this method, and replace it only by a method that gives better results."
     )
 
 
@@ -76,15 +77,16 @@ def _network(found: Findings, factorial: Findings | None) -> str:
     errors = found["modes"]["nrmse"]
     network, ridge = errors["randomised"], errors["ridge, randomised"]
     degraded = (
-        f"in degraded modes, with training on randomised configurations and their true response, its error is {network['inside']:.2f} within the trained "
-        f"severities and {network['outside']:.2f} beyond, against {ridge['inside']:.2f} and {ridge['outside']:.2f} for ridge regression"
+        "In degraded modes, if it is trained on randomised configurations and their true response, the network has a normalised root-mean-square error of "
+        f"{network['inside']:.2f} for severities within the training range and {network['outside']:.2f} beyond it, against {ridge['inside']:.2f} and "
+        f"{ridge['outside']:.2f} for ridge regression"
     )
     nominal = _difference(factorial, "network, ridge")
     if nominal is None:
-        return f"**A network pays**, as far as is known, where the map is not linear: {degraded}; on nominal telemetry the comparison is not measured yet."
+        return f"**A network pays**, as far as is known, where the map is not linear. {degraded}. On nominal telemetry the comparison is not measured yet."
     return (
-        f"**A network pays** where the map is not linear: {degraded}. On nominal telemetry it {_effect(factorial, 'network, ridge')}: with the same windows and "
-        f"resampled residuals, replacing ridge regression by the network changes them by {points(nominal)} points ({_seeds(factorial, 'network, ridge')})."
+        f"**A network pays** where the map is not linear. {degraded}. On nominal telemetry it {_effect(factorial, 'network, ridge')}: with the same windows and "
+        f"resampled residuals, replacing ridge regression by the network changes the false-alarm rate by {points(nominal)} points ({_seeds(factorial, 'network, ridge')})."
     )
 
 
@@ -93,30 +95,31 @@ def _noise(factorial: Findings | None) -> str:
     chosen = next(((name, enhancer) for name, enhancer in known if _difference(factorial, name) is not None), None)
     if chosen is None:
         return (
-            "**Generated noise pays**, as far as is known, where more or longer stretches of noise are needed than were recorded: resampled residuals "
-            "never contain anything new. The comparison of its false alarms with those of whole residual windows is not measured yet."
+            "**Generated noise pays**, as far as is known, where the application needs more noise, or longer stretches of noise, than were recorded, because "
+            "resampled residuals never contain anything new. The comparison of its false alarms with those of whole residual windows is not measured yet."
         )
     name, enhancer = chosen
     return (
-        f"**Generated noise pays** where more or longer stretches of noise are needed than were recorded, because resampled residuals never contain anything "
-        f"new. It {_effect(factorial, name)} here: with {enhancer} and the same residuals, replacing whole windows by the convolutional GAN changes them by "
-        f"{points(_difference(factorial, name))} points ({_seeds(factorial, name)})."
+        f"**Generated noise pays** where the application needs more noise, or longer stretches of noise, than were recorded, because resampled residuals never "
+        f"contain anything new. It {_effect(factorial, name)} here: with {enhancer} and the same residuals, replacing whole residual windows by noise of the "
+        f"convolutional GAN changes the false-alarm rate by {points(_difference(factorial, name))} points ({_seeds(factorial, name)})."
     )
 
 
 def _nothing(labelled: Findings | None) -> str:
     if labelled is None:
-        return "**Nothing here helps enough** where telemetry changes after training; this is not measured yet."
+        return "**Nothing here helps enough** where telemetry changes after training. This is not measured yet."
     arms = labelled["arms"]
     controls = {name: about for name, about in labelled["controls"].items() if "found" in about}
     best = max(controls, key=lambda name: controls[name]["auc_pr"])
     rates = {name: mean_of(about["false_alarms"]) for name, about in (arms | controls).items()}
     quiet = min((name for name in arms if " + " in name), key=rates.__getitem__)
     return (
-        f"**Nothing here helps enough** where nominal telemetry itself changes after training: on {len(labelled['channels'])} channels of a spacecraft, detectors "
-        f"trained on the real past alarm on {per_cent(rates['real'])} of later nominal windows, and with the best generated telemetry (*{quiet}*) on "
-        f"{per_cent(rates[quiet])}, against {per_cent(rates[best])} for a score of one line ({best}), which ranks labelled samples with an AUC-PR of "
-        f"{controls[best]['auc_pr']:.2f}, against {max(about['auc_pr'] for about in arms.values()):.2f} for the best arm."
+        f"**Nothing here helps enough** where nominal telemetry itself changes after training. On {len(labelled['channels'])} channels of a spacecraft, detectors "
+        f"trained on the real past flag {per_cent(rates['real'])} of later nominal windows, and detectors trained on the generated telemetry with the fewest "
+        f"false alarms (*{quiet}*) flag {per_cent(rates[quiet])}. A simple score of one line of code ({best}) flags {per_cent(rates[best])}. The area under the "
+        f"precision-recall curve (AUC-PR) on the labelled samples is {controls[best]['auc_pr']:.2f} for this score, and "
+        f"{max(about['auc_pr'] for about in arms.values()):.2f} for the best kind of training data."
     )
 
 

@@ -62,7 +62,7 @@ def test_every_figure_is_drawn_and_every_claim_that_can_be_is_judged(run, name):
     assert found["source"] == f"{name}.npy"
     measured = {claim["id"]: claim for claim in found["claims"] if claim["verdict"] != "not measured"}
     assert list(measured) == ["C1", "C2", "C4", "C5", "C6", "C7"]
-    assert all(np.isfinite(claim["value"]) for claim in measured.values())
+    assert all(claim["value"] is None or np.isfinite(claim["value"]) for claim in measured.values())  # C4 may have no iteration
     errors = measured["C1"]["details"]
     assert 0 < errors["ridge_nrmse"] < errors["identity_nrmse"] < 1.5
     assert errors["synchronised_identity_nrmse"] < errors["identity_nrmse"], "a clock that is set is nearer than one that runs free"

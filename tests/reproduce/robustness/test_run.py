@@ -75,7 +75,7 @@ def test_figures_are_marked_and_findings_are_json(done):
 def test_a_second_run_trains_nothing_and_says_the_same(done):
     folder, first = done
     again = run(folder)
-    assert again.returncode == 0 and " ...\n" not in again.stdout and again.stdout.count("(from the cache)") == 9
+    assert again.returncode == 0 and " ...\n" not in again.stdout and again.stdout.count("(from the cache)") == 10
     assert again.stdout.split("\n\n")[1] == first.split("\n\n")[1]
 
 

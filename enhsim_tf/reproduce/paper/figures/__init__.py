@@ -1,7 +1,7 @@
 """The figures of the paper, one module each.
 
-To add a figure, write a module of this package whose name is that of the figure, such as `fig15_my_figure`, and which defines
-`FIGURE`, a `PaperFigure`. Nothing else has to be changed: the names of the figures are those of the modules.
+To add a figure, write a module in this package, for example `fig15_my_figure`, that defines `FIGURE`, a `PaperFigure`. Nothing else has
+to be changed: the name of the module is the name of the figure.
 """
 
 import importlib
