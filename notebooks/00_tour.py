@@ -199,7 +199,6 @@ with drawing(alt, 3, 1.7, sharey=True) as panels:
 # %%
 rates = dict(zip(found["arms"], found["false_alarm_rate"]))
 recall = dict(zip(found["arms"], found["recall"]))
-assert rates["enhanced"][0] > 0.5
 if experiment.settings.budget == "full":  # noise of the wrong size would teach a detector nothing
     assert rates["enhanced"].min() > 0.5
     assert rates["enhanced + GAN noise"][0] > 0.9 and rates["enhanced + Gaussian noise"].max() < 0.15

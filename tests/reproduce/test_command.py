@@ -214,7 +214,7 @@ def _start_and_kill(arguments, pattern, pause_s=0.0, drawn=None):
 def test_killed_in_each_stage_it_ends_with_the_same_numbers(smoke, tmp_path):
     cache, out = tmp_path / "cache", tmp_path / "out"
     arguments = ["--budget", "smoke", "--out", str(out), "--cache", str(cache)]
-    pauses = {"enhancer": 0.5, "noise GAN": 1.5, "false alarms": 0.7}  # long stages are killed well inside
+    pauses = {"telemetry": 0.0, "enhancer": 0.5, "noise GAN": 1.5, "false alarms": 0.7}  # long stages are killed well inside
     for number, stage in enumerate(STAGES):
         said = _start_and_kill(arguments, rf"{stage} \.\.\.", pauses.get(stage, 0.05))
         for earlier in STAGES[: max(number - 1, 0)]:  # the last one before was killed in its turn and is done anew

@@ -163,6 +163,8 @@ def is_balanced(experiment: Experiment) -> Outcome:
 def binomial_interval(share: float, number: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a binomial share of `number` independent rows."""
     z = 1.959964
+    if not number:  # nothing was counted, so nothing is known
+        return 0.0, 1.0
     middle, width = share + z**2 / (2 * number), z * np.sqrt(share * (1 - share) / number + z**2 / (4 * number**2))
     return float((middle - width) / (1 + z**2 / number)), float((middle + width) / (1 + z**2 / number))
 
