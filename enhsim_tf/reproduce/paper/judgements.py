@@ -147,7 +147,8 @@ def is_balanced(experiment: Experiment) -> Outcome:
     accuracy, iteration = (history["accuracy_real"] + history["accuracy_generated"]) / 2, history["iteration"]
     is_late = iteration >= iteration[-1] / 2
     is_early = ~is_late & (iteration > 0)
-    early, late = (float(accuracy[chosen].mean()) for chosen in (is_early, is_late))
+    # with two recorded iterations there is none in the first half: no rows, whose share is taken as chance
+    early, late = (float(accuracy[chosen].mean()) if chosen.any() else 0.5 for chosen in (is_early, is_late))
     (ahead, _), (low, high) = (binomial_interval(share, each * int(rows.sum())) for share, rows in ((early, is_early), (late, is_late)))
     is_faster, is_level, is_far = ahead > 0.5, high >= 0.5 and low <= 0.8, high < 0.35 or low > 0.95
     real, generated = (float(history[f"accuracy_{kind}"][is_late].mean()) for kind in ("real", "generated"))
