@@ -19,6 +19,8 @@ examples:
                                                      effect of each kind of noise on detectors; takes hours, can be interrupted
   python -m enhsim_tf.reproduce --experiment factorial
                                                      which part of the pipeline lowers false alarms; takes hours, can be interrupted
+  python -m enhsim_tf.reproduce --experiment learning-curve
+                                                     from how few real windows a simulator pays; an hour or two, can be interrupted
   python -m enhsim_tf.reproduce --experiment labelled --data DIR
                                                      detectors on real telemetry with labelled anomalies; some minutes per channel
   python -m enhsim_tf.reproduce --experiment battery
@@ -37,10 +39,12 @@ EXPERIMENTS = {
     "robustness": "run_experiment",
     "factorial": "run_factorial",
     "noise": "run_noise",
+    "learning-curve": "run_learning_curve",
     "labelled": "run_labelled",
     "battery": "run_battery",
 }
-WITH_ENVIRONMENTS = ("robustness", "factorial", "noise")
+WITH_FAMILIES = ("noise", "learning-curve")  # experiments for all families of noise; they take --rungs, too
+WITH_ENVIRONMENTS = ("robustness", "factorial", *WITH_FAMILIES)
 RUNG_NAMES = ("none", "Gaussian", "autoregression", "residual windows", "autoregressive network", "GAN of the paper", "convolutional GAN")
 
 
@@ -86,8 +90,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--experiment",
         choices=EXPERIMENTS,
         help="run an experiment instead of the paper: robustness trains detectors with each kind of noise; factorial combines windows, extraction, enhancer and "
-        "generator; noise tries noise models on fourteen families of noise; labelled tests detectors on real telemetry with labelled anomalies; battery "
-        "enhances a coarse simulator of a battery with the help of a fine one",
+        "generator; noise tries noise models on fourteen families of noise; learning-curve varies the number of real windows; labelled tests "
+        "detectors on real telemetry with labelled anomalies; battery enhances a coarse simulator of a battery with the help of a fine one",
     )
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="folder of labelled telemetry, with train/, test/ and labeled_anomalies.csv"
@@ -95,7 +99,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--channels", metavar="A,B", help="only these channels (default: all)")
     parser.add_argument("--environment", choices=FAMILIES, help="run the experiment with this kind of noise only (default: all)")
     parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds of the experiment (default: 10, factorial: 5)")
-    parser.add_argument("--rungs", metavar="A,B", help="only these noise models in the experiment on noise (default: all)")
+    parser.add_argument(
+        "--rungs",
+        metavar="A,B",
+        help="noise models: only these in the experiment on noise (default: all); also these in learning-curve (default: no networks)",
+    )
     parser.add_argument("--arrays", action="store_true", help="also save the arrays behind each figure, as .npz")
     parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached stages (default: .cache in a checkout)")
@@ -107,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
     check(options)
     folder = make_folders(options)
     if options.experiment:
-        runs = (run_robustness, run_factorial, run_noise, run_labelled, run_battery)
+        runs = (run_robustness, run_factorial, run_noise, run_learning_curve, run_labelled, run_battery)
         return dict(zip(EXPERIMENTS, runs, strict=True))[options.experiment](options, folder)
     from enhsim_tf.common.atomic_files import write_json
     from enhsim_tf.reproduce.caption import figure_caption
@@ -222,6 +230,26 @@ def run_noise(options: argparse.Namespace, folder: Path) -> int:
     return 0
 
 
+def run_learning_curve(options: argparse.Namespace, folder: Path) -> int:
+    """Runs the experiment on the number of real windows in a subfolder of the figures' folder, and returns the exit code."""
+    from enhsim_tf.reproduce.learning_curve.run import FOLDER, run
+    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.reproduce.stages import default_cache
+
+    turned = {} if options.seeds is None else {"curve__num_seeds": options.seeds}
+    environments = NOISES if options.environment is None else (options.environment,)
+    rungs = () if options.rungs is None else chosen_rungs(options.rungs)
+    out, settings = folder / FOLDER, make_settings(options.budget, **turned)
+    found = run(settings, options.cache or default_cache(), out, environments, rungs, options.fresh, tell)
+    for name, about in found["environments"].items():
+        bar = about["bar"]
+        tell(
+            f"{name:18} {bar['num_real']} real windows: excess {bar['real_excess']:.1%} without a simulator, {bar['excess']:.1%} with {bar['best']}"
+        )
+    tell(f"tables, findings.json and figures in {out}/")
+    return 0
+
+
 def run_factorial(options: argparse.Namespace, folder: Path) -> int:
     """Runs the factorial experiment in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.factorial.run import FOLDER, run
@@ -321,10 +349,10 @@ def check(options: argparse.Namespace) -> None:
     if options.experiment and options.store != "parquet":
         raise InputError(f"Expected --experiment with the Parquet store. Received: --store {options.store}.")
     if options.rungs is not None:
-        if options.experiment != "noise":
-            raise InputError("Expected --rungs together with --experiment noise. Received: --rungs without it.")
+        if options.experiment not in WITH_FAMILIES:
+            raise InputError(f"Expected --rungs together with --experiment {' or '.join(WITH_FAMILIES)}. Received: --rungs without it.")
         chosen_rungs(options.rungs)
-    if options.experiment != "noise" and options.environment not in (None, *NOISES):
+    if options.experiment not in WITH_FAMILIES and options.environment not in (None, *NOISES):
         raise InputError(f"Expected --environment {', '.join(NOISES)} with this experiment. Received: {options.environment}.")
     if options.seeds is not None and options.seeds < 1:
         raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")

@@ -223,6 +223,23 @@ class LadderSettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class CurveSettings:
+    """The experiment on how few real windows suffice: `python -m enhsim_tf.reproduce --experiment learning-curve`."""
+
+    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
+    first_seed: int = setting(4_000, "seed", f"{OUR_CHOICE}: no design was chosen on these seeds")
+    num_real: tuple[int, ...] = setting(
+        (5, 10, 20, 50, 100, 300, 1_000, 10_000), "windows", f"{OUR_CHOICE}: disjoint windows of the real record", smoke=(5, 20)
+    )
+    num_windows: int = setting(1_500, "windows", f"{OUR_CHOICE}: most windows for training, as many as the paper's enhancer", smoke=60)
+    num_judged: int = setting(1_000, "windows", f"{OUR_CHOICE}: disjoint test windows, and as many for the matched rate", smoke=40)
+    num_anomalous: int = setting(60, "windows", f"{OUR_CHOICE}: test windows with an anomaly of each kind", smoke=6)
+    num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
+    gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
+    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
+
+
+@dataclasses.dataclass(frozen=True)
 class FactorialSettings:
     """The factorial experiment: `python -m enhsim_tf.reproduce --experiment factorial`. Its other settings are those of robustness."""
 
@@ -279,6 +296,7 @@ class Settings:
     modes: ModesSettings = ModesSettings()
     factorial: FactorialSettings = FactorialSettings()
     ladder: LadderSettings = LadderSettings()
+    curve: CurveSettings = CurveSettings()
     labelled: LabelledSettings = LabelledSettings()
     battery: BatterySettings = BatterySettings()
     budget: str = "full"
@@ -328,5 +346,7 @@ def deviations() -> list[dict[str, str]]:
 def _in_words(value: Any, unit: str) -> str:
     if isinstance(value, str | bool):  # their unit lists the choices
         return {True: "yes", False: "no"}.get(value, value)
+    if isinstance(value, tuple):
+        return f"{', '.join(f'{each:,}' for each in value)} {unit}"
     number = f"{value:,}" if isinstance(value, int) else f"{value:,g}"
     return number if unit == "1" else f"{number} {unit}"

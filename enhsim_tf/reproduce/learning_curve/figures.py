@@ -1,0 +1,97 @@
+"""The figure of the learning curve, drawn from its findings."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib.figure
+import matplotlib.ticker
+from matplotlib.axes import Axes
+
+from enhsim_tf.common.number_words import in_words
+from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
+from enhsim_tf.reproduce.figure import Figure
+from enhsim_tf.reproduce.learning_curve.arms import ADVERSARIAL, CORAL, SIMULATOR, THRESHOLD_ON_REAL
+from enhsim_tf.reproduce.learning_curve.arms import REAL as REAL_ARM
+
+_CURVES = {
+    REAL_ARM: ("the real windows alone", "|", "-", REAL),
+    SIMULATOR + "autoregression": ("simulator + autoregression", "^", "--", AVERAGE),
+    SIMULATOR + "residual windows": ("simulator + residual windows", "D", "-", ENHANCED),
+    SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
+    THRESHOLD_ON_REAL: ("the same, threshold on the real windows", "d", ":", ENHANCED),
+    CORAL: ("CORAL", "s", ":", COARSE),
+    ADVERSARIAL: ("domain-adversarial classifier", "x", ":", QUIET),
+}
+"""Label, marker, line style and colour of each arm that is drawn."""
+
+
+def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
+    """False alarms and recall over the number of real windows, a column for each environment."""
+    environments, numbers = found["environments"], found["numbers"]
+    figure, down = new_sheet(DOUBLE, 4.9, _message(found), _subtitle(found))
+    grid = panels(figure, down + 0.75, 2, len(environments), gap=(0.3, 0.2), sharex=True, sharey="row")
+    for (name, about), (upper, lower) in zip(environments.items(), grid.T, strict=True):
+        for arm, (label, marker, line, colour) in _CURVES.items():
+            curve = about["arms"].get(arm)
+            if curve is None:
+                continue
+            at = [number for number in numbers if str(number) in curve["rate"]]
+            style = {"marker": marker, "linestyle": line, "color": colour, "markersize": 3.5, "linewidth": 1.0, "markerfacecolor": "none"}
+            upper.plot(at, [100 * curve["rate"][str(number)] for number in at], label=label, **style)
+            lower.plot(at, [100 * curve["recall_at_real_rate"][str(number)] for number in at], **style)
+        _finish(upper, lower, numbers, name)
+    grid[0, 0].set_ylabel("false alarms (%)")
+    grid[1, 0].set_ylabel("recall at 1 % alarms (%)")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    height = figure.get_size_inches()[1]
+    figure.legend(handles, labels, frameon=False, ncols=3, loc="upper left", bbox_to_anchor=(0.07, 1 - (down - 0.02) / height))
+    figure.text(0.53, 0.012, "real windows in the record (disjoint)", ha="center")
+    return figure
+
+
+def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
+    upper.axhline(1, color=QUIET, linewidth=0.6, zorder=0)
+    upper.set_title(name, loc="left")
+    upper.set_yscale("symlog", linthresh=1)
+    upper.set_ylim(0, 110)
+    upper.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50, 100], ["0", "0.5", "1", "2", "5", "10", "20", "50", "100"])
+    upper.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+    lower.set_xscale("log")
+    shown = [number for number in numbers if number in (5, 20, 100, 1_000, 10_000)] or numbers
+    lower.set_xticks(shown, [f"{number:,}" for number in shown], fontsize=7)
+    lower.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+
+
+def _message(found: Mapping[str, Any]) -> str:
+    """The answer in the title: where the simulator with autoregression or residual windows pays in most environments."""
+    environments, numbers = found["environments"].values(), found["numbers"]
+    paying = [
+        number
+        for number in numbers
+        if sum(any(number in places for places in about["pays"].values()) for about in environments) > len(environments) / 2
+    ]
+    if not paying:
+        return "Nowhere on this curve does a fitted simulator pay in most environments"
+    if paying == numbers[: len(paying)] and len(paying) < len(numbers):
+        return f"A fitted simulator pays up to {paying[-1]:,} real windows, and no longer from {numbers[len(paying)]:,}"
+    return f"A fitted simulator pays in most environments with {', '.join(f'{number:,}' for number in paying)} real windows"
+
+
+def _subtitle(found: Mapping[str, Any]) -> str:
+    seeds = len(found["seeds"])
+    return (
+        f"Detectors trained on k real windows, or on a simulator fitted to the same k windows; mean over four detectors and "
+        f"{in_words(seeds)} seed{'s' * (seeds > 1)}. Thresholds are set for 1 % (horizontal line; linear below it). A simulator pays where its "
+        "excess of false alarms is at most half that of the real windows and its recall at most 3 points lower."
+    )
+
+
+FIGURES = {
+    "learning_curve": Figure(
+        18,
+        "How many real windows suffice",
+        "A column for each environment: above, the false alarms of detectors over the number of real windows, for each kind of training "
+        "data; below, their recall at 1 % false alarms. The title says up to how many windows the simulator pays.",
+        curves,
+    ),
+}

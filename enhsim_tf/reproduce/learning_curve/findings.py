@@ -1,0 +1,91 @@
+"""What the learning curve found: from how few real windows a simulator pays, and when it stops paying.
+
+The rules below were fixed before the first run. False-alarm rates and recalls are means over the detectors of an arm; excess is the
+false-alarm rate above the one that thresholds were set for. Recall is compared at the matched rate, with a threshold from other real
+windows.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.reproduce.learning_curve.arms import REAL, SIMULATOR
+from enhsim_tf.reproduce.tables import KeptTables
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KEPT = KeptTables(
+    names=("rows",),
+    labels=("environment", "arm", "detector"),
+    digits=4,
+    kind="experiment",
+    command="python -m enhsim_tf.reproduce --experiment learning-curve",
+)
+RATE = 0.01
+PAYS_SHARE = 0.5  # a simulator pays where its excess is at most this share of that of training on the real windows alone
+MAX_RECALL_LOSS = 0.03  # and its recall at the matched rate is at most this much lower
+SUFFICES = 0.005  # real windows suffice where the excess of training on them is at most this
+JUDGED_AT = 20  # windows at which the best simulator arm must have at most half of the excess of the real ones
+
+
+def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
+    """Summarises the table of `KEPT`.
+
+    Args:
+        tables: The table `rows`.
+
+    Returns:
+        For each environment and arm its curves over the number of real windows; and for each environment the numbers of real
+        windows at which each simulator arm pays, and the smallest number from which the real windows suffice.
+    """
+    rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
+    numbers = sorted({int(number) for number in rows["num_real"]})
+    environments = {}
+    for environment in dict.fromkeys(rows["environment"]):
+        own = rows[rows["environment"] == environment]
+        arms = {arm: _curves(own[own["arm"] == arm], numbers) for arm in dict.fromkeys(own["arm"])}
+        real = arms[REAL]
+        simulators = [arm for arm in arms if arm.startswith(SIMULATOR)]
+        pays = {arm: [number for number in numbers if _pays(arms[arm], real, number)] for arm in simulators}
+        suffices = [number for number in numbers if all(real["excess"][str(n)] <= SUFFICES for n in numbers if n >= number)]
+        at = str(JUDGED_AT if JUDGED_AT in numbers else numbers[-1])
+        best = min((arm for arm in simulators if at in arms[arm]["excess"]), key=lambda arm: max(arms[arm]["excess"][at], 0))
+        environments[environment] = {
+            "arms": arms,
+            "pays": pays,
+            "real_suffices_from": suffices[0] if suffices else None,
+            "bar": {
+                "num_real": int(at),
+                "best": best,
+                "excess": arms[best]["excess"][at],
+                "real_excess": real["excess"][at],
+                "is_kept": bool(max(arms[best]["excess"][at], 0) <= PAYS_SHARE * real["excess"][at]),
+            },
+        }
+    return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
+
+
+def _curves(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, Any]:
+    """Mean over seeds, and the range over seeds of the false-alarm rate, by the number of real windows."""
+    found: dict[str, Any] = {"rate": {}, "low": {}, "high": {}, "excess": {}, "recall": {}, "recall_at_real_rate": {}, "seeds": {}}
+    for number in numbers:
+        here = rows[rows["num_real"] == number]
+        if here.empty:
+            continue
+        by_seed = here.groupby("seed")[["rate", "recall", "recall_at_real_rate"]].mean()
+        found["rate"][str(number)] = float(by_seed["rate"].mean())
+        found["low"][str(number)], found["high"][str(number)] = (float(each) for each in np.quantile(by_seed["rate"], [0.1, 0.9]))
+        found["excess"][str(number)] = float(by_seed["rate"].mean()) - RATE
+        for name in ("recall", "recall_at_real_rate"):
+            found[name][str(number)] = float(by_seed[name].mean())
+        found["seeds"][str(number)] = len(by_seed)
+    return found
+
+
+def _pays(arm: dict[str, Any], real: dict[str, Any], number: int) -> bool:
+    at = str(number)
+    if at not in arm["excess"] or real["excess"][at] <= SUFFICES:
+        return False
+    loss = real["recall_at_real_rate"][at] - arm["recall_at_real_rate"][at]
+    return max(arm["excess"][at], 0) <= PAYS_SHARE * real["excess"][at] and loss <= MAX_RECALL_LOSS
