@@ -73,9 +73,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     fit.add_argument(
         "--noise",
-        choices=NOISES,
-        default="convolutional",
-        help="noise model (default: %(default)s); paper is the GAN of the paper; resampled (only with --coarse) reuses windows of the residual",
+        choices=tuple(name.replace(" ", "-") for name in NOISES),
+        default="best",
+        help="noise model (default: best, the simplest one that held-out telemetry does not tell from real noise); paper is the GAN of the paper",
     )
     fit.add_argument(
         "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"

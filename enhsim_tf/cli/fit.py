@@ -6,7 +6,6 @@ import sys
 from enhsim_tf.cli.options import cleaning_options, tell_failed
 from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError
 
 
 def run_fit(options: argparse.Namespace) -> int:
@@ -17,20 +16,17 @@ def run_fit(options: argparse.Namespace) -> int:
     """
     from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 
+    noise = options.noise.replace("-", " ")
     counts = (options.num_windows, options.epochs, options.iterations)
     enhancer = None if options.enhancer is None else options.enhancer.replace("-", " ")
     if options.coarse is None:
         refuse_without_coarse(options, "coarse_time", "coarse_column", "delay")
-        if options.noise == "resampled":
-            raise InputError(
-                "Expected --noise resampled only together with --coarse. Received: no --coarse. Choose convolutional or paper."
-            )
-        chosen, run = FitOptions(options.window, *counts, options.noise, options.held_out, options.seed, enhancer or "best"), None
+        chosen, run = FitOptions(options.window, *counts, noise, options.held_out, options.seed, enhancer or "best"), None
     else:
         from enhsim_tf.enhanced_simulator.fit_many import CoarseRun
         from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 
-        chosen = RunOptions(options.window, *counts, options.noise, enhancer, options.delay, options.held_out, options.seed)
+        chosen = RunOptions(options.window, *counts, noise, enhancer, options.delay, options.held_out, options.seed)
         run = CoarseRun(options.coarse, options.coarse_column, options.coarse_time)
     from enhsim_tf.common.parallel.engines import parse_workers
 

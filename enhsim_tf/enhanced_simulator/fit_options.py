@@ -3,8 +3,10 @@
 import dataclasses
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.noise.rung_names import BY_OPTION
 
 ENHANCERS = ("coarse", "ridge", "ridge and network", "network")  # rungs of `enhancer.ladder` for windows at their own level and gain
+NOISES = ("best", *BY_OPTION)
 FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
 
 
@@ -17,7 +19,8 @@ class FitOptions:
         num_windows: Number of training windows, cut at random starts.
         epochs: Passes of the enhancer over the training windows, with a learning rate that falls to zero.
         num_iterations: Adversarial iterations of the noise networks.
-        noise: Noise networks: `convolutional`, or those of the `paper`.
+        noise: Model of the noise: one of `NOISES`, or `best`, the simplest that held-out telemetry does not tell from real noise
+            (see `noise_choice`), which the command `fit` uses.
         held_out: Share of the telemetry, taken from its end, that is reserved for the report. 0 trains and reports on all
             telemetry.
         seed: Random seed of training and report.
@@ -42,6 +45,8 @@ class FitOptions:
             raise InputError(f"Expected held_out from 0 to 0.5. Received: held_out={self.held_out}.")
         if self.enhancer not in (*ENHANCERS, "best"):
             raise InputError(f"Expected enhancer, one of: best, {', '.join(ENHANCERS)}. Received: enhancer={self.enhancer!r}.")
+        if self.noise not in NOISES:
+            raise InputError(f"Expected noise, one of: {', '.join(NOISES)}. Received: noise={self.noise!r}.")
         if self.window is not None and self.window < FEWEST_SAMPLES:
             raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
         for name, least in (("num_windows", 1), ("epochs", 1), ("num_iterations", 0)):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import printable
+from enhsim_tf.enhanced_simulator.noise_fitting import sentence_of, warning_of
 
 RATE = 0.01  # false-alarm rate for which thresholds are set
 SEVERITY = 4.0  # size of the injected anomalies, in standard deviations of the noise
@@ -43,6 +44,10 @@ class ChannelReport:
         levels: For quantised telemetry, the `count` of its levels and the `step` between them; otherwise empty.
         ladder: For each enhancer that was judged on held-out time, its `name`, `error`, `standard_error`, `is_within` (one
             standard error of the best) and `is_chosen`. Empty if the paper's network was used without a choice.
+        noise_model: Name of the noise model that was asked for, or `best`.
+        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for.
+        noise_auc: AUC of a classifier that separates `generated` noise from that of the evaluation telemetry, and of one that
+            separates `real` noise of the training telemetry from it. Empty if there is too little telemetry.
     """
 
     channel: str
@@ -62,6 +67,9 @@ class ChannelReport:
     time_unit: str = "s"
     levels: Mapping[str, float] = dataclasses.field(default_factory=dict)
     ladder: Sequence[Mapping[str, Any]] = ()
+    noise_model: str = "convolutional"
+    noise_ladder: Sequence[Mapping[str, Any]] = ()
+    noise_auc: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all fields except the examples, and the verdict, in plain JSON types."""
@@ -71,6 +79,8 @@ class ChannelReport:
             "nrmse": nrmse,
             "noise": [dict(row) for row in self.noise],
             "ladder": [dict(each) for each in self.ladder],
+            "noise_ladder": [dict(each) for each in self.noise_ladder],
+            "noise_auc": dict(self.noise_auc),
             "verdict": self.verdict,
         }
 
@@ -89,11 +99,18 @@ class ChannelReport:
     @property
     def verdict(self) -> list[str]:
         """Sentences on the accuracy of the simulator, and on which anomalies a detector trained on its output finds."""
-        said = [*self._of_the_enhancers(), self._of_the_signal(), self._of_the_noise(), self._of_false_alarms(), self._of_anomalies()]
+        said = [
+            *self._of_the_enhancers(),
+            self._of_the_signal(),
+            self._of_the_noise_models(),
+            self._of_the_noise(),
+            self._of_false_alarms(),
+            self._of_anomalies(),
+        ]
         if self.levels:
             said.append(
-                f"Levels: the telemetry has {self.levels['count']:,.0f} values, {self.levels['step']:.4g} apart; generated values are not "
-                "rounded to them, which a detector can tell. Round them to that step before training."
+                f"Levels: the telemetry has {self.levels['count']:,.0f} values, {self.levels['step']:.4g} apart; generated values are rounded "
+                "to this grid."
             )
         return said
 
@@ -126,6 +143,13 @@ class ChannelReport:
             f"{errors['coarse']:.3f}, ridge regression {errors['ridge']:.3f}, the mean of the nearest training windows "
             f"{errors['nearest']:.3f}. {judged}"
         )
+
+    def _of_the_noise_models(self) -> str:
+        said = sentence_of(self.noise_ladder, self.noise_model)
+        if not self.noise_auc:
+            return said
+        auc = f"AUC of a classifier against the noise of {self._where()}: generated {self.noise_auc['generated']:.2f}"
+        return f"{said} {auc}, real {self.noise_auc['real']:.2f}."
 
     def _of_the_noise(self) -> str:
         measured = [row for row in self.noise if row["ratio"] is not None]
@@ -178,7 +202,8 @@ class ChannelReport:
         windows = _counted(self.num_windows, "window")
         where = f"{windows} held out" if self.is_held_out else f"{windows} of the training telemetry"
         head = f"windows of {self.window} samples, period {self.period_s:.6g} {self.time_unit}; measured on {where}"
-        return [f"{printable(self.channel)}: {head}", *self.verdict]
+        warning = warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
+        return [f"{printable(self.channel)}: {head}{warning}", *self.verdict]
 
 
 def _counted(number: int, noun: str) -> str:

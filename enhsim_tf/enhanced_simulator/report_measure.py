@@ -15,6 +15,8 @@ from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
 from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
 from enhsim_tf.realism import real_floor
+from enhsim_tf.realism.two_sample import two_sample_auc
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import disjoint_starts, evenly_spaced_starts
 
@@ -24,8 +26,8 @@ if TYPE_CHECKING:
 QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors whose training takes about a second
 _NUM_WINDOWS = 1_000  # generated windows for training a detector, and as many others for its threshold
 _NUM_COMPARED = 200  # maximum number of real windows for errors and false alarms
+_LEAST_COMPARED = 20  # windows of each kind, for a classifier
 _LEAST_NOISE_WINDOW, _NUM_NOISE_WINDOWS = 16, 40  # comparison of noise: minimum window length, and target number of disjoint windows
-_OFTEN = 3  # a value of quantised telemetry counts as a level if it occurs at least this often
 
 
 def report_on(
@@ -57,6 +59,7 @@ def report_on(
     real = training.target
     trial = evaluation.make_trial(pairs.target, pairs.target, None, noise_sd, seed)
     trial = dataclasses.replace(trial, anomalous={key: value for key, value in trial.anomalous.items() if key[1] == SEVERITY})
+    levels = Levels.find(np.concatenate([part.values for part in learnt]))
     quick = {name: DETECTORS[name] for name in QUICK}
     cut = len(real) * 3 // 5  # later real windows set the threshold, with a gap in time, because neighbouring windows overlap
     gap = window * len(real) // max(1, sum(map(len, learnt)))
@@ -91,28 +94,25 @@ def report_on(
         },
         learnt[0].unit,
         learnt[0].time_unit,
-        levels_of(np.concatenate([part.values for part in learnt])),
+        {} if levels is None else {"count": levels.count, "step": levels.step},
         simulator.trained.get("ladder", ()),
+        simulator.trained.get("noise", "convolutional"),
+        simulator.trained.get("noise_ladder", ()),
+        _noise_auc(simulator, learnt, held_out, seed),
     )
 
 
-def levels_of(values: np.ndarray) -> dict[str, float]:
-    """Finds the levels of quantised telemetry.
-
-    Args:
-        values: The telemetry. A few values between the levels, such as interpolated ones, are ignored.
-
-    Returns:
-        The `count` of levels and the smallest `step` between two levels; empty if the telemetry is not quantised.
-    """
-    levels, counts = np.unique(values, return_counts=True)
-    often = levels[counts >= _OFTEN].astype(np.float64)
-    if not 2 <= len(often) <= len(values) // 10 or counts[counts >= _OFTEN].sum() < 0.99 * len(values):
+def _noise_auc(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], seed: int) -> dict[str, float]:
+    """Returns the AUC of a classifier of generated, and of learnt, against held-out noise; empty if there are too few windows."""
+    starts = [evenly_spaced_starts(parts, simulator.window, _NUM_COMPARED) for parts in (learnt, held_out)]
+    number = min(map(len, starts))
+    if number < _LEAST_COMPARED:
         return {}
-    step = float(np.diff(often).min())
-    multiples = (often - often[0]) / step
-    is_even = np.abs(multiples - np.round(multiples)).max() < 0.1  # values of a noise-free wave repeat too, but are not evenly spaced
-    return {"count": len(often), "step": step} if is_even else {}
+    pairs = [simulator.pairs(parts, chosen) for parts, chosen in zip((learnt, held_out), starts, strict=True)]
+    clean = [simulator.follow(each) for each in pairs]
+    real = [each.target - below for each, below in zip(pairs, clean, strict=True)]
+    generated = simulator.add_noise(clean[0], np.random.default_rng([seed, 3])) - clean[0]
+    return {kind: two_sample_auc(noise[:number], real[1][:number], seed) for kind, noise in (("generated", generated), ("real", real[0]))}
 
 
 def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
@@ -144,6 +144,7 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     residual = residual[:, : short * pieces].reshape(-1, short)
     half = len(residual) // 2
     floor = real_floor.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
-    generated = simulator.noise.generate(-(-half // pieces), seed)[:, : short * pieces].reshape(-1, short)[:half]
+    clean = simulator.generate_clean(-(-half // pieces), seed=seed)
+    generated = simulator.draw_noise(clean, seed)[:, : short * pieces].reshape(-1, short)[:half]
     rows = [dataclasses.asdict(row) for row in floor.evaluate(generated).rows]
     return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is not valid JSON

@@ -1,7 +1,7 @@
 """Saves and loads trained models: `.keras` files, arrays, `settings.json`, and `manifest.json` with their checksums.
 
-There are two formats. A simulator of square waves consists of three networks. A run model (`runs`) consists of its enhancer, its
-noise as two networks or as an array, the nominal run and the range of the training runs.
+There are two formats. A simulator of square waves consists of its enhancer and its noise. A run model (`runs`) also has the nominal
+run and the range of the training runs. The noise is two networks, or arrays (`noise.states`).
 """
 
 import os
@@ -10,13 +10,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import READ_ERRORS, read_json
+from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
 from enhsim_tf.enhanced_simulator.safe_loading import check_network
 
 if TYPE_CHECKING:
     from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.noise.states import NoiseState
 
 MANIFEST, SETTINGS = "manifest.json", "settings.json"
 MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
@@ -24,13 +27,13 @@ _OURS = b'"enhsim_tf.EnhancedSimulator/'  # near the beginning of every manifest
 _FORMAT = "enhsim_tf.EnhancedSimulator/1"
 RUNS_FORMAT = "enhsim_tf.EnhancedSimulator/runs-1"
 _NETWORKS = ("enhancer.keras", "generator.keras", "discriminator.keras")
+_NOISE = "noise.npz"
+_RUN_FILES = ("range.npz", "nominal.npz")
 _FILES = {  # the possible files of each format, beside the settings
-    _FORMAT: (set(_NETWORKS),),
-    RUNS_FORMAT: (
-        {"enhancer.keras", "range.npz", "nominal.npz", "generator.keras", "discriminator.keras"},
-        {"enhancer.keras", "range.npz", "nominal.npz", "noise.npz"},
-    ),
+    _FORMAT: (set(_NETWORKS), {"enhancer.keras", _NOISE}),
+    RUNS_FORMAT: ({*_NETWORKS, *_RUN_FILES}, {"enhancer.keras", _NOISE, *_RUN_FILES}),
 }
+_MOST_BYTES = 2**28  # maximum size of arrays
 
 
 def write_saved(
@@ -63,6 +66,41 @@ def write_saved(
         write_json(temporary / SETTINGS, settings)
         checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
         write_json(temporary / MANIFEST, {"format": form, "sha256": checksums})
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Writes arrays to a compressed `.npz` file.
+
+    Args:
+        path: Path of the file.
+        arrays: The arrays by name.
+    """
+    with open(path, "wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Reads the arrays that `write_arrays` wrote. Files that are too large are refused."""
+    return load_npz(path, _MOST_BYTES)
+
+
+def noise_file(noise: "NoiseState") -> dict[str, Callable[[Path], None]]:
+    """Returns the file of a noise model that consists of arrays, for `write_saved`; empty if it consists of networks."""
+    return {_NOISE: lambda path: write_arrays(path, noise.arrays)} if noise.arrays else {}
+
+
+def read_noise(folder: Path, settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]") -> Any:
+    """Restores the noise model of a saved model.
+
+    Args:
+        folder: The folder.
+        settings: Settings of the noise.
+        networks: The networks that were loaded.
+    """
+    from enhsim_tf.noise.states import model_from
+
+    path = folder / _NOISE
+    return model_from(settings, networks, read_arrays(path) if path.is_file() else {})
 
 
 def is_foreign(folder: Path) -> bool:

@@ -1,9 +1,11 @@
 """The enhanced simulator: coarse simulation, enhancement and generated noise (step 5 and "Combined" of the paper's pipeline)."""
 
+import dataclasses
 import functools
 import itertools
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -14,16 +16,19 @@ from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, h
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.batches import complete_batch, complete_labelled_batch
+from enhsim_tf.enhanced_simulator.batches import add_changed, complete_batch, complete_labelled_batch
 from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_finite, check_parts, config_of, is_finite
-from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of, is_finite
+from enhsim_tf.enhanced_simulator.saving import noise_file, read_noise, read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
 from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.noise.gan import NoiseGAN, num_overlapping
+from enhsim_tf.noise import ladder
+from enhsim_tf.noise.gan import num_overlapping
+from enhsim_tf.noise.states import state_of
 from enhsim_tf.telemetry.parquet_store import write_windows
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
 
@@ -44,7 +49,7 @@ class EnhancedSimulator:
     Args:
         coarse: The coarse simulator.
         enhancer: Network that maps coarse windows to enhanced windows, both of shape `(windows, samples)`.
-        noise: The trained noise networks.
+        noise: The noise model, of any rung of `noise.ladder`.
         interval_s: Sampling interval in seconds.
         offset: Value, in the telemetry's unit, that corresponds to 0 in the enhancer's normalised units.
         scale: Size, in the telemetry's unit, of 1 in the enhancer's normalised units.
@@ -52,6 +57,7 @@ class EnhancedSimulator:
             times, in the order of time, shape `(times, 2)`. Each generated window uses one of these rows. None means that
             level and amplitude are constant.
         trained: Record of how the networks were trained, in plain JSON types. It is saved with the networks.
+        quantisation: Levels of the channel, to which generated telemetry is rounded. None does not round.
 
     Example:
     >>> simulator = EnhancedSimulator.fit(telemetry, coarse=SquareWaveSimulator.fit(telemetry), seed=0)
@@ -64,13 +70,15 @@ class EnhancedSimulator:
         self,
         coarse: SquareWaveSimulator,
         enhancer: keras.Model,
-        noise: NoiseGAN,
+        noise: Any,
         interval_s: float = 1.0,
         offset: float = 0.0,
         scale: float = 1.0,
         levels: np.ndarray | None = None,
         trained: Mapping[str, Any] | None = None,
+        quantisation: Levels | None = None,
     ):
+        self.quantisation = quantisation
         self.levels = None if levels is None else np.asarray(levels, np.float64).reshape(-1, 2)
         self.trained = dict(trained or {})
         self.coarse, self.enhancer, self.noise = coarse, enhancer, noise
@@ -84,7 +92,27 @@ class EnhancedSimulator:
     @functools.cached_property
     def noise_sd(self) -> float:
         """Standard deviation of the generated noise, in the telemetry's unit."""
-        return float(np.std(self.noise.generate(_NUM_NOISE, 0), dtype=np.float64))
+        clean = self.generate_clean(_NUM_NOISE) if getattr(self.noise, "follows_signal", False) else np.empty((_NUM_NOISE, 0))
+        return float(np.std(self.draw_noise(clean, 0), dtype=np.float64))
+
+    def draw_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
+        """Generates noise for windows or for one series. Noise that follows the signal receives it in units of the enhancer.
+
+        Args:
+            clean: Enhanced windows of shape `(windows, samples)`, or an enhanced series of shape `(samples,)`.
+            seed: Seed, or a random number generator, whose state advances.
+
+        Returns:
+            float32 array of the shape of `clean`, in the telemetry's unit.
+        """
+        draw = ladder.generate if np.ndim(clean) == 2 else ladder.generate_series
+        signal = (clean - self.offset) / self.scale if getattr(self.noise, "follows_signal", False) else None
+        return draw(self.noise, len(clean), seed, signal)
+
+    def add_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
+        """Adds noise to enhanced windows or to an enhanced series, and rounds to the levels of a quantised channel."""
+        noisy = clean + self.draw_noise(clean, seed)
+        return noisy if self.quantisation is None else self.quantisation.round(noisy)
 
     @classmethod
     def fit(
@@ -366,8 +394,8 @@ class EnhancedSimulator:
         """Generates one continuous series of any length, without visible joins between windows.
 
         Enhanced windows that overlap by half are cross-faded with weights that add up to one. The noise is generated
-        separately, by `NoiseGAN.generate_series`. Noise of the paper's networks repeats a pattern every half window, with
-        an autocorrelation of about 0.5 at that lag; noise of `noise="convolutional"` does not.
+        separately, as one series. Noise of the paper's networks repeats a pattern every half window, with
+        an autocorrelation of about 0.5 at that lag; noise of the other models does not.
 
         Args:
             num_samples: Length of the series in samples.
@@ -422,7 +450,8 @@ class EnhancedSimulator:
             ranges = [(scenario.mode, scenario.severity, 0, num_samples)]
         elif schedule:
             coarse = simulate_schedule(self.coarse, times, schedule, rng)
-        clean, mask, events = self._join_series(nominal, levels)[:num_samples], np.zeros(num_samples, bool), []
+        nominal_clean = self._join_series(nominal, levels)[:num_samples]
+        clean, mask, events = nominal_clean, np.zeros(num_samples, bool), []
         if coarse is not None:
             inside, held = np.zeros((1, num_samples), bool), []
             for mode, severity, begin, end in ranges:
@@ -437,11 +466,13 @@ class EnhancedSimulator:
                 clean, mask = blend_changes(clean, degraded, inside, fade_length(window), tolerance)
             hold_values(clean, mask, held, tolerance)
             clean, mask = clean[0], mask[0]
-            edges = [0, *((before[3] + after[2]) // 2 for before, after in itertools.pairwise(ranges)), num_samples]
-            for (mode, severity, *_), (begin, end) in zip(ranges, itertools.pairwise(edges), strict=True):
-                changed = np.flatnonzero(mask[begin:end])
-                events += [(mode, severity, begin + int(changed[0]), begin + int(changed[-1]) + 1)] if len(changed) else []
-        return check_finite(clean + self.noise.generate_series(num_samples, _noise_rng(seed))), mask, events
+        noise = self.draw_noise(nominal_clean, _noise_rng(seed))
+        values, mask = add_changed(clean, nominal_clean, noise, mask, self.quantisation)
+        edges = [0, *((before[3] + after[2]) // 2 for before, after in itertools.pairwise(ranges)), num_samples]
+        for (mode, severity, *_), (begin, end) in zip(ranges, itertools.pairwise(edges), strict=bool(ranges)):
+            changed = np.flatnonzero(mask[begin:end])
+            events += [(mode, severity, begin + int(changed[0]), begin + int(changed[-1]) + 1)] if len(changed) else []
+        return values, mask, events
 
     def _join_series(self, coarse: np.ndarray, levels: np.ndarray | None) -> np.ndarray:
         """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
@@ -471,25 +502,31 @@ class EnhancedSimulator:
             InputError: If the folder contains something other than a saved simulator, or if a number of the simulator is not
                 finite; the folder is left unchanged.
         """
-        networks = {"enhancer": self.enhancer, "generator": self.noise.generator, "discriminator": self.noise.discriminator}
-        numbers = np.array([self.interval_s, self.offset, self.scale, self.noise.scale])
-        bad = [name for name, network in networks.items() if not is_finite(network.get_weights())]
-        if bad or not is_finite([numbers, *([] if self.levels is None else [self.levels])]):
+        noise = state_of(self.noise)
+        numbers = np.array([self.interval_s, self.offset, self.scale, *([] if self.quantisation is None else [self.quantisation.step])])
+        parts = {
+            "enhancer": is_finite(self.enhancer.get_weights()),
+            "noise": noise.is_finite,
+            "units or levels": is_finite([numbers, *([] if self.levels is None else [self.levels])]),
+        }
+        bad = [name for name, is_good in parts.items() if not is_good]
+        if bad:
             raise InputError(
-                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad) or 'units or levels'} with NaN or infinity. "
+                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. "
                 "It was not saved. Fit it again."
             )
         settings = {
             "coarse": config_of(self.coarse),
-            "noise": self.noise.get_config(),
+            "noise": dict(noise.settings),
             "interval_s": self.interval_s,
             "offset": self.offset,
             "scale": self.scale,
             "levels": None if self.levels is None else self.levels.tolist(),
+            "quantisation": None if self.quantisation is None else dataclasses.asdict(self.quantisation),
             "trained": self.trained,
             "keras": keras.__version__,
         }
-        write_saved(folder, networks, settings)
+        write_saved(folder, {"enhancer": self.enhancer, **noise.networks}, settings, noise_file(noise))
 
     @classmethod
     def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
@@ -504,14 +541,15 @@ class EnhancedSimulator:
         Raises:
             InputError: If the folder was not written by `save`, or if a file in it has changed since.
         """
-        return read_saved(folder, cls._from_saved)
+        return read_saved(folder, functools.partial(cls._from_saved, Path(folder)))
 
     @classmethod
-    def _from_saved(cls, networks: Mapping[str, keras.Model], settings: Mapping[str, Any]) -> "EnhancedSimulator":
+    def _from_saved(cls, folder: Path, networks: Mapping[str, keras.Model], settings: Mapping[str, Any]) -> "EnhancedSimulator":
         coarse = SquareWaveSimulator.from_config(settings["coarse"])
-        noise = NoiseGAN(networks["generator"], networks["discriminator"], **settings["noise"])
+        noise = read_noise(folder, settings["noise"], networks)
         units = settings["interval_s"], settings["offset"], settings["scale"], settings.get("levels")
-        return cls(coarse, networks["enhancer"], noise, *units, settings["trained"])
+        quantisation = None if settings.get("quantisation") is None else Levels(**settings["quantisation"])
+        return cls(coarse, networks["enhancer"], noise, *units, settings["trained"], quantisation)
 
 
 def _noise_rng(seed: int) -> np.random.Generator:

@@ -16,16 +16,14 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts, check_size, is_finite
 from enhsim_tf.enhanced_simulator.choosing import choose_enhancer
+from enhsim_tf.enhanced_simulator.noise_fitting import BEST, JUDGED_SHARE, NoiseTraining, NoiseWindows, choose_noise, fit_noise
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
-from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.extraction import extract_noise, noise_unit
-from enhsim_tf.noise.gan import NoiseGAN
-from enhsim_tf.noise.generator import build_generator
-from enhsim_tf.noise.guarded_training import train_guarded
+from enhsim_tf.noise.extraction import extract_noise
+from enhsim_tf.noise.rung_names import BY_OPTION
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
 
@@ -52,7 +50,8 @@ class TrainingSettings:
         normalise: Whether both networks are trained on normalised values: the enhancer in units of the coarse simulator's
             levels, the noise networks at the paper's noise amplitude. False passes the values unchanged, as in the paper.
         window: Length of a window in samples.
-        noise: Networks that learn the noise: `paper`, or `convolutional`, whose generator has full-rank output.
+        noise: Model of the noise, a key of `noise.rung_names.BY_OPTION`: for example the networks of the `paper`, or `convolutional`,
+            whose generator has full-rank output; or `best`, which held-out telemetry chooses (see `noise_choice`).
         extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
             telemetry, as in the paper; `enhancer` subtracts the enhanced signal.
         held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction only
@@ -85,10 +84,15 @@ class TrainingSettings:
         check_counts(
             window=(self.window, 2), num_windows=(self.num_windows, 1), epochs=(self.epochs, 1), num_iterations=(self.num_iterations, 0)
         )
-        if self.noise not in ("paper", "convolutional") or self.extraction not in _MIN_WINDOWS or not 0 <= self.held_out < 1:
+        if self.noise not in (BEST, *BY_OPTION) or self.extraction not in _MIN_WINDOWS or not 0 <= self.held_out < 1:
             raise InputError(
-                "Expected noise to be paper or convolutional, extraction to be moving average or enhancer, 0 <= held_out < 1. "
+                f"Expected noise among {BEST}, {', '.join(BY_OPTION)}; extraction to be moving average or enhancer; 0 <= held_out < 1. "
                 f"Received: noise={self.noise!r}, extraction={self.extraction!r}, held_out={self.held_out}."
+            )
+        if self.noise in (BEST, "autoregressive network") and self.extraction != "enhancer":
+            raise InputError(
+                f"Expected noise={self.noise!r} with extraction by the enhancer, because it is judged with the enhanced signal. "
+                f"Received: extraction={self.extraction!r}."
             )
 
 
@@ -137,20 +141,48 @@ def train(
     if settings.follow:
         seen = simulator.pairs(parts, evenly_spaced_starts(parts, settings.window, _NUM_LEVELS)).drop_flat()
         simulator.levels = np.stack([seen.shift, seen.gain], axis=1)
+    simulator.quantisation = Levels.find(values)
     simulator.trained = _training_record(parts[0].name, len(values), settings)
     if ladder is not None:
         simulator.trained |= {"enhancer": settings.enhancer, "ladder": ladder}
+    notes: list[str] = []
+    training = _noise_training(simulator, settings, verbose, progress)
     rng = np.random.default_rng([settings.seed, 1])
     if by_enhancer:
-        noise_windows = simulator.residual_windows(rest, settings.num_windows, rng)
+        windows = _noise_windows(simulator, rest, random_window_starts(rest, settings.window, settings.num_windows, rng))
     else:
-        noise_windows, _ = cut_windows_from_parts(
-            averaged, random_window_starts(averaged, settings.window, settings.num_windows, rng), settings.window
-        )
-    notes: list[str] = []
-    simulator.noise = train_noise(noise_windows, settings, verbose, progress, notes)
+        starts = random_window_starts(averaged, settings.window, settings.num_windows, rng)
+        noise, _ = cut_windows_from_parts(averaged, starts, settings.window)
+        windows = NoiseWindows(noise, np.zeros_like(noise))
+    if settings.noise == BEST:
+        halves = [_evenly_spaced(simulator, some, settings) for some in split_end(rest, JUDGED_SHARE)]
+        simulator.noise, simulator.trained["noise_ladder"] = choose_noise(*halves, windows, training, notes)
+    else:
+        simulator.noise = fit_noise(settings.noise, windows, training, notes)
     simulator.trained |= {"notes": notes} if notes else {}
     return simulator
+
+
+def _noise_training(simulator: "EnhancedSimulator", settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseTraining:
+    def to_unit(clean: np.ndarray) -> np.ndarray:
+        return (clean - simulator.offset) / simulator.scale
+
+    unit = None if settings.normalise else 1.0
+    return NoiseTraining(settings.num_iterations, settings.seed, to_unit, simulator.quantisation, unit, verbose, progress)
+
+
+def _noise_windows(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], starts: np.ndarray) -> NoiseWindows:
+    pairs = simulator.pairs(parts, starts)
+    clean = simulator.follow(pairs)
+    return NoiseWindows(pairs.target - clean, clean)
+
+
+def _evenly_spaced(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: TrainingSettings) -> NoiseWindows:
+    """Returns windows of noise in the order of time, or none if no part is long enough."""
+    parts = [part for part in parts if len(part) >= settings.window]
+    if not parts:
+        return NoiseWindows(*np.zeros((2, 0, settings.window), np.float32))
+    return _noise_windows(simulator, parts, evenly_spaced_starts(parts, settings.window, settings.num_windows))
 
 
 def _build(
@@ -209,27 +241,6 @@ def _train_round(
         f"Expected telemetry from which the enhancer can learn. Received: {_ATTEMPTS} trainings that diverged, the last one at a learning rate "
         f"of {rate:.2g}. Look for values far from all others, or give another channel."
     )
-
-
-def train_noise(
-    noise_windows: np.ndarray, settings: TrainingSettings, verbose: int | str, progress: Progress, notes: list[str] | None = None
-) -> NoiseGAN:
-    """Builds the noise networks and trains them on windows of extracted noise, shape `(windows, samples)`.
-
-    `notes` receives a sentence for each training that diverged, and one if the networks were replaced by Gaussian noise.
-    """
-
-    def build() -> NoiseGAN:
-        if settings.noise == "convolutional":
-            return convolutional_noise_gan(noise_windows, settings.num_iterations, settings.seed)
-        generator, discriminator = (build(settings.window, seed=settings.seed) for build in (build_generator, build_discriminator))
-        scale = noise_unit(noise_windows) if settings.normalise else 1.0
-        return NoiseGAN(generator, discriminator, scale=scale, seed=settings.seed)
-
-    report_iteration = progress.loop("noise GAN, iteration", settings.num_iterations)
-    show_bars = None if verbose == "auto" else bool(verbose)
-    note = (lambda line: None) if notes is None else notes.append
-    return train_guarded(build, noise_windows, settings.num_iterations, show_bars, report_iteration, note)
 
 
 def _subtract_moving_average(parts: Sequence[Telemetry], settings: TrainingSettings) -> list[Telemetry]:

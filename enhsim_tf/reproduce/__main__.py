@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from enhsim_tf.common.console import Parser, run_command, tell
+from enhsim_tf.noise.rung_names import BY_OPTION
 
 EXAMPLES = """\
 examples:
@@ -45,7 +46,7 @@ EXPERIMENTS = {
 }
 WITH_FAMILIES = ("noise", "learning-curve")  # experiments for all families of noise; they take --rungs, too
 WITH_ENVIRONMENTS = ("robustness", "factorial", *WITH_FAMILIES)
-RUNG_NAMES = ("none", "Gaussian", "autoregression", "residual windows", "autoregressive network", "GAN of the paper", "convolutional GAN")
+RUNG_NAMES = tuple(BY_OPTION.values())
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:

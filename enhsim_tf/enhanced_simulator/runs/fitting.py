@@ -13,24 +13,28 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_parts
+from enhsim_tf.enhanced_simulator.noise_fitting import BEST, JUDGED_SHARE, NoiseTraining, NoiseWindows, choose_noise, fit_noise
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
-from enhsim_tf.enhanced_simulator.runs.model import Noise, RunModel
+from enhsim_tf.enhanced_simulator.runs.model import RunModel
 from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 from enhsim_tf.enhanced_simulator.runs.report import RATE, RunReport, compare_noise
 from enhsim_tf.enhanced_simulator.runs.residuals import held_out_residuals, windows_of
 from enhsim_tf.enhanced_simulator.runs.scoring import ResidualDetector
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
-from enhsim_tf.enhanced_simulator.training import TrainingSettings, train_noise
-from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, fit_ladder, fit_rung
+from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, Rung, fit_ladder, fit_rung
 from enhsim_tf.enhancer.overlapping import enhance_run
+from enhsim_tf.enhancer.training_pairs import split_end
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.realism.two_sample import two_sample_auc
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
-from enhsim_tf.telemetry.windows import cut_windows_from_parts, random_window_starts
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
 
 _LEAST_WINDOW, _MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
 _WINDOWS_IN_TRAINING = 20  # the default window is this share of the training telemetry
 _LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 _EXAMPLE = 2  # length of the example for the figure, in windows
+_LEAST_COMPARED, _NUM_COMPARED = 20, 200  # windows of each kind, for a classifier
 _NUM_NOISE = 50  # length of the generated noise that is compared with the real one, in windows
 
 
@@ -81,17 +85,22 @@ def fit_run_model(
     ladder = fit_ladder(*windows, RUNGS, options.seed, options.epochs, refit="chosen", wanted=options.enhancer)
     rung = ladder.rungs[ladder.chosen]
     residuals = held_out_residuals(learnt, windows, ladder.edges, ladder.before_refit[ladder.chosen], options.seed, options.epochs)
-    noise = _fit_noise(residuals, window, options, verbose, progress)
+    levels = Levels.find(np.concatenate([pair.telemetry.values for pair in learnt]))
+    noise, judged_noise, noted = _fit_noise(residuals, learnt, rung, levels, window, options, verbose, progress)
+    notes += noted
     coverage = Coverage.fit(windows[0], windows[2], rung.scaling)
     trained = {
         "telemetry": parts[0].name,
         "num_samples": sum(map(len, learnt)),
         "coarse": _kept(coarse),
         "rungs": {each.name: each.error for each in ladder.judged},
+        "noise_ladder": judged_noise,
     } | dataclasses.asdict(options)
     nominal = dataclasses.replace(recording, parts=tuple(Run(pair.coarse, pair.telemetry.offset_s) for pair in learnt))
     nominal = dataclasses.replace(nominal, interval_s=parts[0].interval_s, start=parts[0].start)
-    model = RunModel(rung, noise, coverage, nominal, window, delay.seconds, None if isinstance(coarse, Recording) else coarse, trained)
+    model = RunModel(
+        rung, noise, coverage, nominal, window, delay.seconds, None if isinstance(coarse, Recording) else coarse, trained, levels
+    )
     judged = end if options.held_out and end else learnt
     return model, _report(model, ladder, judged, bool(options.held_out and end), residuals, notes, options, windows)
 
@@ -164,13 +173,49 @@ def split_pairs(pairs: Sequence[Pair], share: float) -> tuple[list[Pair], list[P
     return first, rest
 
 
-def _fit_noise(residuals: Sequence[Telemetry], window: int, options: RunOptions, verbose: int | str, progress: Progress) -> Noise:
-    starts = random_window_starts(residuals, window, options.num_windows, np.random.default_rng([options.seed, 1]))
-    windows, _ = cut_windows_from_parts(residuals, starts, window)
-    if not np.std(windows, dtype=np.float64) > 0 or options.noise == "resampled":  # networks cannot learn noise of size 0
-        return WindowBootstrap(windows)
-    settings = TrainingSettings(seed=options.seed, num_iterations=options.num_iterations, window=window, noise=options.noise)
-    return train_noise(windows, settings, verbose, progress)
+def _fit_noise(
+    residuals: Sequence[Telemetry],
+    pairs: Sequence[Pair],
+    rung: Rung,
+    levels: Levels | None,
+    window: int,
+    options: RunOptions,
+    verbose: int | str,
+    progress: Progress,
+) -> tuple[Any, list[dict[str, Any]], list[str]]:
+    """Fits the noise model to held-out residuals; returns it with the judgements of all rungs and what is to be said about it."""
+    training = NoiseTraining(options.num_iterations, options.seed, rung.scaling.scale_target, levels, None, verbose, progress)
+    clean = _clean_below(residuals, pairs)
+    notes: list[str] = []
+
+    def cut(some: Sequence[tuple[Telemetry, Telemetry]], starts: np.ndarray) -> NoiseWindows:
+        return NoiseWindows(*(cut_windows_from_parts([each[which] for each in some], starts, window)[0] for which in (0, 1)))
+
+    both = list(zip(residuals, clean, strict=True))
+    everything = cut(both, random_window_starts(residuals, window, options.num_windows, np.random.default_rng([options.seed, 1])))
+    if not np.std(everything.noise, dtype=np.float64) > 0:  # networks cannot learn noise of size 0
+        return WindowBootstrap(everything.noise), [], notes
+    if options.noise != BEST:
+        return fit_noise(options.noise, everything, training, notes), [], notes
+    halves = []
+    for some in zip(*(split_end(each, JUDGED_SHARE) for each in (residuals, clean)), strict=True):
+        usable = [each for each in zip(*some, strict=True) if len(each[0]) >= window]
+        starts = evenly_spaced_starts([each[0] for each in usable], window, options.num_windows) if usable else []
+        halves.append(cut(usable, starts) if usable else NoiseWindows(*np.zeros((2, 0, window), np.float32)))
+    return *choose_noise(*halves, everything, training, notes), notes
+
+
+def _clean_below(residuals: Sequence[Telemetry], pairs: Sequence[Pair]) -> list[Telemetry]:
+    """Returns the enhanced run below each residual: the telemetry of the same time minus the residual."""
+    found = []
+    for part in residuals:
+        for pair in pairs:
+            first = round((part.offset_s - pair.telemetry.offset_s) / part.interval_s)
+            if 0 <= first and first + len(part) <= len(pair):
+                values = pair.telemetry.values[first : first + len(part)] - part.values
+                found.append(dataclasses.replace(part, values=values))
+                break
+    return found
 
 
 def _kept(coarse: CoarseSimulator) -> dict[str, Any]:
@@ -201,7 +246,7 @@ def _report(
     detector = ResidualDetector(model, ScoreOptions(false_alarm_rate=RATE, seed=options.seed))
     alarms = np.concatenate([detector.score(each) > 1 for each in left])
     outside = np.concatenate([model.coverage.score(pair.coarse) > 1 for pair in judged])
-    generated = model.noise.generate_series(_NUM_NOISE * model.window, np.random.default_rng([options.seed, 5]))
+    generated = model.draw_noise(model.nominal_series(_NUM_NOISE * model.window), np.random.default_rng([options.seed, 5]))
     shown = min(len(judged[0]), _EXAMPLE * model.window)
     (copy,) = next(model.generate_copies(_one_run(model, judged[0].part(0, shown)), 1, options.seed))
     return RunReport(
@@ -221,9 +266,32 @@ def _report(
         compare_noise([part.values for part in residuals], generated),
         float(np.mean(alarms)),
         float(np.mean(outside)),
+        tuple(model.trained["noise_ladder"]),
+        options.noise,
+        _noise_auc(model, judged, left, [part.values for part in residuals], options.seed),
         judged[0].telemetry.unit,
         {"coarse": coarse[0][:shown], "enhanced": enhanced[0][:shown], "real": judged[0].telemetry.values[:shown], "generated": copy},
     )
+
+
+def _noise_auc(
+    model: RunModel, judged: Sequence[Pair], left: Sequence[np.ndarray], learnt: Sequence[np.ndarray], seed: int
+) -> dict[str, float]:
+    """Returns the AUC of a classifier of generated, and of learnt, against held-out residuals; empty if there are too few windows."""
+    starts = [evenly_spaced_starts(parts, model.window, _NUM_COMPARED) for parts in (learnt, left)]
+    number = min(map(len, starts))
+    if number < _LEAST_COMPARED:
+        return {}
+    real = [
+        cut_windows_from_parts(_as_series(parts), chosen, model.window)[0] for parts, chosen in zip((learnt, left), starts, strict=True)
+    ]
+    clean = np.concatenate([*model.nominal_chunks(number, np.random.default_rng([seed, 8]))])
+    generated = model.add_noise(clean, np.random.default_rng([seed, 9])) - clean
+    return {kind: two_sample_auc(noise[:number], real[1][:number], seed) for kind, noise in (("generated", generated), ("real", real[0]))}
+
+
+def _as_series(parts: Sequence[np.ndarray]) -> list[Telemetry]:
+    return [Telemetry(values) for values in parts]
 
 
 def _one_run(model: RunModel, pair: Pair) -> Recording:

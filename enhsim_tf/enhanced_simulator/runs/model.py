@@ -3,7 +3,7 @@
 import dataclasses
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,20 +16,12 @@ from enhsim_tf.enhanced_simulator.runs import saving
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhancer.ladder import Rung
 from enhsim_tf.enhancer.overlapping import cut_run, enhance_run
+from enhsim_tf.noise import ladder
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 
 _CHUNK = 2_048  # windows generated at a time
 _SAME_RATE = 1e-3
-
-
-class Noise(Protocol):
-    """What a run model needs of a noise model."""
-
-    def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(num_windows, samples)`."""
-
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws one series of noise, float32 of shape `(num_samples,)`."""
 
 
 class RunModel:
@@ -37,13 +29,14 @@ class RunModel:
 
     Args:
         rung: The enhancer.
-        noise: The noise model.
+        noise: The noise model, of any rung of `noise.ladder`.
         coverage: The range of the training runs.
         nominal: The nominal run of the fit, with the model's columns. It is saved with the model.
         window: Length of a window in samples.
         delay_s: How much later the telemetry is than the coarse run, in seconds.
         coarse: The coarse simulator, or None if it has to be given again.
         trained: Record of the training, in plain JSON types.
+        quantisation: Levels of the channel, to which generated telemetry is rounded. None does not round.
 
     Example:
     >>> model, report = fit_run_model(telemetry, read_recording("simulator.csv"))
@@ -54,14 +47,16 @@ class RunModel:
     def __init__(
         self,
         rung: Rung,
-        noise: Noise,
+        noise: Any,
         coverage: Coverage,
         nominal: Recording,
         window: int,
         delay_s: float = 0.0,
         coarse: CoarseSimulator | None = None,
         trained: Mapping[str, Any] | None = None,
+        quantisation: Levels | None = None,
     ):
+        self.quantisation = quantisation
         self.rung, self.noise, self.coverage, self.nominal = rung, noise, coverage, nominal
         self.window, self.delay_s, self.coarse, self.trained = int(window), float(delay_s), coarse, dict(trained or {})
 
@@ -139,7 +134,26 @@ class RunModel:
         clean = [self.enhance(part.values) for part in self.usable(run).parts]
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
-            yield [enhanced + self.noise.generate_series(len(enhanced), rng) for enhanced in clean]
+            yield [self.add_noise(enhanced, rng) for enhanced in clean]
+
+    def draw_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
+        """Generates noise for windows or for one series. Noise that follows the signal receives it in units of the enhancer.
+
+        Args:
+            clean: Enhanced windows of shape `(windows, samples)`, or an enhanced series of shape `(samples,)`.
+            seed: Seed, or a random number generator, whose state advances.
+
+        Returns:
+            float32 array of the shape of `clean`, in the telemetry's unit.
+        """
+        draw = ladder.generate if np.ndim(clean) == 2 else ladder.generate_series
+        signal = self.rung.scaling.scale_target(clean) if getattr(self.noise, "follows_signal", False) else None
+        return draw(self.noise, len(clean), seed, signal)
+
+    def add_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
+        """Adds noise to enhanced windows or to an enhanced series, and rounds to the levels of a quantised channel."""
+        noisy = clean + self.draw_noise(clean, seed)
+        return noisy if self.quantisation is None else self.quantisation.round(noisy)
 
     def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
         """Runs the coarse simulator of the model.
@@ -190,9 +204,19 @@ class RunModel:
     def generate_chunks(self, num_windows: int, scenario: Any = None, seed: int = 0) -> Iterator[np.ndarray]:
         """Yields the windows of `generate` in chunks, so that memory does not grow with their number."""
         self._refuse_scenario(scenario)
+        noise_rng = np.random.default_rng([seed, 1])
+        for clean in self.nominal_chunks(num_windows, np.random.default_rng(seed)):
+            yield self.add_noise(clean, noise_rng)
+
+    def nominal_chunks(self, num_windows: int, rng: np.random.Generator) -> Iterator[np.ndarray]:
+        """Yields enhanced windows from random places of the saved nominal run, without noise, in chunks.
+
+        Args:
+            num_windows: Number of windows.
+            rng: Random generator of the places.
+        """
         check_counts(num_windows=(num_windows, 0))
         parts = self._nominal_parts()
-        rng, noise_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1])
         firsts = np.cumsum([0] + [len(part) - self.window + 1 for part in parts])
         places = rng.integers(0, firsts[-1], num_windows)
         for first in range(0, num_windows, _CHUNK):
@@ -202,7 +226,7 @@ class RunModel:
             for number in np.unique(which):
                 here = which == number
                 coarse[here] = cut_run(parts[number].values, chosen[here] - firsts[number], self.window)
-            yield self.rung.predict(coarse) + self.noise.generate(len(chosen), noise_rng)
+            yield self.rung.predict(coarse)
 
     def generate_labelled_chunks(self, num_windows: int, scenario: Any = None, seed: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yields the windows of `generate_chunks` with masks of changed samples, which are False because the windows are nominal."""
@@ -231,6 +255,10 @@ class RunModel:
             float32 array of shape `(num_samples,)`.
         """
         self._refuse_scenario(scenario)
+        return self.add_noise(self.nominal_series(num_samples, start_s), np.random.default_rng([seed, 1]))
+
+    def nominal_series(self, num_samples: int, start_s: float = 0.0) -> np.ndarray:
+        """Returns the series of `generate_series` without noise."""
         check_counts(num_samples=(num_samples, 1))
         skipped, fade = round(start_s / self.interval_s), self.window // 2
         clean = [self.enhance(part.values) for part in self._nominal_parts()]
@@ -244,8 +272,7 @@ class RunModel:
             following[:fade] = (1 - rise) * tail + rise * following[:fade]
             pieces.append(following[:-fade])
             length, tail = length + len(following) - fade, following[-fade:]
-        series = np.concatenate(pieces)[skipped : skipped + num_samples]
-        return series + self.noise.generate_series(num_samples, np.random.default_rng([seed, 1]))
+        return np.concatenate(pieces)[skipped : skipped + num_samples]
 
     def _nominal_parts(self) -> tuple[Run, ...]:
         return self.usable(self.nominal).parts

@@ -3,10 +3,9 @@
 import dataclasses
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
+from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, NOISES
 
 RUNGS = ("coarse", "level and gain", "ridge", "ridge and network", "network")  # as in `enhancer.ladder`, which imports TensorFlow
-NOISES = ("convolutional", "paper", "resampled")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,8 +17,7 @@ class RunOptions:
         num_windows: Number of training windows, evenly spaced over the time.
         epochs: Passes of the networks over the training windows.
         num_iterations: Adversarial iterations of the noise networks.
-        noise: Model of the noise: the networks `convolutional` or those of the `paper`, or `resampled`, which draws whole
-            residual windows again.
+        noise: Model of the noise, as in `FitOptions`.
         enhancer: One of `RUNGS`, or None, which chooses the simplest rung that is not measurably worse than the best one.
         delay_s: How much later the telemetry is than the coarse run, in seconds. None: it is estimated.
         held_out: Share of the telemetry, taken from its end, that is reserved for the report.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import printable
+from enhsim_tf.enhanced_simulator.noise_fitting import sentence_of, warning_of
 
 RATE = 0.01  # false-alarm rate for which the threshold of the residual detector is set
 
@@ -31,6 +32,10 @@ class RunReport:
         noise: Standard deviation (`sd`) and correlation of neighbouring samples (`lag_1`), for `real` residuals and `generated` noise.
         false_alarms: Share of these samples that the residual detector flags, at a threshold set for `RATE`.
         outside: Share of these samples whose coarse run is outside the training range.
+        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for.
+        noise_model: Name of the noise model that was asked for, or `best`.
+        noise_auc: AUC of a classifier that separates `generated` noise from the residuals of the judged telemetry, and of one that
+            separates `real` residuals of the training telemetry from them. Empty if there is too little telemetry.
         unit: Unit of the values.
         examples: A stretch for the figure: `coarse`, `enhanced`, `generated` and `real`.
     """
@@ -49,6 +54,9 @@ class RunReport:
     noise: Mapping[str, Mapping[str, float]]
     false_alarms: float
     outside: float
+    noise_ladder: tuple[Mapping[str, Any], ...] = ()
+    noise_model: str = "convolutional"
+    noise_auc: Mapping[str, float] = dataclasses.field(default_factory=dict)
     unit: str = "1"
     examples: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
 
@@ -59,6 +67,8 @@ class RunReport:
         return plain | {
             "nrmse": dict(self.nrmse),
             "noise": {kind: dict(each) for kind, each in self.noise.items()},
+            "noise_ladder": [dict(each) for each in self.noise_ladder],
+            "noise_auc": dict(self.noise_auc),
             "verdict": self.verdict,
         }
 
@@ -75,15 +85,23 @@ class RunReport:
             f"Chosen: {self.chosen}, {why}.",
             f"Signal: error {self.nrmse['enhanced']:.4f} on {self.num_samples:,} samples {where}; the coarse simulator {self.nrmse['coarse']:.4f}. "
             "Both errors contain the noise of the telemetry.",
+            self._of_the_noise_models(),
             f"Noise: standard deviation {generated['sd']:.4g}{unit} generated, {real['sd']:.4g}{unit} real; correlation of neighbouring samples "
             f"{generated['lag_1']:.2f} generated, {real['lag_1']:.2f} real.",
             f"False alarms of `score --coarse` there, at a threshold set for {RATE:.0%}: {self.false_alarms:.1%} of the samples.",
             f"Range: {self.outside:.1%} of these samples are outside the training range of the coarse columns.",
         ]
 
+    def _of_the_noise_models(self) -> str:
+        said = sentence_of(self.noise_ladder, self.noise_model)
+        if not self.noise_auc:
+            return said
+        return f"{said} AUC of a classifier against held-out residuals: generated {self.noise_auc['generated']:.2f}, real {self.noise_auc['real']:.2f}."
+
     def lines(self) -> list[str]:
         """Returns the report as lines of text: a heading, the notes on the pairing, and the verdict."""
         head = f"{self.channel}: windows of {self.window} samples; inputs: {', '.join(self.columns)}"
+        head += warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
         return [printable(line) for line in (head, *self.notes, *self.verdict)]
 
 

@@ -1,5 +1,6 @@
 """Saves and loads run models. Code of a user's simulator is not saved; everything else is."""
 
+import dataclasses
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,17 +10,16 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
-from enhsim_tf.common.size_limits import load_npz
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
-from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, read_saved, write_saved
+from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, noise_file, read_arrays, read_noise, read_saved, write_arrays, write_saved
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.scaling import Scaling
+from enhsim_tf.noise.states import state_of
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.telemetry.quantisation import Levels
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
-
-_MOST_BYTES = 2**28  # maximum size of the nominal run, and of residual windows
 
 
 def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
@@ -35,33 +35,25 @@ def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
     networks = {"enhancer": model.rung.network}
     others = {
         "range.npz": model.coverage.out_of_range.save,
-        "nominal.npz": lambda path: _write_arrays(path, {f"part_{number}": part.values for number, part in enumerate(model.nominal.parts)}),
+        "nominal.npz": lambda path: write_arrays(path, {f"part_{number}": part.values for number, part in enumerate(model.nominal.parts)}),
     }
-    noise: Mapping[str, Any]
-    if isinstance(model.noise, WindowBootstrap):
-        noise = {"kind": "resampled"}
-        others["noise.npz"] = lambda path: _write_arrays(path, {"windows": model.noise.windows})
-    else:
-        noise = {"kind": "networks"} | model.noise.get_config()
-        networks |= {"generator": model.noise.generator, "discriminator": model.noise.discriminator}
+    noise = state_of(model.noise)
+    networks |= noise.networks
+    others |= noise_file(noise)
     settings = {
         "rung": model.rung.name,
         "scaling": model.rung.scaling.get_config(),
-        "noise": noise,
+        "noise": dict(noise.settings),
         "limit": model.coverage.limit,
         "window": model.window,
         "interval_s": model.interval_s,
         "delay_s": model.delay_s,
         "columns": list(model.columns),
         "nominal": {"start": model.nominal.start, "offsets_s": [part.offset_s for part in model.nominal.parts]},
+        "quantisation": None if model.quantisation is None else dataclasses.asdict(model.quantisation),
         "trained": model.trained,
     }
     write_saved(folder, networks, settings, others, RUNS_FORMAT)
-
-
-def _write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    with open(path, "wb") as file:
-        np.savez_compressed(file, **arrays)
 
 
 def load_run_model(folder: str | os.PathLike) -> "RunModel":
@@ -83,15 +75,10 @@ def load_run_model(folder: str | os.PathLike) -> "RunModel":
 def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str, Any]) -> "RunModel":
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
     from enhsim_tf.enhancer.ladder import Rung
-    from enhsim_tf.noise.gan import NoiseGAN
 
     scaling, window = Scaling.from_config(settings["scaling"]), int(settings["window"])
-    if settings["noise"]["kind"] == "resampled":
-        noise = WindowBootstrap(load_npz(folder / "noise.npz", _MOST_BYTES)["windows"])
-    else:
-        config = {name: value for name, value in settings["noise"].items() if name != "kind"}
-        noise = NoiseGAN(networks["generator"], networks["discriminator"], **config)
-    arrays, offsets = load_npz(folder / "nominal.npz", _MOST_BYTES), settings["nominal"]["offsets_s"]
+    noise = read_noise(folder, settings["noise"], networks)
+    arrays, offsets = read_arrays(folder / "nominal.npz"), settings["nominal"]["offsets_s"]
     parts = tuple(Run(arrays[f"part_{number}"], float(offset_s)) for number, offset_s in enumerate(offsets))
     nominal = Recording(parts, tuple(settings["columns"]), float(settings["interval_s"]), settings["nominal"]["start"], "the nominal run")
     coverage = Coverage(OutOfRange.load(folder / "range.npz"), settings["limit"], scaling, window)
@@ -106,4 +93,5 @@ def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str
         raise ValueError("an enhancer of another shape than the settings say")
     if not all(np.isfinite(part.values).all() for part in parts) or not nominal.interval_s > 0:
         raise ValueError("a nominal run that no simulator records")
-    return RunModel(rung, noise, coverage, nominal, window, settings["delay_s"], coarse, settings["trained"])
+    quantisation = None if settings.get("quantisation") is None else Levels(**settings["quantisation"])
+    return RunModel(rung, noise, coverage, nominal, window, settings["delay_s"], coarse, settings["trained"], quantisation)

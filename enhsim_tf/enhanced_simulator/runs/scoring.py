@@ -37,12 +37,11 @@ class ResidualDetector:
 
     def __init__(self, model: "RunModel", options: ScoreOptions):
         self.window, self.stride = model.window, max(1, model.window // _STRIDES)
-        noise = model.noise.generate(options.num_windows, np.random.default_rng([options.seed, 3]))
+        clean = np.concatenate([*model.nominal_chunks(options.num_windows, np.random.default_rng([options.seed, 7]))])
+        noise = model.draw_noise(clean, np.random.default_rng([options.seed, 3]))
         self.detector: Detector = DETECTORS[options.detector](options.seed).fit(noise)
-        series, further = (
-            model.noise.generate_series(_THRESHOLD_WINDOWS * self.window, np.random.default_rng([options.seed, number]))
-            for number in (4, 6)
-        )
+        clean = model.nominal_series(_THRESHOLD_WINDOWS * self.window)
+        series, further = (model.draw_noise(clean, np.random.default_rng([options.seed, number])) for number in (4, 6))
         scores = score_trace(self.detector, series, self.window, self.stride)
         self.threshold, self.rate = metrics.finite_threshold(scores, options.false_alarm_rate, _THRESHOLD_WINDOWS)
         self.nominal_scores = self.score(further)  # on it the alarms are counted

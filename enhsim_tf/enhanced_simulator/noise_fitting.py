@@ -1,0 +1,184 @@
+"""Fits the noise model of a simulator: the rung of the ladder that was asked for, or the one that held-out telemetry chooses.
+
+Rule and tolerances are those of `noise_choice`. The rungs learn the noise of the first part of the time and are judged on that of the
+last part, by generated telemetry as the simulator would give it, with its levels if the channel is quantised. A chosen rung without a
+network is fitted again to all of the time.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.common.console import SILENT, Progress
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator import noise_choice
+from enhsim_tf.noise import ladder
+from enhsim_tf.noise.rung_names import BY_OPTION, NETWORKS
+from enhsim_tf.telemetry.quantisation import Levels
+
+JUDGED_SHARE = 0.25  # of the time, at its end, on which rungs are judged
+MOST_JUDGED = 1_000  # windows
+BEST = "best"
+_LEAST_JUDGED = 20
+_DRAW = 73  # number of the random draw
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseWindows:
+    """Windows of noise and the enhanced windows below them.
+
+    Args:
+        noise: Telemetry minus enhanced signal, shape `(windows, samples)`, in the unit of the telemetry.
+        clean: Enhanced windows of the same shape.
+    """
+
+    noise: np.ndarray
+    clean: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.noise)
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseTraining:
+    """How noise models are fitted.
+
+    Args:
+        num_iterations: Adversarial iterations of the GANs. The autoregressive network takes three times as many.
+        seed: Seed of the training.
+        to_unit: Converts enhanced windows to the unit in which noise that follows the signal receives them.
+        quantisation: Levels of the channel, or None.
+        unit: Unit of the paper's GAN, in the unit of the telemetry. None: it follows from the noise.
+        verbose: Progress bars of the GANs: 0 none, 1 always, "auto" on a terminal.
+        progress: Reports the progress of the trainings as lines of text.
+    """
+
+    num_iterations: int
+    seed: int
+    to_unit: Callable[[np.ndarray], np.ndarray]
+    quantisation: Levels | None = None
+    unit: float | None = None
+    verbose: int | str = 0
+    progress: Progress = SILENT
+
+
+def fit_noise(option: str, windows: NoiseWindows, training: NoiseTraining, notes: list[str]) -> Any:
+    """Fits the rung of one option.
+
+    Args:
+        option: A key of `rung_names.BY_OPTION`.
+        windows: Windows to learn from.
+        training: How they are learnt.
+        notes: Receives a sentence for each training that diverged.
+
+    Returns:
+        The noise model.
+
+    Raises:
+        InputError: If the rung cannot be fitted to this noise.
+    """
+    is_adversarial = option in ("paper", "convolutional")
+    number = training.num_iterations * (1 if is_adversarial else 3)
+    name = "noise GAN, iteration" if is_adversarial else "noise network, iteration"
+    count = training.progress.loop(name, number) if option in NETWORKS else None
+    watch = ladder.Watch(None if training.verbose == "auto" else bool(training.verbose), count, notes.append)
+    signal = training.to_unit(windows.clean) if option == "autoregressive network" else None
+    if option == "paper":
+        return ladder.fit_paper_gan(windows.noise, number, training.seed, training.unit, watch)
+    return ladder.RUNGS[BY_OPTION[option]](windows.noise, signal, number, training.seed, watch)
+
+
+def choose_noise(
+    learnt: NoiseWindows, judged: NoiseWindows, everything: NoiseWindows, training: NoiseTraining, notes: list[str]
+) -> tuple[Any, list[dict[str, Any]]]:
+    """Fits every rung, judges it on held-out telemetry, and returns the chosen one.
+
+    Args:
+        learnt: Windows of the first part of the time, in order.
+        judged: Windows of the last part of the time, in order.
+        everything: Windows of the whole time, for a chosen rung without a network.
+        training: How they are learnt.
+        notes: Receives a sentence for each rung that could not be fitted or diverged.
+
+    Returns:
+        The noise model; and for each rung its `name`, the numbers of `noise_choice.RungJudgement`, `passes` and `is_chosen`. The
+        list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
+    """
+    if min(len(judged), len(learnt)) < _LEAST_JUDGED:
+        notes.append("there is too little telemetry to judge noise models; whole residual windows are drawn")
+        return fit_noise("residual windows", everything, training, notes), []
+    models, judgements = {}, []
+    for option in BY_OPTION:
+        try:
+            model = fit_noise(option, learnt, training, notes)
+            judgements.append(judge_noise(option, model, learnt, judged, training))
+            models[option] = model
+        except InputError as error:
+            notes.append(f"noise model {option} left out: {error}")
+    chosen = noise_choice.choose(judgements)
+    model = models[chosen] if chosen in NETWORKS else fit_noise(chosen, everything, training, notes)
+    return model, rows_of(judgements, chosen)
+
+
+def judge_noise(option: str, model: Any, learnt: NoiseWindows, judged: NoiseWindows, training: NoiseTraining) -> noise_choice.RungJudgement:
+    """Judges a fitted noise model on held-out telemetry.
+
+    Args:
+        option: Name of its rung.
+        model: The noise model.
+        learnt: Windows from which it was fitted.
+        judged: Windows that it has not seen.
+        training: How it was fitted.
+    """
+    number = min(len(judged), len(learnt), MOST_JUDGED)
+    rows = np.linspace(0, len(learnt) - 1, number).astype(int)
+    clean = learnt.clean[rows]
+    rng = np.random.default_rng([training.seed, _DRAW, list(BY_OPTION).index(option)])
+    noise = ladder.generate(model, number, rng, training.to_unit(clean))
+    if training.quantisation is not None:
+        noise = training.quantisation.round(clean + noise) - clean
+    signals = (clean, clean, judged.clean)
+    return noise_choice.judge(option, noise, learnt.noise[rows], judged.noise[:number], signals, seed=training.seed)
+
+
+def sentence_of(rows: Sequence[Mapping[str, Any]], used: str) -> str:
+    """Describes the judgements of all rungs in one sentence.
+
+    Args:
+        rows: As returned by `choose_noise`.
+        used: The option that the model was fitted with.
+    """
+    if not rows:
+        return f"Noise model: {used}."
+    judged = [f"{each['name']} {each['auc']:.2f} and {each['alarms']:.1%}" for each in rows]
+    (chosen,) = [each for each in rows if each["is_chosen"]]
+    why = "the simplest that passes" if chosen["passes"] else "none passes, and it departs least"
+    return (
+        "Noise models on held-out time, by the AUC of a classifier against real noise and the false alarms of two detectors: "
+        f"{', '.join(judged)}; real noise {chosen['real_auc']:.2f} and {chosen['real_alarms']:.1%}. Used: {chosen['name']}, {why}."
+    )
+
+
+def warning_of(auc: float | None, real_auc: float | None) -> str:
+    """Returns what the first line of a report says if a classifier tells generated noise from the real; otherwise an empty text.
+
+    Args:
+        auc: AUC of a classifier of generated against real noise, or None if it was not measured.
+        real_auc: The same for real against other real noise.
+    """
+    if auc is None or auc <= noise_choice.TOLD_APART:
+        return ""
+    return (
+        f"; WARNING: a classifier tells its noise from the telemetry's (AUC {auc:.2f}; {real_auc:.2f} between two parts of the telemetry's)"
+    )
+
+
+def rows_of(judgements: Sequence[noise_choice.RungJudgement], chosen: str) -> list[dict[str, Any]]:
+    """Returns judgements in plain JSON types."""
+    return [
+        {"name": each.rung, **{name: value for name, value in dataclasses.asdict(each).items() if name != "rung"}}
+        | {"passes": bool(each.passes), "is_chosen": each.rung == chosen}
+        for each in judgements
+    ]
