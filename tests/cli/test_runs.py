@@ -16,7 +16,7 @@ from enhsim_tf.enhancer.ladder import COARSE, RIDGE
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.sources import read_source
 
-TINY = ["--window", "32", "--num-windows", "60", "--epochs", "1", "--noise", "resampled"]
+TINY = ["--window", "32", "--num-windows", "60", "--epochs", "1", "--noise", "residual-windows"]
 
 
 def coarse(num_samples=1_500, seed=0):
@@ -63,7 +63,7 @@ def world(tmp_path_factory):
         failed = fit_channels(
             read_source(folder / "telemetry.csv"),
             folder / "models",
-            RunOptions(window=32, num_windows=300, noise="resampled"),
+            RunOptions(window=32, num_windows=300, noise="residual windows"),
             Cleaning(),
             0,
             said.append,
@@ -191,7 +191,7 @@ def test_bad_fault_runs(world, tmp_path, capsys, change, words):
 )
 def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
     run = dataclasses.replace(run, source=str(world / run.source))
-    options = RunOptions(window=32, num_windows=60, noise="resampled")
+    options = RunOptions(window=32, num_windows=60, noise="residual windows")
     failed = fit_channels(read_source(world / source), tmp_path / "models", options, Cleaning(), 0, print, run=run)
     (line,) = failed.values()
     assert line.startswith("Expected ") and "Received: " in line and all(word in line for word in words)
@@ -203,7 +203,6 @@ def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
     [
         (["fit", "telemetry.csv", "--delay", "3"], ["--delay", "--coarse"]),
         (["fit", "telemetry.csv", "--enhancer", "level-and-gain"], ["enhancer", "ridge and network"]),
-        (["fit", "telemetry.csv", "--noise", "resampled"], ["resampled", "--coarse"]),
         (["generate", "models", "--copies", "3", "--windows", "2"], ["--copies", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--windows", "2"], ["--windows", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--scenario", "stuck:0.5"], ["--scenario", "--coarse"]),

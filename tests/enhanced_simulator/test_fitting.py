@@ -13,7 +13,6 @@ from enhsim_tf.enhanced_simulator import fitting, report_measure
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.fitting import fit_channel, window_of
 from enhsim_tf.enhanced_simulator.report import ChannelReport
-from enhsim_tf.enhanced_simulator.report_measure import levels_of
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -239,7 +238,7 @@ def test_constant_telemetry_has_no_error_and_the_report_is_valid_json():
 )
 def test_the_sentence_on_the_noise(ratios, said):
     report = made_up(noise=[{"measure": f"m{number}", "ratio": ratio} for number, ratio in enumerate(ratios)])
-    assert said in sentence(report, "Noise")
+    assert said in sentence(report, "Noise:")
 
 
 @pytest.mark.parametrize(
@@ -305,30 +304,13 @@ def test_the_report_states_the_evaluation_telemetry():
     assert all(len(line.splitlines()) == 1 for line in made_up(channel="a\nb\x1b[31m").lines())
 
 
-# quantised telemetry
-
-
-@pytest.mark.parametrize("step", [0.1, 1.0, 1 / 128])
-def test_levels_of_quantised_values_are_found(step):
-    rng = np.random.default_rng(0)
-    values = (step * np.round(rng.normal(20, 3, 5_000))).astype(np.float32)
-    values[100:103] += np.float32(step) * np.array([0.25, 0.5, 0.75], np.float32)  # an interpolated gap
-    found = levels_of(values)
-    assert found["step"] == pytest.approx(step, rel=1e-3) and 15 <= found["count"] <= 25
-    said = sentence(made_up(levels=found), "Levels")
-    assert f"{found['count']} values, {step:.4g} apart" in said and "not rounded" in said
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        np.random.default_rng(0).standard_normal(5_000),
-        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),  # values of a noise-free wave repeat too
-        np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a saturated sensor
-        np.arange(20.0),
-    ],
-    ids=["noise", "wave", "clipped", "short"],
-)
-def test_values_that_are_not_quantised_have_no_levels(values):
-    assert levels_of(values.astype(np.float32)) == {}
+def test_the_report_names_the_levels():
+    assert "19 values, 0.25 apart" in sentence(made_up(levels={"count": 19, "step": 0.25}), "Levels")
     assert not [line for line in made_up().verdict if line.startswith("Levels")]
+
+
+def test_noise_that_is_told_apart_is_named_in_the_first_line():
+    first, *_ = made_up(noise_auc={"generated": 0.81, "real": 0.55}).lines()
+    assert "WARNING: a classifier tells its noise from the telemetry's (AUC 0.81; 0.55" in first
+    assert "WARNING" not in made_up(noise_auc={"generated": 0.79, "real": 0.55}).lines()[0]
+    assert "WARNING" not in made_up().lines()[0]

@@ -18,12 +18,14 @@ from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.simulator import PAPER, EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.enhancer.training_pairs import cut_pairs
+from enhsim_tf.noise import gan
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
@@ -356,7 +358,7 @@ def measured(number=1_500):
 @pytest.fixture
 def small_batches(monkeypatch):
     """Uses small batches for the noise networks, because a step on 200 rows takes long to trace."""
-    monkeypatch.setattr(training, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
+    monkeypatch.setattr(gan, "NoiseGAN", functools.partial(NoiseGAN, batch_size=20))
 
 
 def fitted(seed=0, **arguments):
@@ -586,3 +588,46 @@ def test_saving_refuses_a_folder_with_a_foreign_manifest(tmp_path):
     with pytest.raises(InputError, match="something else"):
         small().save(tmp_path)
     assert (tmp_path / "manifest.json").read_text() == '{"name": "an extension"}'
+
+
+# quantised channels
+
+LEVELS = Levels(0.25, 0.1, 9)
+
+
+@pytest.fixture(scope="module")
+def quantised():
+    """A simulator of a channel whose levels are coarse compared with the noise, so that rounding removes small changes."""
+    return known(0.1, 60, quantisation=LEVELS)
+
+
+def is_on_levels(values):
+    steps = (values.astype(np.float64) - LEVELS.origin) / LEVELS.step
+    return np.abs(steps - np.rint(steps)).max() < 1e-4
+
+
+def test_generated_values_keep_the_levels_of_the_channel(quantised):
+    plain = known(0.1, 60)
+    windows = quantised.generate(30, Degraded("drift", 0.4), seed=1)
+    np.testing.assert_array_equal(windows, LEVELS.round(plain.generate(30, Degraded("drift", 0.4), seed=1)))
+    assert is_on_levels(windows) and is_on_levels(quantised.generate_series(500, seed=2))
+    assert not is_on_levels(quantised.generate_clean(5))
+
+
+@pytest.mark.parametrize("mode", ["drift", "gain_loss", "stuck"])
+def test_marked_samples_of_a_quantised_channel_are_those_that_differ(quantised, mode):
+    scenario = Degraded(mode, 0.2)
+    nominal = quantised.generate(40, seed=3)
+    windows, mask = (np.concatenate(each) for each in zip(*quantised.generate_labelled_chunks(40, scenario, seed=3), strict=True))
+    assert mask.any()
+    np.testing.assert_array_equal(mask, windows != nominal)
+    values, marks, events = quantised.generate_labelled_series(900, scenario, seed=3)
+    np.testing.assert_array_equal(marks, values != quantised.generate_series(900, seed=3))
+    assert events[0][2] == np.flatnonzero(marks)[0] and events[-1][3] == np.flatnonzero(marks)[-1] + 1
+
+
+def test_levels_are_saved(quantised, tmp_path):
+    quantised.save(tmp_path / "model")
+    loaded = EnhancedSimulator.load(tmp_path / "model")
+    assert loaded.quantisation == LEVELS
+    np.testing.assert_array_equal(loaded.generate(4, seed=1), quantised.generate(4, seed=1))

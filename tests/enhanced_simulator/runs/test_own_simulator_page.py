@@ -36,7 +36,7 @@ def folder(tmp_path, monkeypatch):
 
 def test_the_example_with_files_runs(folder, capsys):
     made = {}
-    exec(BLOCKS[0].replace("RunOptions(seed=0)", 'RunOptions(seed=0, noise="resampled", num_windows=200)'), made)
+    exec(BLOCKS[0].replace("RunOptions(seed=0)", 'RunOptions(seed=0, noise="residual windows", num_windows=200)'), made)
     assert [copy.shape for copy in made["copies"]] == [(300,)] * 3 and "Chosen: " in capsys.readouterr().out
 
 

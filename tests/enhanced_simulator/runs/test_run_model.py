@@ -23,7 +23,7 @@ from enhsim_tf.telemetry.series import Telemetry
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
 START = "2024-01-01T00:00:00+00:00"
 WINDOW, NOISE_SD = 32, 0.1
-FAST = RunOptions(window=WINDOW, num_windows=300, noise="resampled", epochs=1)
+FAST = RunOptions(window=WINDOW, num_windows=300, noise="residual windows", epochs=1)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -226,10 +226,10 @@ def test_a_recording_has_no_degraded_modes(refused, fitted):
 # saving
 
 
-@pytest.mark.parametrize("noise", ["resampled", "convolutional"])
+@pytest.mark.parametrize("noise", ["residual windows", "convolutional"])
 def test_what_is_saved_is_what_is_loaded(fitted, tmp_path, noise):
     model, _ = fitted
-    if noise != "resampled":
+    if noise != "residual windows":
         run = coarse_run()
         model, _ = fit_run_model(telemetry(run), recording(run), dataclasses.replace(FAST, noise=noise, num_iterations=0))
     model.save(tmp_path / "model")

@@ -21,7 +21,9 @@ def fitted():
     parts = clean(read_source(PAIR / "telemetry.csv")["volts"]).parts
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fitting, "RUNGS", (COARSE, LEVEL_AND_GAIN, RIDGE))
-        return fit_run_model(parts, read_recording(PAIR / "simulator.csv"), RunOptions(window=100, num_windows=600, noise="resampled"))
+        return fit_run_model(
+            parts, read_recording(PAIR / "simulator.csv"), RunOptions(window=100, num_windows=600, noise="residual windows")
+        )
 
 
 def test_the_enhanced_run_has_less_than_half_the_error_of_the_coarse_one(fitted):

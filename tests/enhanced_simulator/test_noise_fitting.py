@@ -1,0 +1,110 @@
+"""The choice of the noise model: known noise gets the simplest model that has its properties, and what is chosen is saved and reported."""
+
+import json
+
+import numpy as np
+import pytest
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, sentence_of
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.noise import ladder
+from enhsim_tf.noise.rung_names import BY_OPTION
+from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.telemetry.quantisation import Levels
+from enhsim_tf.telemetry.series import Telemetry
+
+pytestmark = pytest.mark.usefixtures("narrow_enhancer")
+WAVES = SquareWaveSimulator([SquareWave(40.0, low=-1.0, high=1.0)])
+WITHOUT_NETWORKS = [name for name in BY_OPTION if name not in ("autoregressive network", "paper", "convolutional")]
+
+
+@pytest.fixture
+def no_networks(monkeypatch):
+    """Refuses to train networks, which these cases do not need."""
+
+    def refuse(*arguments):
+        raise InputError("no network in this test")
+
+    for option in ("autoregressive network", "convolutional"):
+        monkeypatch.setitem(ladder.RUNGS, BY_OPTION[option], refuse)
+    monkeypatch.setattr(ladder, "fit_paper_gan", refuse)
+
+
+def series(coefficient, num_samples=24_000, seed=0, step=0.0):
+    """A sine with autoregressive noise of order 1 and unit variance, scaled to a fifth."""
+    from scipy.signal import lfilter
+
+    drawn = np.random.default_rng(seed).standard_normal(num_samples)
+    noise = lfilter([np.sqrt(1 - coefficient**2)], [1, -coefficient], drawn)
+    values = np.sin(2 * np.pi * np.arange(num_samples) / 40) + 0.2 * noise
+    return Telemetry((step * np.rint(values / step) if step else values).astype(np.float32), name="volts")
+
+
+def fit(telemetry, noise="best"):
+    counts = {"num_windows": 600, "window": 64, "epochs": 1, "num_iterations": 1}
+    return EnhancedSimulator.fit(telemetry, WAVES, 0, **counts, noise=noise, enhancer="ridge", verbose=0)
+
+
+@pytest.mark.parametrize(("coefficient", "expected"), [(0.0, GaussianNoise), (0.8, GaussianAutoregression)])
+@pytest.mark.usefixtures("no_networks")
+def test_known_noise_gets_the_simplest_model_that_has_its_properties(coefficient, expected, tmp_path):
+    simulator = fit(series(coefficient))
+    assert type(simulator.noise) is expected
+    rows = simulator.trained["noise_ladder"]
+    assert [each["name"] for each in rows] == WITHOUT_NETWORKS
+    (chosen,) = [each for each in rows if each["is_chosen"]]
+    assert chosen["passes"] and chosen["auc"] - max(chosen["real_auc"], 0.5) <= 0.05
+    assert not any(each["passes"] for each in rows[: rows.index(chosen)])
+    assert len(simulator.trained["notes"]) == 3 and "left out" in simulator.trained["notes"][0]
+    simulator.save(tmp_path / "model")
+    assert sorted(path.name for path in (tmp_path / "model").iterdir()) == ["enhancer.keras", "manifest.json", "noise.npz", "settings.json"]
+    np.testing.assert_array_equal(EnhancedSimulator.load(tmp_path / "model").generate(3, seed=1), simulator.generate(3, seed=1))
+
+
+@pytest.mark.usefixtures("no_networks")
+def test_the_same_seed_chooses_the_same(tmp_path):
+    first, second = (fit(series(0.8, 9_000)) for _ in range(2))
+    assert first.trained == second.trained
+    np.testing.assert_array_equal(first.generate(4, seed=2), second.generate(4, seed=2))
+
+
+def test_every_rung_can_be_asked_for_and_is_saved(tmp_path):
+    telemetry = series(0.5, 3_000)
+    for noise in BY_OPTION:
+        simulator = fit(telemetry, noise)
+        simulator.save(tmp_path / "model")
+        loaded = EnhancedSimulator.load(tmp_path / "model")
+        np.testing.assert_array_equal(loaded.generate(3, seed=1), simulator.generate(3, seed=1))
+        assert "noise_ladder" not in loaded.trained and loaded.trained["noise"] == noise
+
+
+@pytest.mark.usefixtures("no_networks")
+def test_a_quantised_channel_is_judged_with_its_levels():
+    simulator = fit(series(0.0, step=0.25))
+    assert simulator.quantisation == Levels(0.25, simulator.quantisation.origin, simulator.quantisation.count)
+    values = simulator.generate(20, seed=1)
+    np.testing.assert_allclose(values / 0.25, np.rint(values / 0.25), atol=1e-5)
+
+
+def test_too_little_telemetry_gets_residual_windows_and_a_note():
+    windows = NoiseWindows(*np.random.default_rng(0).standard_normal((2, 19, 40)).astype(np.float32))
+    notes = []
+    model, rows = choose_noise(windows, windows, windows, NoiseTraining(1, 0, lambda clean: clean), notes)
+    assert isinstance(model, WindowBootstrap) and rows == [] and "too little telemetry" in notes[0]
+
+
+def test_the_sentence_names_all_rungs_and_why_one_is_used():
+    rows = [
+        {"name": "gaussian", "auc": 0.9, "real_auc": 0.52, "alarms": 0.5, "real_alarms": 0.01, "passes": False, "is_chosen": False},
+        {"name": "paper", "auc": 0.7, "real_auc": 0.52, "alarms": 0.02, "real_alarms": 0.01, "passes": False, "is_chosen": True},
+    ]
+    said = sentence_of(json.loads(json.dumps(rows)), "best")
+    assert (
+        "gaussian 0.90 and 50.0%" in said
+        and "real noise 0.52 and 1.0%" in said
+        and said.endswith("Used: paper, none passes, and it departs least.")
+    )
+    assert sentence_of([], "paper") == "Noise model: paper."

@@ -1,0 +1,58 @@
+"""Noise models are made again from what is saved of them, and what describes no noise is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
+from enhsim_tf.noise.ladder import RUNGS, generate, generate_series
+from enhsim_tf.noise.states import NoiseState, model_from, state_of
+
+WINDOWS = np.random.default_rng(0).standard_normal((30, 40)).astype(np.float32)
+CLEAN = np.sin(np.arange(40) / 5).astype(np.float32) * np.ones((30, 1), np.float32)
+
+
+@pytest.mark.parametrize("rung", RUNGS)
+def test_a_saved_noise_model_generates_the_same_noise(rung):
+    model = RUNGS[rung](WINDOWS, CLEAN, 2, 5)
+    state = state_of(model)
+    assert state.is_finite and bool(state.networks) != bool(state.arrays)
+    again = model_from(json.loads(json.dumps(dict(state.settings))), state.networks, state.arrays)
+    assert type(again) is type(model)
+    np.testing.assert_array_equal(generate(again, 6, 1, CLEAN[:6]), generate(model, 6, 1, CLEAN[:6]))
+    np.testing.assert_array_equal(generate_series(again, 90, 1, np.zeros(90)), generate_series(model, 90, 1, np.zeros(90)))
+
+
+def test_models_saved_under_the_old_name_are_read():
+    model = model_from({"kind": "resampled"}, {}, {"windows": WINDOWS})
+    np.testing.assert_array_equal(model.windows, WINDOWS)
+
+
+@pytest.mark.parametrize(
+    ("settings", "arrays", "words"),
+    [
+        ({"kind": "pink"}, {}, "unknown noise"),
+        ({"kind": "residual windows"}, {"windows": np.full((3, 9), np.nan)}, "not finite"),
+        ({"kind": "autoregression", "window": 9, "innovation_sd": -1.0}, {"coefficients": np.zeros(1)}, "scale"),
+        ({"kind": "autoregressive network", "window": 9, "scale": 0.0}, {}, "scale"),
+        (
+            {"kind": "autoregressive network", "window": 9, "scale": 1.0, "num_components": 10**6, "units": 10**6},
+            {},
+            "impossible size",
+        ),
+    ],
+)
+def test_what_describes_no_noise_is_refused(settings, arrays, words):
+    with pytest.raises(ValueError, match=words):
+        model_from(settings, {}, arrays)
+
+
+def test_numbers_that_are_not_finite_are_found():
+    network = AutoregressiveNetwork.untrained(WINDOWS)
+    state = state_of(network)
+    assert state.is_finite
+    assert not NoiseState(state.settings, {}, state.arrays | {"weight_00": np.full(3, np.inf)}).is_finite
+    assert not NoiseState(dict(state.settings) | {"scale": float("nan")}, {}, state.arrays).is_finite
+    with pytest.raises(TypeError, match="noise model of the ladder"):
+        state_of("noise")

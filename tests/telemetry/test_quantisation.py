@@ -1,0 +1,37 @@
+"""Levels of quantised telemetry are found, other telemetry has none, and values are rounded to the nearest level."""
+
+import numpy as np
+import pytest
+
+from enhsim_tf.telemetry.quantisation import Levels
+
+
+@pytest.mark.parametrize("step", [0.1, 1.0, 1 / 128])
+def test_the_levels_of_quantised_values_are_found(step):
+    rng = np.random.default_rng(0)
+    values = (step * np.round(rng.normal(20, 3, 5_000))).astype(np.float32)
+    values[100:103] += np.float32(step) * np.array([0.25, 0.5, 0.75], np.float32)  # an interpolated gap
+    found = Levels.find(values)
+    assert found.step == pytest.approx(step, rel=1e-6) and 15 <= found.count <= 25
+    kept = np.delete(values, np.arange(100, 103))
+    np.testing.assert_allclose(found.round(kept), kept, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.random.default_rng(0).standard_normal(5_000),
+        np.tile(np.sin(2 * np.pi * np.arange(50) / 50), 100),  # values of a noise-free wave repeat too
+        np.clip(np.random.default_rng(0).standard_normal(5_000), -1, 1),  # a saturated sensor
+        np.arange(20.0),
+    ],
+    ids=["noise", "wave", "clipped", "short"],
+)
+def test_values_that_are_not_quantised_have_no_levels(values):
+    assert Levels.find(values.astype(np.float32)) is None
+
+
+def test_values_are_rounded_to_the_nearest_level():
+    levels = Levels(0.5, 0.1, 4)
+    np.testing.assert_allclose(levels.round(np.array([0.1, 0.34, 0.36, -0.2, 7.0])), [0.1, 0.1, 0.6, -0.4, 7.1], rtol=1e-6)
+    assert levels.round(np.zeros((2, 3))).dtype == np.float32
