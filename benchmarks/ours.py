@@ -2,19 +2,23 @@
 
 import os
 import tempfile
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from benchmarks.examples import Work, epoch_clock, example_windows
+from benchmarks.examples import Work, epoch_clock, example_windows, minor_faults
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.keras_tools.backend import keras, tf
 from enhsim_tf.keras_tools.training import fit_windows
+from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
 from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
+
+_COMPILED = 5  # iterations before the time is taken, because the first one compiles
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -38,6 +42,20 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
 def convolutional_iteration(num_iterations: int, window: int = 500) -> Work:
     """Prepares iterations of the convolutional GAN with the same numbers of rows."""
     return _iterations(convolutional_noise_gan(_example_noise(window)), num_iterations, window)
+
+
+def network_iteration(num_iterations: int, window: int = 500) -> Work:
+    """Prepares iterations of the autoregressive network of noise, with 200 windows and 50 positions."""
+    noise = _example_noise(window)
+    network = AutoregressiveNetwork.untrained(noise)
+
+    def run() -> tuple[float, int]:
+        notes = []
+        network.fit(noise, _COMPILED + num_iterations, on_iteration=lambda number: notes.append((time.perf_counter(), minor_faults())))
+        (began, before), (ended, after) = notes[_COMPILED - 1], notes[-1]
+        return ended - began, after - before
+
+    return run, num_iterations
 
 
 def _example_noise(window: int) -> np.ndarray:

@@ -141,15 +141,18 @@ def gan(budget: Budget) -> Iterator[dict]:
 
 
 def second(budget: Budget) -> Iterator[dict]:
-    """Benchmarks an iteration of the convolutional GAN against an iteration of the paper's GAN."""
+    """Benchmarks an iteration of the convolutional GAN and of the autoregressive network against one of the paper's GAN."""
     given = {"num_iterations": budget.iterations}
     window = {name: value for name, value in budget.gan_size.items() if name == "window"}
     workers = {
         "ours": Worker("ours", "convolutional_iteration", **given, **window),
+        "network": Worker("ours", "network_iteration", **given, **window),
         "the paper's": Worker("ours", "gan_iteration", **given, **budget.gan_size),
     }
     found = workers_in_turns(workers, budget.repetitions)
-    yield found.compare("GAN iteration, second generator", "the paper's", "ms", 1.5, words="the paper's networks, same package")
+    words = "the paper's networks, same package"
+    yield found.compare("GAN iteration, second generator", "the paper's", "ms", 1.5, words=words)
+    yield found.compare("iteration, autoregressive network of noise", "the paper's", "ms", 3.0, ours="network", words=words)
 
 
 def generation(budget: Budget) -> Iterator[dict]:

@@ -19,7 +19,7 @@ def test_the_lists_of_the_command_are_those_of_the_gallery_and_the_ladder():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--rungs", "none"], "Expected --rungs together with --experiment noise"),
+        (["--rungs", "none"], "Expected --rungs together with --experiment noise or learning-curve"),
         (["--experiment", "noise", "--rungs", "pink"], "Expected --rungs of none, Gaussian"),
         (["--experiment", "robustness", "--environment", "bursts"], "Expected --environment white, autoregressive, heteroscedastic, shot"),
     ],

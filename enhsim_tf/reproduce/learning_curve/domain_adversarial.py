@@ -74,8 +74,8 @@ class AnomalyClassifier:
             with tf.GradientTape() as tape:
                 features = self.features(tf.concat(rows, 0), training=True)
                 labelled = self.label(features[: 2 * _BATCH], training=True)
-                reversed_gradient = tf.stop_gradient(features * (1 + weight)) - weight * features
-                both = tf.concat([reversed_gradient[:_BATCH], reversed_gradient[2 * _BATCH :]], 0)  # nominal windows of both domains
+                against = reverse_gradient(features, weight)
+                both = tf.concat([against[:_BATCH], against[2 * _BATCH :]], 0)  # nominal windows of both domains
                 total = loss(_halves(), labelled) + loss(_halves(), self.domain(both, training=True))
             optimizer.apply_gradients(zip(tape.gradient(total, variables), variables, strict=True))
 
@@ -92,6 +92,11 @@ class AnomalyClassifier:
 
     def _scaled(self, windows: np.ndarray) -> np.ndarray:
         return ((windows - self._mean) / self._scale).astype(np.float32)
+
+
+def reverse_gradient(values: tf.Tensor, weight: tf.Tensor | float) -> tf.Tensor:
+    """Returns the values unchanged; their gradient is multiplied by `-weight`."""
+    return tf.stop_gradient(values * (1 + weight)) - weight * values
 
 
 def _halves() -> tf.Tensor:

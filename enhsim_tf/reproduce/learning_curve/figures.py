@@ -8,7 +8,7 @@ import matplotlib.ticker
 from matplotlib.axes import Axes
 
 from enhsim_tf.common.number_words import in_words
-from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
+from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, FOOT, GENERATED, QUIET, REAL, new_sheet, panels
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.learning_curve.arms import ADVERSARIAL, CORAL, SIMULATOR, THRESHOLD_ON_REAL
 from enhsim_tf.reproduce.learning_curve.arms import REAL as REAL_ARM
@@ -45,7 +45,7 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     handles, labels = grid[0, 0].get_legend_handles_labels()
     height = figure.get_size_inches()[1]
     figure.legend(handles, labels, frameon=False, ncols=3, loc="upper left", bbox_to_anchor=(0.07, 1 - (down - 0.02) / height))
-    figure.text(0.53, 0.012, "real windows in the record (disjoint)", ha="center")
+    figure.text(0.53, (FOOT + 0.02) / height, "number of real windows k (disjoint; logarithmic)", ha="center")
     return figure
 
 
@@ -56,6 +56,7 @@ def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
     upper.set_ylim(0, 110)
     upper.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50, 100], ["0", "0.5", "1", "2", "5", "10", "20", "50", "100"])
     upper.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+    lower.set_ylim(0, 100)
     lower.set_xscale("log")
     shown = [number for number in numbers if number in (5, 20, 100, 1_000, 10_000)] or numbers
     lower.set_xticks(shown, [f"{number:,}" for number in shown], fontsize=7)

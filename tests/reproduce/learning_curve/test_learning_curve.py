@@ -1,0 +1,155 @@
+"""The experiment on the number of real windows: its arms have the properties that they are named for, and its rules are those of the text."""
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.reproduce import __main__ as command
+from enhsim_tf.reproduce.learning_curve import findings
+from enhsim_tf.reproduce.learning_curve.arms import (
+    ADVERSARIAL,
+    BOTH,
+    CHEAP_RUNGS,
+    CLASSIFIER,
+    CORAL,
+    NETWORK_RUNGS,
+    ONE_LINE,
+    REAL,
+    SIMULATOR,
+    THRESHOLD_ON_REAL,
+    CoralAlignment,
+    Record,
+)
+from enhsim_tf.reproduce.learning_curve.cells import QUICK, Cell, World
+from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.reproduce.stages import Stages
+from enhsim_tf.telemetry.series import Telemetry
+
+WAVES = SquareWaveSimulator([SquareWave(40.0, low=-1.0, high=1.0)])
+
+
+def record(num_windows=12, noise=0.2, seed=0):
+    values = np.sin(2 * np.pi * np.arange(num_windows * 50) / 40) + noise * np.random.default_rng(seed).standard_normal(num_windows * 50)
+    return Record(Telemetry(values.astype(np.float32)), WAVES, 50, 300, seed, 2, 2)
+
+
+def test_the_rungs_are_those_of_the_ladder():
+    assert {*CHEAP_RUNGS, *NETWORK_RUNGS} == set(command.RUNG_NAMES)
+
+
+def test_the_simulator_of_a_record_generates_its_signal_and_its_noise():
+    chosen = record(60)
+    noise, clean = chosen.residuals
+    assert noise.std() == pytest.approx(0.2, rel=0.1)
+    np.testing.assert_allclose(noise + clean, chosen.windows, atol=1e-6)
+    generated = chosen.generate("Gaussian", 400, 1)
+    assert generated.std() == pytest.approx(np.hypot(np.sqrt(0.5), 0.2), rel=0.03)
+    np.testing.assert_array_equal(generated, record(60).generate("Gaussian", 400, 1))
+    assert not np.array_equal(generated, chosen.generate("Gaussian", 400, 2))
+
+
+def test_aligned_windows_have_the_mean_and_the_covariance_of_the_target():
+    rng = np.random.default_rng(0)
+    mixing = rng.standard_normal((6, 6))
+    source, target = rng.standard_normal((20_000, 6)), rng.standard_normal((20_000, 6)) @ mixing + 3
+    aligned = CoralAlignment.fit(source, target).apply(source)
+    np.testing.assert_allclose(aligned.mean(axis=0), target.mean(axis=0), atol=0.05)
+    np.testing.assert_allclose(np.cov(aligned.T), np.cov(target.T), atol=0.02 * np.abs(np.cov(target.T)).max())
+
+
+def test_the_gradient_of_the_domain_is_reversed():
+    from enhsim_tf.keras_tools.backend import tf
+    from enhsim_tf.reproduce.learning_curve.domain_adversarial import reverse_gradient
+
+    values = tf.constant([1.0, -2.0, 3.0])
+    with tf.GradientTape() as tape:
+        tape.watch(values)
+        unchanged = reverse_gradient(values, 0.3)
+        loss = tf.reduce_sum(unchanged**2)
+    np.testing.assert_allclose(unchanged, values, rtol=1e-6)
+    np.testing.assert_allclose(tape.gradient(loss, values), [-0.6, 1.2, -1.8], rtol=1e-6)  # -0.3 times twice the value
+
+
+@pytest.mark.parametrize("adaptation", [0.0, 0.1])
+def test_a_classifier_finds_what_it_was_taught(adaptation):
+    from enhsim_tf.reproduce.learning_curve.domain_adversarial import AnomalyClassifier
+
+    rng = np.random.default_rng(0)
+    nominal, real = (rng.standard_normal((300, 48)) for _ in range(2))
+    step = np.where((np.arange(48) > 20) & (np.arange(48) < 30), 2.5, 0.0)
+    first, second = (AnomalyClassifier(48, adaptation, seed=1).fit(nominal, nominal + step, real, 150) for _ in range(2))
+    fresh = rng.standard_normal((200, 48))
+    scores = first.score(fresh), first.score(fresh + step)
+    assert np.mean(scores[1] > np.quantile(scores[0], 0.95)) > 0.9
+    np.testing.assert_array_equal(first.score(fresh), second.score(fresh))
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    """The rows of one tiny cell, and of the same cell from the cache."""
+    counts = {"num_real": (6,), "num_windows": 30, "num_judged": 20, "num_anomalous": 6, "num_steps": 3, "num_iterations": 2}
+    changed = {f"curve__{name}": value for name, value in counts.items()}
+    settings = make_settings("smoke", 3, telemetry__window=48, telemetry__noise="shot", **changed)
+    cache, told = tmp_path_factory.mktemp("cache"), []
+    return [Cell(World(settings), 6).rows(("autoregressive network",), Stages(cache, tell=told.append)) for _ in range(2)]
+
+
+def test_a_cell_has_all_arms_and_is_read_from_the_cache(rows):
+    first, again = rows
+    pd.testing.assert_frame_equal(first, again)
+    simulated = [SIMULATOR + rung for rung in (*CHEAP_RUNGS, "autoregressive network")]
+    assert set(first["arm"]) == {REAL, BOTH, THRESHOLD_ON_REAL, CORAL, CLASSIFIER, ADVERSARIAL, ONE_LINE, *simulated}
+    for arm in (REAL, BOTH, THRESHOLD_ON_REAL, CORAL, *simulated):
+        assert tuple(first[first["arm"] == arm]["detector"]) == QUICK
+    assert (first["windows"] == 20).all() and (first["num_real"] == 6).all() and (first["environment"] == "shot").all()
+
+
+def test_the_record_ends_before_the_judged_windows():
+    world = World(make_settings("smoke", 3, curve__num_real=(5, 20), curve__num_judged=8))
+    few, many = world.record(5), world.record(20)
+    np.testing.assert_array_equal(few.telemetry.values, many.telemetry.values[-5 * world.window :])
+    assert few.telemetry.offset_s == 15 * world.window
+    first = world.judged["nominal"][0]
+    np.testing.assert_array_equal(first, world.values[21 * world.window : 22 * world.window])  # a gap of one window
+
+
+def table(real, simulated, recall=0.6):
+    """A table with one detector and one seed: rates of the real windows and of the simulator by number of windows."""
+    made = []
+    for arm, rates, share in ((REAL, real, 0.6), (SIMULATOR + "Gaussian", simulated, recall)):
+        for number, rate in rates.items():
+            row = {
+                "arm": arm,
+                "detector": "a",
+                "alarms": round(1_000 * rate),
+                "windows": 1_000,
+                "recall": 0.5,
+                "recall_at_real_rate": share,
+            }
+            made.append(row | {"num_real": number, "seed": 1, "environment": "white", "set_for": 0.01})
+    return {"rows": pd.DataFrame(made)}
+
+
+def test_a_simulator_pays_where_it_halves_the_excess_without_losing_recall():
+    real, simulated = {5: 0.11, 20: 0.03, 100: 0.012}, {5: 0.06, 20: 0.021, 100: 0.01}
+    found = findings.summarise(table(real, simulated))["environments"]["white"]
+    assert found["pays"] == {SIMULATOR + "Gaussian": [5]}  # five points of ten; 1.1 of 2; and from 100 on the real windows suffice
+    assert found["real_suffices_from"] == 100
+    assert found["bar"] == {
+        "num_real": 20,
+        "best": SIMULATOR + "Gaussian",
+        "excess": pytest.approx(0.011),
+        "real_excess": pytest.approx(0.02),
+        "is_kept": False,
+    }
+    assert findings.summarise(table(real, simulated, recall=0.56))["environments"]["white"]["pays"] == {SIMULATOR + "Gaussian": []}
+    assert findings.summarise(table(real, simulated, recall=0.58))["environments"]["white"]["pays"] == {SIMULATOR + "Gaussian": [5]}
+
+
+def test_options_that_do_not_fit_are_refused_in_one_line(capsys):
+    assert command.main(["--experiment", "learning-curve", "--rungs", "pink"]) == 2
+    assert "Expected --rungs of none, Gaussian" in capsys.readouterr().err
+    assert dataclasses.asdict(make_settings("smoke").curve)["num_real"] == (5, 20)
