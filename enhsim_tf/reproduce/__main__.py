@@ -206,7 +206,7 @@ def run_robustness(options: argparse.Namespace, folder: Path) -> int:
     out = folder / FOLDER
     found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
     tell("\n" + "\n".join(verdict_lines(found)))
-    if options.budget == "full" and out == Path("figures") / FOLDER and not is_other(options):
+    if is_published(options, out, FOLDER):
         report(found, Path())
     tell(f"tables, findings.json and figures in {out}/")
     return 0
@@ -215,6 +215,7 @@ def run_robustness(options: argparse.Namespace, folder: Path) -> int:
 def run_noise(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on noise in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.noise_gallery import GALLERY
+    from enhsim_tf.reproduce.noise_ladder.page import PAGE, fill_page
     from enhsim_tf.reproduce.noise_ladder.run import FOLDER, run
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import default_cache
@@ -227,6 +228,8 @@ def run_noise(options: argparse.Namespace, folder: Path) -> int:
     for name, about in found["families"].items():
         rates = ", ".join(f"{rung} {values['alarms']:.1%}" for rung, values in about["rungs"].items())
         tell(f"{name:18} ({about['half']}) chosen: {', '.join(about['chosen'])}; false alarms: {rates}")
+    if is_published(options, out, FOLDER):
+        fill_page(PAGE, noise=found)
     tell(f"tables, findings.json and figures in {out}/")
     return 0
 
@@ -234,6 +237,7 @@ def run_noise(options: argparse.Namespace, folder: Path) -> int:
 def run_learning_curve(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on the number of real windows in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.learning_curve.run import FOLDER, run
+    from enhsim_tf.reproduce.noise_ladder.page import PAGE, fill_page
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import default_cache
 
@@ -247,6 +251,8 @@ def run_learning_curve(options: argparse.Namespace, folder: Path) -> int:
         tell(
             f"{name:18} {bar['num_real']} real windows: excess {bar['real_excess']:.1%} without a simulator, {bar['excess']:.1%} with {bar['best']}"
         )
+    if is_published(options, out, FOLDER):
+        fill_page(PAGE, curve=found)
     tell(f"tables, findings.json and figures in {out}/")
     return 0
 
@@ -265,7 +271,7 @@ def run_factorial(options: argparse.Namespace, folder: Path) -> int:
     found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
     tell("\n" + "\n".join(lines(found)))
     kept = findings_of(Path(), "robustness")
-    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None and not is_other(options):
+    if is_published(options, out, FOLDER) and kept is not None:
         report(kept, Path())
     tell(f"tables, findings.json and figures in {out}/")
     return 0
@@ -420,6 +426,11 @@ def is_other(options: argparse.Namespace) -> bool:
 
     shown = findings_of(Path(), "labelled")
     return bool(options.channels) or (shown is not None and set(read_labels(options.data)) != {*shown["channels"], *shown["skipped"]})
+
+
+def is_published(options: argparse.Namespace, out: Path, name: str) -> bool:
+    """Whether a run is the published one of its experiment, at full budget and with all of its parts, in the folder of the figures."""
+    return options.budget == "full" and out == Path("figures") / name and options.rungs is None and not is_other(options)
 
 
 def make_folders(options: argparse.Namespace) -> Path:

@@ -9,6 +9,7 @@ from enhsim_tf.noise.ladder import RUNGS
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.noise_gallery import GALLERY
 from enhsim_tf.reproduce.noise_ladder import findings
+from enhsim_tf.reproduce.noise_ladder.page import fill_page
 
 
 def test_the_lists_of_the_command_are_those_of_the_gallery_and_the_ladder():
@@ -85,3 +86,19 @@ def test_the_summary_counts_what_a_table_says():
     assert bursts["half"] == "unseen" and bursts["rungs"]["autoregressive network"]["excess"] == pytest.approx(0.02)
     assert found["limits"]["looked at"]["kept"] == 0 and found["limits"]["unseen"]["kept"] == 1  # two points: above one, below three
     assert found["limits"]["realism"]["families_with_all"] == 0 and found["limits"]["recall"]["kept"] == 2
+
+
+def test_the_page_says_what_the_findings_say(tmp_path):
+    measured = {"alarms": 0.031, "excess": 0.021, "recall_difference": 0.01, "realism_within": 0.5, "beyond": {"rank": 4.2, "energy": 7.1}}
+    about = {"half": "unseen", "rungs": {"real": measured | {"alarms": 0.01}, "autoregressive network": measured}, "chosen": ["gaussian"]}
+    families = {"bursts": about | {"regret": 0.0, "best": "autoregressive network", "seeds": [7]}}
+    found = {"families": families, "limits": findings._limits(families), "seeds": [7], "budget": "full"}
+    page = tmp_path / "noise.md"
+    names = ("families", "limits", "unrealistic", "learning curve")
+    page.write_text("".join(f"<!-- {name}: generated -->\nold\n<!-- end of {name} -->\n" for name in names), encoding="utf-8")
+    fill_page(page, noise=found)
+    text = page.read_text(encoding="utf-8")
+    assert "| bursts | unseen | 1.0% | 3.1% | gaussian |" in text and "seed 7" in text
+    assert "at most 3 points: 1 of 1 families; the largest excess is 2.1 points (bursts)" in text
+    assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
+    assert text.count("\nold\n") == 1  # the part of the other experiment

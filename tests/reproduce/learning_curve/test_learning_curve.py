@@ -8,7 +8,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.reproduce import __main__ as command
-from enhsim_tf.reproduce.learning_curve import findings
+from enhsim_tf.reproduce.learning_curve import figures, findings
 from enhsim_tf.reproduce.learning_curve.arms import (
     ADVERSARIAL,
     BOTH,
@@ -24,6 +24,7 @@ from enhsim_tf.reproduce.learning_curve.arms import (
     Record,
 )
 from enhsim_tf.reproduce.learning_curve.cells import QUICK, Cell, World
+from enhsim_tf.reproduce.noise_ladder import page
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.telemetry.series import Telemetry
@@ -153,3 +154,15 @@ def test_options_that_do_not_fit_are_refused_in_one_line(capsys):
     assert command.main(["--experiment", "learning-curve", "--rungs", "pink"]) == 2
     assert "Expected --rungs of none, Gaussian" in capsys.readouterr().err
     assert dataclasses.asdict(make_settings("smoke").curve)["num_real"] == (5, 20)
+
+
+def test_the_page_and_the_figure_say_where_the_simulator_pays():
+    found = findings.summarise(table({5: 0.11, 20: 0.03, 100: 0.012}, {5: 0.06, 20: 0.021, 100: 0.01}))
+    text = page.learning_curve(found)
+    assert "**white**: a simulator pays with these numbers of real windows: Gaussian: 5. Real windows alone suffice" in text
+    assert (
+        "from 100 on. With 20 windows, the excess is 2.0 points for the real windows alone and 1.1 for the best simulator (Gaussian): more"
+        in text
+    )
+    assert "| white | real | 11.0 / 60 | 3.0 / 60 | 1.2 / 60 |" in text
+    assert figures._message(found) == "A fitted simulator pays up to 5 real windows, and no longer from 20"

@@ -1,0 +1,130 @@
+"""Fills the generated parts of `docs/noise.md` from the findings of the experiments on noise and on the number of real windows."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.reproduce.publish.results import fill_parts
+
+Findings = Mapping[str, Any]
+PAGE = Path("docs/noise.md")
+_NAMED = 3  # measures that are named for a family
+
+
+def fill_page(path: Path, noise: Findings | None = None, curve: Findings | None = None) -> None:
+    """Writes the generated parts of the page between their markers.
+
+    Args:
+        path: The page; nothing is done where it does not exist.
+        noise: The findings of the experiment on noise, or None to keep its parts.
+        curve: The findings of the experiment on the number of real windows, or None to keep its part.
+
+    Raises:
+        InputError: If the markers of a part are not there once.
+    """
+    if not path.is_file():
+        return
+    parts = {}
+    if noise is not None:
+        parts |= {"families": families(noise), "limits": limits(noise), "unrealistic": unrealistic(noise)}
+    if curve is not None:
+        parts["learning curve"] = learning_curve(curve)
+    text = fill_parts(path.read_text(encoding="utf-8"), parts, path.name)
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def families(found: Findings) -> str:
+    """The table of false-alarm rates, a row for each family and a column for each noise model."""
+    names = list(dict.fromkeys(name for about in found["families"].values() for name in about["rungs"]))
+    lines = [f"| family | half | {' | '.join(names)} | chosen by the rule |", "|---" * (len(names) + 3) + "|"]
+    for family, about in sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at"):
+        rates = [f"{about['rungs'][name]['alarms']:.1%}" if name in about["rungs"] else "" for name in names]
+        lines.append(f"| {family.replace('_', ' ')} | {about['half']} | {' | '.join(rates)} | {', '.join(sorted(set(about['chosen'])))} |")
+    return "\n".join([_scope(found), "", *lines])
+
+
+def _scope(found: Findings) -> str:
+    seeds = found["seeds"]
+    which = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+    return f"False alarms on nominal windows with real noise, thresholds set for 1 % ({which}, budget {found['budget']}):"
+
+
+def limits(found: Findings) -> str:
+    """What became of each limit, as a list."""
+    kept = found["limits"]
+    lines = []
+    for half in ("looked at", "unseen"):
+        own = kept[half]
+        if not own["of"]:
+            continue
+        worst = max(own["excess"], key=own["excess"].get)
+        lines.append(
+            f"- Excess of false alarms of the {kept['rung']} over real windows, {half} families, at most {100 * own['limit']:g} "
+            f"point{'s' * (own['limit'] != 0.01)}: {own['kept']} of {own['of']} families; the largest excess is {100 * own['excess'][worst]:.1f} "
+            f"points ({worst.replace('_', ' ')})."
+        )
+    recall, realism, choice = kept["recall"], kept["realism"], kept["choice"]
+    lines += [
+        f"- Recall at the real rate within {100 * recall['limit']:g} points of that after training on real windows: {recall['kept']} of "
+        f"{recall['of']} families.",
+        f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
+        f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
+        f"- Excess of the chosen model within {100 * choice['limit']:g} points of that of the best model: {choice['kept']} of {choice['of']} families.",
+    ]
+    return "\n".join(lines)
+
+
+def unrealistic(found: Findings) -> str:
+    """For each family, which measures still tell the noise of the learnt model from the real noise."""
+    rung, lines = found["limits"]["rung"], []
+    for family, about in found["families"].items():
+        if rung not in about["rungs"]:
+            continue
+        beyond = about["rungs"][rung].get("beyond", {})
+        worst = sorted(beyond, key=beyond.get, reverse=True)[:_NAMED]
+        if worst:
+            named = ", ".join(f"{name} ({beyond[name]:.1f} times its floor)" for name in worst)
+            lines.append(
+                f"- {family.replace('_', ' ')}: {len(beyond)} measure{'s' * (len(beyond) != 1)} beyond three times the floor: {named}."
+            )
+        else:
+            lines.append(f"- {family.replace('_', ' ')}: no measure beyond three times its floor.")
+    return "\n".join([f"Noise of the {rung}, by family:", "", *lines])
+
+
+def learning_curve(found: Findings) -> str:
+    """The verdict for each environment, and a table of false-alarm rates by number of real windows."""
+    numbers, lines = found["numbers"], []
+    for name, about in found["environments"].items():
+        real, bar = about["arms"]["real"], about["bar"]
+        pays = {arm: places for arm, places in about["pays"].items() if places}
+        where = "; ".join(f"{arm.removeprefix('simulator + ')}: {_numbers(places)}" for arm, places in pays.items()) or "nowhere"
+        enough = f"from {about['real_suffices_from']:,} on" if about["real_suffices_from"] else "nowhere on this curve"
+        lines.append(
+            f"- **{name}**: a simulator pays with these numbers of real windows: {where}. Real windows alone suffice (excess at most half a point) {enough}. "
+            f"With {bar['num_real']} windows, the excess is {100 * real['excess'][str(bar['num_real'])]:.1f} points for the real windows alone and "
+            f"{100 * bar['excess']:.1f} for the best simulator ({bar['best'].removeprefix('simulator + ')}): "
+            f"{'at most half' if bar['is_kept'] else 'more than half'}."
+        )
+    arms = list(dict.fromkeys(arm for about in found["environments"].values() for arm in about["arms"]))
+    head = f"| environment | training | {' | '.join(f'{number:,}' for number in numbers)} |"
+    rows = [head, "|---" * (len(numbers) + 2) + "|"]
+    for name, about in found["environments"].items():
+        for arm in arms:
+            curve = about["arms"].get(arm)
+            if curve is None:
+                continue
+            cells = [
+                f"{100 * curve['rate'][str(n)]:.1f} / {100 * curve['recall_at_real_rate'][str(n)]:.0f}" if str(n) in curve["rate"] else ""
+                for n in numbers
+            ]
+            rows.append(f"| {name} | {arm} | {' | '.join(cells)} |")
+    seeds = found["seeds"]
+    scope = f"False alarms in % / recall at 1 % false alarms in %, by the number of real windows, means over {len(seeds)} seed{'s' * (len(seeds) > 1)}:"
+    return "\n".join([*lines, "", scope, "", *rows])
+
+
+def _numbers(places: list[int]) -> str:
+    return ", ".join(f"{number:,}" for number in places)
