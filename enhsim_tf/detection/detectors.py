@@ -49,7 +49,7 @@ class PCAResidual:
         """Computes the principal components of nominal windows."""
         from sklearn.decomposition import PCA
 
-        with threadpool_limits(1):
+        with threadpool_limits(1), np.errstate(invalid="ignore"):  # the shares of variance of equal windows are not used
             self._pca = PCA(min(self.num_components, *windows.shape), svd_solver="randomized", random_state=self.seed).fit(windows)
         return self
 

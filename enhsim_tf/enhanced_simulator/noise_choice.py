@@ -59,6 +59,7 @@ def judge(
     signals: Sequence[np.ndarray],
     rate: float = 0.01,
     seed: int = 0,
+    compared: Sequence[np.ndarray] | None = None,
 ) -> RungJudgement:
     """Judges the noise of a rung on held-out noise.
 
@@ -70,6 +71,8 @@ def judge(
         signals: Three arrays of clean signal windows, to which generated, learnt and held-out noise are added.
         rate: False-alarm rate for which thresholds are set.
         seed: Seed of the classifier and the detectors.
+        compared: Generated, learnt and held-out noise for the classifier, if it differs from those above: if windows overlap, the
+            classifier recognises single windows of real noise, whatever the noise is like.
     """
     number = min(len(generated), len(learnt), len(held_out))
     half = number // 2
@@ -83,10 +86,11 @@ def judge(
         for kind, training in (("generated", windows), ("real", reference)):
             detector = DETECTORS[name](seed).fit(training[:half])
             alarms[kind].append(metrics.false_alarm_rate(detector.score(judged), metrics.threshold(detector.score(training[half:]), rate)))
+    tried = [each[:number] for each in (generated, learnt, held_out)] if compared is None else compared
     return RungJudgement(
         rung,
-        two_sample_auc(generated[:number], held_out[:number], seed),
-        two_sample_auc(learnt[:number], held_out[:number], seed),
+        two_sample_auc(tried[0], tried[2], seed),
+        two_sample_auc(tried[1], tried[2], seed),
         float(np.mean(alarms["generated"])),
         float(np.mean(alarms["real"])),
     )

@@ -1,8 +1,9 @@
 """Fits the noise model of a simulator: the rung of the ladder that was asked for, or the one that held-out telemetry chooses.
 
 Rule and tolerances are those of `noise_choice`. The rungs learn the noise of the first part of the time and are judged on that of the
-last part, by generated telemetry as the simulator would give it, with its levels if the channel is quantised. A chosen rung without a
-network is fitted again to all of the time.
+last part, by generated telemetry as the simulator would give it, with its levels if the channel is quantised. The classifier sees
+disjoint windows only, cut into pieces if there are few of them: it recognises single windows that overlap, whatever their noise is like.
+A chosen rung without a network is fitted again to all of the time.
 """
 
 import dataclasses
@@ -16,12 +17,14 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import noise_choice
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import BY_OPTION, NETWORKS
+from enhsim_tf.realism.two_sample import two_sample_auc
 from enhsim_tf.telemetry.quantisation import Levels
 
 JUDGED_SHARE = 0.25  # of the time, at its end, on which rungs are judged
 MOST_JUDGED = 1_000  # windows
 BEST = "best"
 _LEAST_JUDGED = 20
+_ENOUGH_PIECES, _LEAST_PIECE = 200, 16  # disjoint pieces that the classifier should see, and their least length in samples
 _DRAW = 73  # number of the random draw
 
 
@@ -32,10 +35,22 @@ class NoiseWindows:
     Args:
         noise: Telemetry minus enhanced signal, shape `(windows, samples)`, in the unit of the telemetry.
         clean: Enhanced windows of the same shape.
+        starts: Start of each window in samples, in ascending order, shape `(windows,)`. Needed to judge with these windows.
     """
 
     noise: np.ndarray
     clean: np.ndarray
+    starts: np.ndarray | None = None
+
+    @property
+    def disjoint(self) -> np.ndarray:
+        """Noise windows that share no sample, shape `(windows, samples)`."""
+        chosen, end = [], -np.inf
+        for row, start in enumerate(self.starts):
+            if start >= end:
+                chosen.append(row)
+                end = start + self.noise.shape[1]
+        return self.noise[chosen]
 
     def __len__(self) -> int:
         return len(self.noise)
@@ -50,6 +65,7 @@ class NoiseTraining:
         seed: Seed of the training.
         to_unit: Converts enhanced windows to the unit in which noise that follows the signal receives them.
         quantisation: Levels of the channel, or None.
+        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
         unit: Unit of the paper's GAN, in the unit of the telemetry. None: it follows from the noise.
         verbose: Progress bars of the GANs: 0 none, 1 always, "auto" on a terminal.
         progress: Reports the progress of the trainings as lines of text.
@@ -59,6 +75,7 @@ class NoiseTraining:
     seed: int
     to_unit: Callable[[np.ndarray], np.ndarray]
     quantisation: Levels | None = None
+    with_signal: bool = True
     unit: float | None = None
     verbose: int | str = 0
     progress: Progress = SILENT
@@ -106,7 +123,7 @@ def choose_noise(
         The noise model; and for each rung its `name`, the numbers of `noise_choice.RungJudgement`, `passes` and `is_chosen`. The
         list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
     """
-    if min(len(judged), len(learnt)) < _LEAST_JUDGED:
+    if min(len(judged), len(learnt)) < _LEAST_JUDGED or len(compare(learnt.noise, learnt, judged)[0]) < _LEAST_JUDGED:
         notes.append("there is too little telemetry to judge noise models; whole residual windows are drawn")
         return fit_noise("residual windows", everything, training, notes), []
     models, judgements = {}, []
@@ -139,8 +156,48 @@ def judge_noise(option: str, model: Any, learnt: NoiseWindows, judged: NoiseWind
     noise = ladder.generate(model, number, rng, training.to_unit(clean))
     if training.quantisation is not None:
         noise = training.quantisation.round(clean + noise) - clean
-    signals = (clean, clean, judged.clean)
-    return noise_choice.judge(option, noise, learnt.noise[rows], judged.noise[:number], signals, seed=training.seed)
+    signals = [each if training.with_signal else np.zeros_like(each) for each in (clean, clean, judged.clean[:number])]
+    compared = compare(noise, learnt, judged)
+    return noise_choice.judge(option, noise, learnt.noise[rows], judged.noise[:number], signals, seed=training.seed, compared=compared)
+
+
+def compare(generated: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows) -> list[np.ndarray]:
+    """Returns generated, learnt and held-out noise for a classifier: disjoint windows, cut into pieces if there are few.
+
+    Args:
+        generated: Generated windows of noise, shape `(windows, samples)`.
+        learnt: Windows from which the noise model was fitted.
+        judged: Windows that it has not seen.
+
+    Returns:
+        Three arrays of the same number of pieces, shape `(pieces, samples)`.
+    """
+    groups = [generated, learnt.disjoint, judged.disjoint]
+    number, window = min(map(len, groups)), generated.shape[1]
+    pieces = max(1, min(-(-_ENOUGH_PIECES // number), window // _LEAST_PIECE))
+    short = window // pieces
+    spread = [each[np.linspace(0, len(each) - 1, number).astype(int)] for each in groups]
+    return [each[:, : short * pieces].reshape(-1, short) for each in spread]
+
+
+def auc_of(generated: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows, seed: int) -> dict[str, float]:
+    """Returns how well a classifier tells generated, and learnt, from held-out noise, in disjoint windows or pieces of them.
+
+    Args:
+        generated: Generated windows of noise.
+        learnt: Windows from which the noise model was fitted.
+        judged: Windows that it has not seen.
+        seed: Seed of the classifier.
+
+    Returns:
+        The AUC of `generated` and of `real` noise; empty if there are fewer than 20 pieces of each.
+    """
+    if not (len(learnt) and len(judged)):
+        return {}
+    tried = compare(generated, learnt, judged)
+    if len(tried[0]) < _LEAST_JUDGED:
+        return {}
+    return {kind: two_sample_auc(noise, tried[2], seed) for kind, noise in (("generated", tried[0]), ("real", tried[1]))}
 
 
 def sentence_of(rows: Sequence[Mapping[str, Any]], used: str) -> str:

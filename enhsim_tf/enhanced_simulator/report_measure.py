@@ -11,11 +11,11 @@ import numpy as np
 
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, NoiseWindows, auc_of
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
 from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
 from enhsim_tf.realism import real_floor
-from enhsim_tf.realism.two_sample import two_sample_auc
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import disjoint_starts, evenly_spaced_starts
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 QUICK = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")  # detectors whose training takes about a second
 _NUM_WINDOWS = 1_000  # generated windows for training a detector, and as many others for its threshold
 _NUM_COMPARED = 200  # maximum number of real windows for errors and false alarms
-_LEAST_COMPARED = 20  # windows of each kind, for a classifier
 _LEAST_NOISE_WINDOW, _NUM_NOISE_WINDOWS = 16, 40  # comparison of noise: minimum window length, and target number of disjoint windows
 
 
@@ -104,15 +103,13 @@ def report_on(
 
 def _noise_auc(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], seed: int) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out noise; empty if there are too few windows."""
-    starts = [evenly_spaced_starts(parts, simulator.window, _NUM_COMPARED) for parts in (learnt, held_out)]
-    number = min(map(len, starts))
-    if number < _LEAST_COMPARED:
-        return {}
-    pairs = [simulator.pairs(parts, chosen) for parts, chosen in zip((learnt, held_out), starts, strict=True)]
-    clean = [simulator.follow(each) for each in pairs]
-    real = [each.target - below for each, below in zip(pairs, clean, strict=True)]
-    generated = simulator.add_noise(clean[0], np.random.default_rng([seed, 3])) - clean[0]
-    return {kind: two_sample_auc(noise[:number], real[1][:number], seed) for kind, noise in (("generated", generated), ("real", real[0]))}
+    real, rng = [], np.random.default_rng([seed, 3])
+    for parts in (learnt, held_out):
+        starts = evenly_spaced_starts(parts, simulator.window, MOST_JUDGED)
+        pairs = simulator.pairs(parts, starts)
+        clean = simulator.follow(pairs)
+        real.append(NoiseWindows(pairs.target - clean, clean, starts))
+    return auc_of(simulator.add_noise(real[0].clean, rng) - real[0].clean, *real, seed)
 
 
 def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:

@@ -168,20 +168,22 @@ def _noise_training(simulator: "EnhancedSimulator", settings: TrainingSettings, 
         return (clean - simulator.offset) / simulator.scale
 
     unit = None if settings.normalise else 1.0
-    return NoiseTraining(settings.num_iterations, settings.seed, to_unit, simulator.quantisation, unit, verbose, progress)
+    return NoiseTraining(
+        settings.num_iterations, settings.seed, to_unit, simulator.quantisation, unit=unit, verbose=verbose, progress=progress
+    )
 
 
 def _noise_windows(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], starts: np.ndarray) -> NoiseWindows:
     pairs = simulator.pairs(parts, starts)
     clean = simulator.follow(pairs)
-    return NoiseWindows(pairs.target - clean, clean)
+    return NoiseWindows(pairs.target - clean, clean, np.sort(starts))
 
 
 def _evenly_spaced(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: TrainingSettings) -> NoiseWindows:
     """Returns windows of noise in the order of time, or none if no part is long enough."""
     parts = [part for part in parts if len(part) >= settings.window]
     if not parts:
-        return NoiseWindows(*np.zeros((2, 0, settings.window), np.float32))
+        return NoiseWindows(*np.zeros((2, 0, settings.window), np.float32), np.zeros(0, int))
     return _noise_windows(simulator, parts, evenly_spaced_starts(parts, settings.window, settings.num_windows))
 
 

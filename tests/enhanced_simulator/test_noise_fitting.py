@@ -7,7 +7,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, sentence_of
+from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, compare, sentence_of
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import BY_OPTION
@@ -89,8 +89,25 @@ def test_a_quantised_channel_is_judged_with_its_levels():
     np.testing.assert_allclose(values / 0.25, np.rint(values / 0.25), atol=1e-5)
 
 
+def test_a_classifier_sees_disjoint_windows_and_pieces_of_them():
+    rows = np.arange(9)[:, None] * 30 + np.arange(90.0)  # windows of 90 samples that begin every 30 samples
+    windows = NoiseWindows(rows, rows, 30 * np.arange(9))
+    np.testing.assert_array_equal(windows.disjoint, rows[[0, 3, 6]])
+    generated, learnt, judged = compare(-rows, windows, windows)
+    assert generated.shape == learnt.shape == (15, 18)  # five pieces each: shorter ones would have fewer than 16 samples
+    np.testing.assert_array_equal(np.sort(learnt.ravel()), np.arange(270.0))
+    np.testing.assert_array_equal(learnt, judged)
+
+
+@pytest.mark.usefixtures("no_networks")
+def test_noise_is_told_from_none_where_a_few_windows_overlap():
+    few = fit(series(0.0, 900))  # fourteen windows, of which three are judged
+    assert [each["name"] for each in few.trained["noise_ladder"] if each["is_chosen"]] != ["none"]
+    assert few.noise_sd == pytest.approx(0.2, rel=0.2)
+
+
 def test_too_little_telemetry_gets_residual_windows_and_a_note():
-    windows = NoiseWindows(*np.random.default_rng(0).standard_normal((2, 19, 40)).astype(np.float32))
+    windows = NoiseWindows(*np.random.default_rng(0).standard_normal((2, 19, 40)).astype(np.float32), 40 * np.arange(19))
     notes = []
     model, rows = choose_noise(windows, windows, windows, NoiseTraining(1, 0, lambda clean: clean), notes)
     assert isinstance(model, WindowBootstrap) and rows == [] and "too little telemetry" in notes[0]

@@ -13,7 +13,16 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_parts
-from enhsim_tf.enhanced_simulator.noise_fitting import BEST, JUDGED_SHARE, NoiseTraining, NoiseWindows, choose_noise, fit_noise
+from enhsim_tf.enhanced_simulator.noise_fitting import (
+    BEST,
+    JUDGED_SHARE,
+    MOST_JUDGED,
+    NoiseTraining,
+    NoiseWindows,
+    auc_of,
+    choose_noise,
+    fit_noise,
+)
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhanced_simulator.runs.model import RunModel
 from enhsim_tf.enhanced_simulator.runs.options import RunOptions
@@ -25,7 +34,6 @@ from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, Rung, fit_ladder, f
 from enhsim_tf.enhancer.overlapping import enhance_run
 from enhsim_tf.enhancer.training_pairs import split_end
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
-from enhsim_tf.realism.two_sample import two_sample_auc
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
@@ -34,7 +42,6 @@ _LEAST_WINDOW, _MOST_WINDOW = 64, 500  # limits of the default window length in 
 _WINDOWS_IN_TRAINING = 20  # the default window is this share of the training telemetry
 _LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 _EXAMPLE = 2  # length of the example for the figure, in windows
-_LEAST_COMPARED, _NUM_COMPARED = 20, 200  # windows of each kind, for a classifier
 _NUM_NOISE = 50  # length of the generated noise that is compared with the real one, in windows
 
 
@@ -184,12 +191,16 @@ def _fit_noise(
     progress: Progress,
 ) -> tuple[Any, list[dict[str, Any]], list[str]]:
     """Fits the noise model to held-out residuals; returns it with the judgements of all rungs and what is to be said about it."""
-    training = NoiseTraining(options.num_iterations, options.seed, rung.scaling.scale_target, levels, None, verbose, progress)
+    # `score --coarse` judges the difference from the enhanced run, so the detectors see the noise alone
+    training = NoiseTraining(
+        options.num_iterations, options.seed, rung.scaling.scale_target, levels, with_signal=False, verbose=verbose, progress=progress
+    )
     clean = _clean_below(residuals, pairs)
     notes: list[str] = []
 
     def cut(some: Sequence[tuple[Telemetry, Telemetry]], starts: np.ndarray) -> NoiseWindows:
-        return NoiseWindows(*(cut_windows_from_parts([each[which] for each in some], starts, window)[0] for which in (0, 1)))
+        windows = (cut_windows_from_parts([each[which] for each in some], starts, window)[0] for which in (0, 1))
+        return NoiseWindows(*windows, np.sort(starts))
 
     both = list(zip(residuals, clean, strict=True))
     everything = cut(both, random_window_starts(residuals, window, options.num_windows, np.random.default_rng([options.seed, 1])))
@@ -201,7 +212,7 @@ def _fit_noise(
     for some in zip(*(split_end(each, JUDGED_SHARE) for each in (residuals, clean)), strict=True):
         usable = [each for each in zip(*some, strict=True) if len(each[0]) >= window]
         starts = evenly_spaced_starts([each[0] for each in usable], window, options.num_windows) if usable else []
-        halves.append(cut(usable, starts) if usable else NoiseWindows(*np.zeros((2, 0, window), np.float32)))
+        halves.append(cut(usable, starts) if usable else NoiseWindows(*np.zeros((2, 0, window), np.float32), np.zeros(0, int)))
     return *choose_noise(*halves, everything, training, notes), notes
 
 
@@ -278,20 +289,16 @@ def _noise_auc(
     model: RunModel, judged: Sequence[Pair], left: Sequence[np.ndarray], learnt: Sequence[np.ndarray], seed: int
 ) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out residuals; empty if there are too few windows."""
-    starts = [evenly_spaced_starts(parts, model.window, _NUM_COMPARED) for parts in (learnt, left)]
-    number = min(map(len, starts))
-    if number < _LEAST_COMPARED:
-        return {}
-    real = [
-        cut_windows_from_parts(_as_series(parts), chosen, model.window)[0] for parts, chosen in zip((learnt, left), starts, strict=True)
-    ]
-    clean = np.concatenate([*model.nominal_chunks(number, np.random.default_rng([seed, 8]))])
-    generated = model.add_noise(clean, np.random.default_rng([seed, 9])) - clean
-    return {kind: two_sample_auc(noise[:number], real[1][:number], seed) for kind, noise in (("generated", generated), ("real", real[0]))}
 
+    def windows_of_residuals(parts: Sequence[np.ndarray]) -> NoiseWindows:
+        parts = [Telemetry(values) for values in parts if len(values) >= model.window]
+        starts = evenly_spaced_starts(parts, model.window, MOST_JUDGED) if parts else np.zeros(0, int)
+        windows = cut_windows_from_parts(parts, starts, model.window)[0] if parts else np.zeros((0, model.window), np.float32)
+        return NoiseWindows(windows, windows, starts)
 
-def _as_series(parts: Sequence[np.ndarray]) -> list[Telemetry]:
-    return [Telemetry(values) for values in parts]
+    real = [windows_of_residuals(parts) for parts in (learnt, left)]
+    clean = np.concatenate([*model.nominal_chunks(MOST_JUDGED, np.random.default_rng([seed, 8]))])
+    return auc_of(model.add_noise(clean, np.random.default_rng([seed, 9])) - clean, *real, seed)
 
 
 def _one_run(model: RunModel, pair: Pair) -> Recording:
