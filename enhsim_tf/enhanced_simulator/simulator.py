@@ -155,7 +155,8 @@ class EnhancedSimulator:
                 simulator's levels, the noise networks at the paper's noise amplitude. False passes the values unchanged,
                 as in the paper.
             window: Length of a window in samples.
-            noise: Networks that learn the noise: `paper`, or `convolutional`, whose generator has full-rank output.
+            noise: Model of the noise, a key of `noise.rung_names.BY_OPTION`: for example the networks of the `paper`, or
+                `convolutional`, whose generator has full-rank output; or `best`, which held-out telemetry chooses.
             extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
                 telemetry, as in the paper; `enhancer` subtracts the enhanced signal and so keeps slow noise.
             held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction
@@ -493,7 +494,7 @@ class EnhancedSimulator:
         return cycle[(begin + np.arange(num_windows)) % len(cycle)]
 
     def save(self, folder: str | os.PathLike) -> None:
-        """Saves the simulator to a folder: three `.keras` files, `settings.json`, and `manifest.json` with their checksums.
+        """Saves the simulator to a folder: its networks, its noise, `settings.json`, and `manifest.json` with their checksums.
 
         Args:
             folder: The folder. A simulator that was saved there before is replaced.

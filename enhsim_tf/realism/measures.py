@@ -35,6 +35,8 @@ def effective_rank(windows: np.ndarray) -> float:
     """
     centred = np.asarray(windows, np.float64) - np.mean(windows, axis=0, dtype=np.float64)
     energy = np.linalg.svd(centred, compute_uv=False) ** 2
+    if not energy.sum() > 0:  # equal windows occupy no dimension; the exponential of an empty sum is 1
+        return 1.0
     share = energy / energy.sum()
     share = share[share > 0]
     return float(np.exp(-np.sum(share * np.log(share))))
@@ -70,8 +72,12 @@ def autocorrelation_distance(generated_products: np.ndarray, real_products: np.n
 
 
 def scale_difference(generated: np.ndarray, real: np.ndarray) -> float:
-    """Absolute logarithm of the ratio of the standard deviations: 0 for equal scales, about 0.1 for a difference of 10 %."""
-    return float(abs(np.log(np.std(generated, dtype=np.float64) / np.std(real, dtype=np.float64))))
+    """Absolute logarithm of the ratio of the standard deviations: 0 for equal scales, about 0.1 for a difference of 10 %.
+
+    It is infinite if one of the two does not vary.
+    """
+    scales = [float(np.std(each, dtype=np.float64)) for each in (generated, real)]
+    return float(abs(np.log(scales[0] / scales[1]))) if all(scales) else float(0 if scales[0] == scales[1] else np.inf)
 
 
 def log_scales(windows: np.ndarray) -> np.ndarray:

@@ -62,6 +62,13 @@ def test_effective_rank_of_two_unequal_directions():
     assert measures.effective_rank(windows) == pytest.approx(np.exp(-0.9 * np.log(0.9) - 0.1 * np.log(0.1)))
 
 
+@pytest.mark.filterwarnings("error")
+def test_noise_that_does_not_vary_has_no_warning():
+    assert measures.effective_rank(np.ones((5, 8))) == 1
+    assert measures.scale_difference(np.zeros((5, 8)), normal(5, 8)) == np.inf
+    assert measures.scale_difference(np.zeros((5, 8)), np.ones((5, 8))) == 0
+
+
 def test_effective_rank_of_white_noise():
     # the eigenvalues of n samples over N windows follow Marchenko and Pastur's law, their entropy is log n - n / (2 N)
     samples, num_windows = 60, 400
