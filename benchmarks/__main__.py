@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Runs the command."""
     options = parse(arguments)
     from benchmarks.figures import draw
-    from benchmarks.report import fill_readme, with_words
+    from benchmarks.report import fill_page, with_words
     from enhsim_tf.common.atomic_files import write_json
 
     if options.redraw:
@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     for file in [options.out, *drawn]:
         print(file)
     if options.out == FOLDER / RESULTS[options.avx2]:
-        fill_readme(FOLDER.parent / "README.md", [json.loads((FOLDER / name).read_text()) for name in RESULTS if (FOLDER / name).is_file()])
+        fill_page(FOLDER.parent, [json.loads((FOLDER / name).read_text()) for name in RESULTS if (FOLDER / name).is_file()])
     return 0
 
 

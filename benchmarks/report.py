@@ -1,10 +1,9 @@
-"""Formats the results as text, for the terminal and for the table of the README."""
+"""Formats the results as text, for the terminal and for the table of docs/speed.md."""
 
 from pathlib import Path
 
 from benchmarks.rows import bar_of_reproduction, reproduction
-from enhsim_tf.common.atomic_files import replace_file
-from enhsim_tf.reproduce.publish.results import fill_parts
+from enhsim_tf.reproduce.publish.results import fill_pages
 
 
 def line_of(row: dict) -> str:
@@ -79,8 +78,6 @@ def with_words(results: dict) -> list[dict]:
     return measured + [{"of": "reproduction", **row} for row in reproduction(measured, bar_of_reproduction(results["machine"]))]
 
 
-def fill_readme(path: Path, results: list[dict]) -> None:
-    """Writes the table between the README's speed markers."""
-    text = path.read_text(encoding="utf-8")
-    with replace_file(path) as temporary:
-        temporary.write_text(fill_parts(text, {"speed": markdown(results)}, path.name), encoding="utf-8")
+def fill_page(root: Path, results: list[dict]) -> None:
+    """Writes the table into the page on speed."""
+    fill_pages(root, {"speed": markdown(results)})

@@ -1,7 +1,4 @@
-"""Links of the README in the pages of the book that include a section of it, and links of other pages to the README.
-
-The README itself is not a page of the book, because its sections are.
-"""
+"""Links of the README in the first page of the book, which includes it, and links of other pages to the README."""
 
 import posixpath
 import re
@@ -15,10 +12,7 @@ _README = "README.md"
 _LINK = re.compile(r"\]\((?!\w+:)([^)\s]+)\)")
 _SECTIONS = {
     "": "book/index.md",
-    "how-long-it-takes": "book/speed.md#how-long-it-takes",
-    "on-a-real-spacecraft": "book/own_telemetry.md#on-a-real-spacecraft",
-    "when-something-goes-wrong": "book/faults.md",
-    "where-the-paper-leaves-a-choice": "book/decisions.md",
+    "what-a-practitioner-should-do": "book/index.md#what-a-practitioner-should-do",
 }
 """Where the book has the README, and those of its sections to which a link leads."""
 _FOLDERS = {"notebooks": "book/lessons.md"}

@@ -127,7 +127,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.reproduce.paper.over_seeds import ranges
     from enhsim_tf.reproduce.paper.pipeline import Experiment
     from enhsim_tf.reproduce.publish.page import write_page
-    from enhsim_tf.reproduce.publish.results import fill_readme, results, table
+    from enhsim_tf.reproduce.publish.results import fill_results, results, table
     from enhsim_tf.reproduce.publish.verdicts import BEFORE, PATH, fill_verdicts
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import Stages, default_cache, save_arrays
@@ -185,7 +185,7 @@ def run(options: argparse.Namespace) -> int:
         tell("A smoke run and a channel of one's own have no expected verdicts; those above are of this run alone.")
         return 0
     if folder == Path("figures"):
-        fill_readme(Path("README.md"), folder)
+        fill_results(Path(), folder)
         fill_verdicts(PATH, BEFORE, folder)
     different = changed(records)
     if different:

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from benchmarks import figures, rows
 from benchmarks.__main__ import ROWS, main, parse
 from benchmarks.figures import draw
-from benchmarks.report import fill_readme, line_of, markdown, with_words
+from benchmarks.report import fill_page, line_of, markdown, with_words
 from benchmarks.worker import Worker
 from enhsim_tf.common.errors import InputError
 
@@ -127,11 +127,11 @@ def test_redraw_refuses_what_it_cannot_do(tmp_path, capsys, arguments, word):
     assert left.value.code == 2 and word in capsys.readouterr().err
 
 
-def test_the_kept_results_and_the_readme_say_the_same():
+def test_the_kept_results_and_the_page_say_the_same():
     kept = [json.loads((ROOT / "benchmarks" / name).read_text()) for name in ("results.json", "results_avx2.json")]
     for each in kept:
         assert with_words(each) == each["rows"]
-    assert f"<!-- speed: generated -->\n{markdown(kept)}\n<!-- end of speed -->" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"<!-- speed: generated -->\n{markdown(kept)}\n<!-- end of speed -->" in (ROOT / "docs" / "speed.md").read_text(encoding="utf-8")
 
 
 def test_a_worker_says_why_it_is_skipped(monkeypatch, tmp_path):
@@ -166,19 +166,20 @@ def test_a_quick_run_measures_and_keeps_other_rows(tmp_path, monkeypatch):
     assert {row["of"] for row in found["rows"]} <= set(ROWS)
 
 
-def test_the_readme_gets_the_table_between_its_markers(tmp_path):
+def test_the_page_gets_the_table_between_its_markers(tmp_path):
     slow = measured("enhancer step", "plain fit", 90.0, 100.0)
     found = {"rows": [slow, {"work": "a", "comparison": "b", "skipped": "no c"}], "machine": {"cores": 2, "tensorflow": "1.0"}}
-    path = tmp_path / "README.md"
+    path = tmp_path / "docs" / "speed.md"
+    path.parent.mkdir()
     path.write_text("before\n<!-- speed: generated -->\nold\n<!-- end of speed -->\nafter\n")
-    fill_readme(path, [found])
+    fill_page(tmp_path, [found])
     text = path.read_text()
     assert text == f"before\n<!-- speed: generated -->\n{markdown([found])}\n<!-- end of speed -->\nafter\n"
     assert "| enhancer step | 90 ms | plain fit | 0.90 (0.90 to 0.90) | at most 0.70 | **not reached** |  |" in text and "no c" in text
-    path.write_text("no markers")
-    with pytest.raises(InputError, match="markers of 'speed' once in README.md"):
-        fill_readme(path, [found])
-    assert path.read_text() == "no markers"
+    path.write_text("<!-- timings: generated -->")
+    with pytest.raises(InputError, match="markers of 'speed' once in speed.md"):
+        fill_page(tmp_path, [found])
+    assert path.read_text() == "<!-- timings: generated -->"
 
 
 CPUINFO = "processor\t: 0\nmodel name\t: Some Processor\nflags\t\t: fpu sse4_2 avx2 fma avx512f avx512_vnni hypervisor\nprocessor\t: 1\n"

@@ -292,22 +292,26 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
     assert not list((tmp_path / "models").iterdir())
 
 
-# examples of the README
+# examples of the README and of the page on telemetry of one's own
 
 
 def test_the_commands_of_the_readme_can_be_parsed():
-    texts = [(ROOT / "README.md").read_text(encoding="utf-8"), commands.EXAMPLES]
+    pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/own_telemetry.md")]
+    texts = [*pages, commands.EXAMPLES]
     lines = [line.strip() for text in texts for line in text.splitlines()]
     asked = [line.split()[3:] for line in lines if line.startswith("python -m enhsim_tf ") and "--help" not in line]
-    assert [words[0] for words in asked] == ["fit", "generate", "score"] * 2 + ["fit", "generate"]
+    assert [words[0] for words in asked] == ["fit", "generate", "score", "fit", "generate"] + ["fit", "generate", "score"] * 2 + [
+        "fit",
+        "generate",
+    ]
     for words in asked:
         assert parse(words).command == words[0]
 
 
 @pytest.mark.usefixtures("narrow_enhancer")
-def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (snippet,) = [part.partition("```")[0] for part in readme.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
+def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
+    page = (ROOT / "docs" / "own_telemetry.md").read_text(encoding="utf-8")
+    (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
     snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
         "num_windows=1000", "num_windows=20"
     )

@@ -3,8 +3,8 @@
 Each try starts a command, injects a fault at a random moment, runs the same command again until it succeeds, and
 compares the results with those of an undisturbed run: every byte of the data set of `generate`; every figure's
 arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
-tries the same on a smaller scale; this takes minutes for `fleet` and about an hour for `reproduce`. `python -m tests.faults readme --out
-docs/faults.json` fills the README's table from the file.
+tries the same on a smaller scale; this takes minutes for `fleet` and about an hour for `reproduce`. `python -m tests.faults page --out
+docs/faults.json` fills the table of docs/faults.md from the file.
 """
 
 import argparse
@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import replace_file, write_json
-from enhsim_tf.reproduce.publish.results import fill_parts
+from enhsim_tf.common.atomic_files import write_json
+from enhsim_tf.reproduce.publish.results import fill_pages
 from tests.faults import of_data_sets, of_reproduce
 from tests.faults.in_common import MISSED
 
@@ -31,7 +31,7 @@ TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "ru
 
 
 def as_markdown(table):
-    """The README's table: the faults, the command, the number of tries, and the outcomes."""
+    """The table of the page: the faults, the command, the number of tries, and the outcomes."""
     commands = {"fleet": "`generate --workers`", "reproduce": "`enhsim_tf.reproduce`"}
     lines = ["| fault | command | tries | outcome |", "|---|---|---|---|"]
     for row in table:
@@ -44,19 +44,16 @@ def as_markdown(table):
     )
 
 
-def fill_readme(table):
-    """Writes the table between the README's markers."""
-    path = ROOT / "README.md"
-    filled = fill_parts(path.read_text(encoding="utf-8"), {"faults": as_markdown(table)}, path.name)
-    with replace_file(path) as temporary:
-        temporary.write_text(filled, encoding="utf-8")
+def fill_page(table):
+    """Writes the table into the page on faults."""
+    fill_pages(ROOT, {"faults": as_markdown(table)})
 
 
 def main():
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description="Faults, tried for real.")
-    choices = [*BENCHES, "readme"]
+    choices = [*BENCHES, "page"]
     parser.add_argument(
-        "of", choices=choices, help="what is tried: large data sets, or the cache of the paper's reproduction; readme: nothing"
+        "of", choices=choices, help="what is tried: large data sets, or the cache of the paper's reproduction; page: nothing"
     )
     parser.add_argument("--tries", type=int, help="of each fault (default: 20 of those that kill, 3 of the others)")
     parser.add_argument(
@@ -70,8 +67,8 @@ def main():
     options = parser.parse_args()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore SIGINT, and so would their child processes
     kept = json.loads(options.out.read_text()) if options.out.exists() else []
-    if options.of == "readme":
-        fill_readme(kept)
+    if options.of == "page":
+        fill_page(kept)
         return 0
     make, faults = BENCHES[options.of]
     table = [row for row in kept if row["of"] != options.of or (options.only and row["fault"] not in options.only)]

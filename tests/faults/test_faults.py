@@ -1,4 +1,4 @@
-"""The README's table of faults matches the record, every listed fault was tried, and no data was lost."""
+"""The table of faults matches the record, every listed fault was tried, and no data was lost."""
 
 import json
 from pathlib import Path
@@ -11,8 +11,8 @@ ROOT = Path(__file__).parents[2]
 RECORD = json.loads((ROOT / "docs" / "faults.json").read_text(encoding="utf-8"))
 
 
-def test_the_readme_shows_the_record():
-    assert f"<!-- faults: generated -->\n{faults.as_markdown(RECORD)}\n<!-- end of faults -->" in (ROOT / "README.md").read_text(
+def test_the_page_shows_the_record():
+    assert f"<!-- faults: generated -->\n{faults.as_markdown(RECORD)}\n<!-- end of faults -->" in (ROOT / "docs" / "faults.md").read_text(
         encoding="utf-8"
     )
 

@@ -357,12 +357,17 @@ def test_the_captions_say_commands_that_draw_the_same_again(tmp_path, monkeypatc
 def test_a_full_run_into_figures_fills_the_readme_and_no_other_run_does(pretended, tmp_path):
     readme = "# Title\n" + (ROOT / "README.md").read_text(encoding="utf-8").split("\n", 1)[1]
     (tmp_path / "README.md").write_text(readme, encoding="utf-8")
+    (tmp_path / "docs").mkdir()
+    page = (ROOT / "docs" / "what_holds.md").read_text(encoding="utf-8")
+    (tmp_path / "docs" / "what_holds.md").write_text(page, encoding="utf-8")
     for arguments in (["--out", "elsewhere"], ["--budget", "smoke"], ["--only", "fig02"]):
         assert pretended(*arguments) == 0
         assert (tmp_path / "README.md").read_text(encoding="utf-8") == readme
+        assert (tmp_path / "docs" / "what_holds.md").read_text(encoding="utf-8") == page
     assert pretended() == 0
-    filled = (tmp_path / "README.md").read_text(encoding="utf-8")
-    assert filled.startswith("# [Re, in part] Title\n") and filled.count("| words (words) |") == filled.count("| words |") == 9
+    filled = (tmp_path / "docs" / "what_holds.md").read_text(encoding="utf-8")
+    assert filled.count("| words (words) |") == filled.count("| words |") == 9
+    assert (tmp_path / "README.md").read_text(encoding="utf-8").startswith("# [Re, in part] Title\n")
 
 
 def test_a_foreign_readme_does_not_stop_a_run(pretended, tmp_path):

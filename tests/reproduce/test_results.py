@@ -54,28 +54,15 @@ RECORDS = [
         "details": {},
     },
 ]
-README = """# Training detectors
-
-Before.
-
-<!-- claims: generated -->
-old
-<!-- end of claims -->
-
-Between, with a `<!--` of its own.
-
-<!-- deviations: generated -->
-<!-- end of deviations -->
-<!-- timings: generated -->
-old
-older
-<!-- end of timings -->
-<!-- channels: generated -->
-<!-- end of channels -->
-
-After.
-"""
-MARKERS = ("claims", "channels", "deviations", "timings")
+TEXTS = {
+    "README.md": "# Training detectors\n\nBefore.\n\n<!-- claims in short: generated -->\nold\n<!-- end of claims in short -->\n\nAfter.\n",
+    "docs/what_holds.md": "# Page\n\n<!-- claims: generated -->\nold\nolder\n<!-- end of claims -->\n\nWith a `<!--` of its own.\n",
+    "docs/spacecraft.md": "<!-- channels: generated -->\n<!-- end of channels -->\nLast.\n",
+    "docs/decisions.md": "<!-- deviations: generated -->\n<!-- end of deviations -->\n",
+    "docs/speed.md": "<!-- timings: generated -->\nold\n<!-- end of timings -->\n",
+}
+"""The pages with generated parts, before they are filled."""
+MARKERS = {"claims in short": "README.md", "claims": "docs/what_holds.md", "deviations": "docs/decisions.md", "timings": "docs/speed.md"}
 
 
 @pytest.fixture
@@ -122,13 +109,17 @@ def test_the_table_says_it_for_a_terminal(monkeypatch, columns):
 
 @pytest.fixture
 def filled(tmp_path, found):
-    def fill(text=README, spread=None):
-        (tmp_path / "README.md").write_text(text, encoding="utf-8")
+    """Fills the pages and returns their texts, one after the other."""
+
+    def fill(texts=TEXTS, spread=None):
+        (tmp_path / "docs").mkdir(exist_ok=True)
+        for name, text in texts.items():
+            (tmp_path / name).write_text(text, encoding="utf-8")
         write_json(tmp_path / "results.json", found)
         if spread is not None:
             write_json(tmp_path / "spread.json", spread)
-        results.fill_readme(tmp_path / "README.md", tmp_path)
-        return (tmp_path / "README.md").read_text(encoding="utf-8")
+        results.fill_results(tmp_path, tmp_path)
+        return "".join((tmp_path / name).read_text(encoding="utf-8") for name in texts)
 
     return fill
 
@@ -137,13 +128,20 @@ def _between(text, name):
     return re.search(f"<!-- {name}: generated -->\n(.*)<!-- end of {name} -->", text, re.DOTALL)[1]
 
 
-def test_the_readme_is_filled_between_its_markers_only(filled):
+def test_the_pages_are_filled_between_their_markers_only(filled):
     text = filled()
-    assert text.startswith("# [Re, in part] Training detectors\n\nBefore.\n") and text.endswith("\n\nAfter.\n")
-    for name in MARKERS:
+    assert text.startswith("# [Re, in part] Training detectors\n\nBefore.\n") and "\n\nAfter.\n" in text
+    for name in (*MARKERS, "channels"):
         text = text.replace(_between(text, name), "")
-    before = README.replace("old\nolder\n", "").replace("old\n", "")
+    before = "".join(TEXTS.values()).replace("old\nolder\n", "").replace("old\n", "")
     assert text == before.replace("# Training", "# [Re, in part] Training")
+
+
+def test_the_readme_has_a_short_row_for_each_claim(filled):
+    rows = [line for line in _between(filled(), "claims in short").splitlines() if line.startswith("| C")]
+    for row, record, value in zip(rows, RECORDS, ("0.123", "1,234,568", "–"), strict=True):
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        assert cells == [record["id"], record["sentence"], f"**{record['verdict']}**", f"{record['statistic']}: {value}"]
 
 
 def test_the_readme_holds_the_claims(filled):
@@ -226,27 +224,31 @@ def test_the_readme_shows_what_real_channels_reached(tmp_path, filled, found):
     assert rows == [f"| `{name}.npy` | 0.100 | 0.200 | 0.300 | 0.010 | 0.020 | 0.030 | 17 | {judged} |" for name in ("a", "b")]
 
 
-def test_filling_twice_is_filling_once(filled):
+def test_filling_twice_is_filling_once(tmp_path, filled):
     once = filled()
-    assert filled(once) == once
-    assert filled(once.replace("[Re, in part]", "[¬Re]")) == once, "the verdict of the title is replaced, not added to"
+    texts = {name: (tmp_path / name).read_text(encoding="utf-8") for name in TEXTS}
+    assert filled(texts) == once
+    texts["README.md"] = texts["README.md"].replace("[Re, in part]", "[¬Re]")
+    assert filled(texts) == once, "the verdict of the title is replaced, not added to"
 
 
 @pytest.mark.parametrize("name", MARKERS)
 @pytest.mark.parametrize("kind", ["begin", "end", "twice"])
-def test_missing_markers_are_refused_and_the_file_stays(tmp_path, filled, refused, name, kind):
+def test_missing_markers_are_refused_and_all_pages_stay(tmp_path, filled, refused, name, kind):
     marker = f"<!-- end of {name} -->\n" if kind == "end" else f"<!-- {name}: generated -->\n"
-    block = f"<!-- {name}: generated -->\n<!-- end of {name} -->\n"
-    text = README + block if kind == "twice" else README.replace(marker, "")
+    other = "<!-- other: generated -->\n"  # so that it is still a page with generated parts
+    text = TEXTS[MARKERS[name]]
+    text = text + f"<!-- {name}: generated -->\n<!-- end of {name} -->\n" if kind == "twice" else text.replace(marker, "") + other
+    texts = TEXTS | {MARKERS[name]: text}
     with refused(name):
-        filled(text)
-    assert (tmp_path / "README.md").read_text(encoding="utf-8") == text
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["README.md", "results.json"]
+        filled(texts)
+    assert {each: (tmp_path / each).read_text(encoding="utf-8") for each in texts} == texts
 
 
-def test_without_a_readme_nothing_is_done(tmp_path):
-    results.fill_readme(tmp_path / "README.md", tmp_path)
-    assert not list(tmp_path.iterdir())
+def test_without_pages_nothing_is_done(tmp_path, found):
+    write_json(tmp_path / "results.json", found)
+    results.fill_results(tmp_path, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["results.json"]
 
 
 def test_deviations_table_has_a_row_a_setting():
@@ -258,10 +260,14 @@ def test_deviations_table_has_a_row_a_setting():
     assert head.count("|") == rule.count("|") == 6
 
 
-def test_the_repositorys_readme_is_up_to_date(tmp_path):
+def test_the_repositorys_pages_are_up_to_date(tmp_path):
     if not (ROOT / "figures" / "results.json").is_file():
         pytest.skip("figures/results.json is not there yet: run the full budget")
-    shutil.copy(ROOT / "README.md", tmp_path)
-    results.fill_readme(tmp_path / "README.md", ROOT / "figures")
-    assert (tmp_path / "README.md").read_text(encoding="utf-8") == (ROOT / "README.md").read_text(encoding="utf-8")
+    names = set(results.PAGES.values())
+    (tmp_path / "docs").mkdir()
+    for name in names:
+        shutil.copy(ROOT / name, tmp_path / name)
+    results.fill_results(tmp_path, ROOT / "figures")
+    for name in names:
+        assert (tmp_path / name).read_text(encoding="utf-8") == (ROOT / name).read_text(encoding="utf-8"), name
     assert json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))["budget"] == "full"

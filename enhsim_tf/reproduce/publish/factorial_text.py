@@ -68,14 +68,14 @@ def cells_table(found: Findings) -> str:
     return "\n".join(rows)
 
 
-def readme_part(found: Findings) -> str:
-    """The README's figure, if a comparison is complete, and its table."""
-    shown = f"![{ALT}](figures/factorial/contributions.png)\n\n" if found["shares"] else ""
+def page_part(found: Findings) -> str:
+    """The figure of the page on what holds, if a comparison is complete, and its table."""
+    shown = f"![{ALT}](../figures/factorial/contributions.png)\n\n" if found["shares"] else ""
     return shown + short_table(found)
 
 
 def short_table(found: Findings) -> str:
-    """The table of the README and the report: the references, the paper's pipeline, the pipeline without networks, and the best cell of each generator."""
+    """The table of that page and of the report: the references, the paper's pipeline, the pipeline without networks, and the best cell of each generator."""
     cells = found["cells"]
     without = dataclasses.replace(WITHOUT_NETWORK, windows=LEVELS["windows"][0]).name, WITHOUT_NETWORK.name
     chosen = ["coarse", PAPER_CELL.name, *without]

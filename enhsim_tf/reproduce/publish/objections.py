@@ -19,7 +19,7 @@ def objections(found: Findings, factorial: Findings | None = None, labelled: Fin
         {
             "objection": "Ridge regression, the baseline, has a fixed penalty on unscaled values, so that it depends on the unit of the channel and is too weak a baseline.",
             "outcome": "Right. The project now has a single ridge regression, on standardised values with a penalty chosen by cross-validation over blocks of time "
-            "(`enhancer/ridge.py`). The README's table of claims compares the enhancer with it.",
+            "(`enhancer/ridge.py`). The table of claims compares the enhancer with it.",
         },
         {
             "objection": "In the study of real telemetry, the arms learn from unequal amounts of data, and the share of anomalies found is not compared with chance.",

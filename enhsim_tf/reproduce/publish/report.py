@@ -1,4 +1,4 @@
-"""Writes the report on robustness and its tables in `docs/`, the generated parts of the README and the last lines of the command.
+"""Writes the report on robustness and its tables in `docs/`, the generated parts of other pages and the last lines of the command.
 
 All numbers come from the findings. A test renders the report again from the tables and compares.
 """
@@ -152,13 +152,13 @@ def _tried(row: Mapping[str, str]) -> dict[str, Any]:
 
 
 def report(found: Findings, root: Path) -> None:
-    """Writes the report, and the generated parts of the README if it exists.
+    """Writes the report, and the generated parts of the pages that exist.
 
     Args:
         found: The findings of a full run.
         root: Folder of the project.
     """
-    from enhsim_tf.reproduce.publish.results import fill_parts
+    from enhsim_tf.reproduce.publish.results import fill_pages
     from enhsim_tf.reproduce.spacecraft import run
 
     labelled, factorial = (findings_of(root, name) for name in ("labelled", "factorial"))
@@ -170,17 +170,12 @@ def report(found: Findings, root: Path) -> None:
     if labelled is not None:
         parts["labelled"] = run.table(labelled)
     if factorial is not None:
-        parts["factorial"] = factorial_text.readme_part(factorial)
-    readme = root / "README.md"
-    if readme.is_file():
-        text = readme.read_text(encoding="utf-8")
-        parts = {name: part for name, part in parts.items() if f"<!-- {name}: generated -->" in text}
-        with replace_file(readme) as temporary:
-            temporary.write_text(fill_parts(text, parts, readme.name), encoding="utf-8")
+        parts["factorial"] = factorial_text.page_part(factorial)
+    fill_pages(root, parts)
 
 
 def table(found: Findings) -> str:
-    """The README's table: false alarms by arm and environment, and recall."""
+    """The table of the page on what holds: false alarms by arm and environment, and recall."""
     from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
     from enhsim_tf.detection.registry import DETECTORS
     from enhsim_tf.reproduce.settings import make_settings

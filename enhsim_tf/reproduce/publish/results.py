@@ -1,4 +1,4 @@
-"""Results of a run: the table on the terminal, `results.json`, and the generated parts of the README."""
+"""Results of a run: the table on the terminal, `results.json`, and the generated parts of the README and other pages."""
 
 import collections
 import json
@@ -103,29 +103,76 @@ def titles_line(found: Mapping[str, Any], spread: Mapping[str, Any]) -> str:
     return f"{said} On {', '.join(ties)} the seeds are divided equally, and the worse verdict counts." if ties else said
 
 
-def fill_readme(path: Path, folder: Path) -> None:
-    """Writes the generated parts of the README between their markers, and the verdict into its title.
+PAGES = {
+    "claims in short": "README.md",
+    "practice": "README.md",
+    "claims": "docs/what_holds.md",
+    "robustness": "docs/what_holds.md",
+    "factorial": "docs/what_holds.md",
+    "labelled": "docs/spacecraft.md",
+    "channels": "docs/spacecraft.md",
+    "deviations": "docs/decisions.md",
+    "timings": "docs/speed.md",
+    "speed": "docs/speed.md",
+    "faults": "docs/faults.md",
+}
+"""The page of each generated part, by the name of its markers."""
+
+
+def fill_pages(root: Path, parts: Mapping[str, str]) -> None:
+    """Writes generated parts between their markers. Pages that do not exist, or that have no generated part at all, are left out.
 
     Args:
-        path: The README; nothing is done where it does not exist.
+        root: Folder of the project.
+        parts: Contents by name, with the names of `PAGES`.
+
+    Raises:
+        InputError: If the markers of a part are not once on its page; then no page is changed.
+    """
+    filled = {}
+    for name in dict.fromkeys(PAGES[part] for part in parts):
+        path = root / name
+        text = path.read_text(encoding="utf-8") if path.is_file() else ""
+        if ": generated -->" in text:  # otherwise not a page of this project
+            filled[path] = fill_parts(text, {part: content for part, content in parts.items() if PAGES[part] == name}, path.name)
+    for path, text in filled.items():
+        with replace_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def fill_results(root: Path, folder: Path) -> None:
+    """Writes the results of a run into the pages, and the verdict into the title of the README.
+
+    Args:
+        root: Folder of the project.
         folder: Holds `results.json` of a full run, and `spread.json` where further seeds were run.
     """
-    if not path.is_file():
-        return
     found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    text, spread = path.read_text(encoding="utf-8"), read_spread(folder, found)
-    if ": generated -->" not in text:  # not the README of this project
-        return
+    spread = read_spread(folder, found)
     parts = {
+        "claims in short": claims_in_short(found, spread),
         "claims": claims_table(found, spread),
         "channels": channels_table(sorted(folder.glob("*/results.json"))),
         "deviations": deviations_table(),
         "timings": timings_table(found),
     }
-    text = fill_parts(text, parts, path.name)
-    text = re.sub(r"\A# (\[.*?\] )?", f"# {title_verdict(found['claims'], spread)} ", text)
-    with replace_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    fill_pages(root, parts)
+    readme = root / PAGES["claims in short"]
+    text = readme.read_text(encoding="utf-8") if readme.is_file() else ""
+    if ": generated -->" in text:
+        with replace_file(readme) as temporary:
+            temporary.write_text(re.sub(r"\A# (\[.*?\] )?", f"# {title_verdict(found['claims'], spread)} ", text), encoding="utf-8")
+
+
+def claims_in_short(found: Mapping[str, Any], spread: Mapping[str, Any] | None = None) -> str:
+    """The claims as a Markdown table with a short row each: the sentence, the value and the verdict."""
+    lines = ["| | the paper says | verdict | value |", "|---|---|---|---|"]
+    for claim in found["claims"]:
+        value = f"{claim['statistic'].partition(':')[0]}: {short(claim['value'])}"
+        verdict = f"**{verdict_over(claim, spread)}**" + (f"; {claim['holds']} here" if claim.get("holds") else "")
+        lines.append(f"| {claim['id']} | {claim['sentence']} | {verdict} | {value} |")
+    said = "" if spread is None else f" {titles_line(found, spread)}"
+    return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget.{said}"
 
 
 def fill_parts(text: str, parts: Mapping[str, str], where: str) -> str:

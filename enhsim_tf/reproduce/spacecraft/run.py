@@ -103,7 +103,7 @@ def collect(
 
 
 def table(found: dict[str, Any]) -> str:
-    """The tables of the README: one row per training arm and control, and one row per channel."""
+    """The tables of the page on the spacecraft: one row per training arm and control, and one row per channel."""
     from enhsim_tf.reproduce.publish.wording import p_value
     from enhsim_tf.reproduce.spacecraft.rates import PRIMARY
     from enhsim_tf.reproduce.spacecraft.study import DEGRADED_ARM, GENERATED_ARM, RIDGE_ARM

@@ -152,7 +152,7 @@ def test_committed_findings_come_from_the_committed_table(near):
     again = findings.summarise(read_cells(KEPT / TABLE))
     assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
     assert (KEPT / TABLE).stat().st_size < 400_000
-    readme = (KEPT.parents[1] / "README.md").read_text(encoding="utf-8")
-    assert factorial_text.readme_part(kept) in readme
+    root = KEPT.parents[1]
+    assert factorial_text.page_part(kept) in (root / "docs" / "what_holds.md").read_text(encoding="utf-8")
     robustness, labelled = (report.findings_of(KEPT.parents[1], name) for name in ("robustness", "labelled"))
-    assert practice.bullets(robustness, kept, labelled) in readme
+    assert practice.bullets(robustness, kept, labelled) in (root / "README.md").read_text(encoding="utf-8")

@@ -432,7 +432,7 @@ def test_report_matches_the_tables(near):
     assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
     for path, text in report.render_all(ROOT, kept).items():
         assert text == (ROOT / path).read_text(encoding="utf-8"), path
-    assert report.table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert report.table(kept) in (ROOT / "docs" / "what_holds.md").read_text(encoding="utf-8")
     assert sum(path.stat().st_size for path in KEPT.glob("*.parquet")) < 1_000_000
     assert min(kept["seeds"]) == make_settings().robustness.first_seed
 
@@ -462,17 +462,17 @@ def test_tries_cover_every_environment_that_misses_a_target():
             assert tried[name] == {wording.REAL_NOISE, *designs.DESIGNS}, name
 
 
-def test_readme_statements_agree_with_the_findings():
+def test_statements_of_the_page_agree_with_the_findings():
     if not KEPT.is_dir():
         pytest.skip("the experiment has not been run: no figures/robustness")
     kept = json.loads((KEPT / "findings.json").read_text(encoding="utf-8"))
-    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    page = " ".join((ROOT / "docs" / "what_holds.md").read_text(encoding="utf-8").split())
     counts = [in_words(len(each)) for each in (DETECTORS, ARMS, kept["environments"])]
-    assert "{} detectors are trained on {} kinds of windows".format(*counts) in readme and f"with {counts[2]} kinds of noise" in readme
+    assert "{} detectors are trained on {} kinds of windows".format(*counts) in page and f"with {counts[2]} kinds of noise" in page
     words = wording.words(kept, make_settings(kept["budget"]))
-    assert words["is_ar_as_good"] == ("Where noise is Gaussian, a fitted autoregression does as well." in readme)
+    assert words["is_ar_as_good"] == ("Where noise is Gaussian, a fitted autoregression does as well." in page)
     blocks, gan = (kept["arms"][f"residual + {name}"]["gap_closed"] for name in ("bootstrap", "convolutional GAN"))
-    assert (abs(blocks - gan) < 0.02) == ("Blocks of the residuals, without any generator, close the gap as well as the conv" in readme)
+    assert (abs(blocks - gan) < 0.02) == ("Blocks of the residuals, without any generator, close the gap as well as the conv" in page)
 
 
 # what others measured of this process at a thousand windows a side: not of our code

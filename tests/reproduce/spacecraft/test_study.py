@@ -161,11 +161,11 @@ def test_findings_are_those_of_the_tables(out, found):
     assert again == {key: found[key] for key in again}
 
 
-def test_the_projects_report_and_readme_are_those_of_its_tables(near):
+def test_the_projects_report_and_page_are_those_of_its_tables(near):
     kept = findings_of(ROOT, "labelled")
     again = json.loads(json.dumps(summarise(KEPT.read(ROOT / "figures" / "labelled"))))
     assert again == near({key: kept[key] for key in again}) and kept["budget"] == "full"
-    assert table(kept) in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert table(kept) in (ROOT / "docs" / "spacecraft.md").read_text(encoding="utf-8")
 
 
 def test_figures_are_there(out):
