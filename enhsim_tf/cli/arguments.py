@@ -50,8 +50,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     fit = commands.add_parser(
         "fit",
         help="fit an enhanced simulator to nominal telemetry",
-        description="Fits an enhanced simulator to each channel of nominal, periodic telemetry. The last part of the telemetry is held out,\n"
-        "and the report evaluates the simulator on it. A fit takes about a minute and a half per channel on two cores.",
+        description="Fits an enhanced simulator to each channel of nominal telemetry. Its coarse simulator is a square wave, or the commands in an\n"
+        "array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
+        "report evaluates the simulator on it. A fit takes about a minute and a half per channel on two cores.",
         epilog=EXIT,
         **form,
     )
@@ -63,7 +64,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--window",
         type=int,
         metavar="N",
-        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500)",
+        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500 and to an eighth of the record)",
     )
     fit.add_argument(
         "--enhancer",
@@ -261,5 +262,13 @@ def _add_cleaning(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> 
     parser.add_argument(
         "--timezone", metavar="ZONE", help="time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
     )
-    parser.add_argument("--max-fill", type=int, default=5, metavar="N", help="longest gap, in samples, that is interpolated (default: 5)")
+    parser.add_argument(
+        "--max-fill", type=int, metavar="N", help="longest gap, in samples, that is filled (default: 5; any with --fill hold)"
+    )
+    parser.add_argument(
+        "--fill",
+        choices=("linear", "hold"),
+        default="linear",
+        help="fill gaps by straight lines (default), or hold the last value, for telemetry that is sent only when it changes",
+    )
     parser.add_argument("--drop-bad", action="store_true", help="drop and count values and times that cannot be read, instead of stopping")
