@@ -6,7 +6,7 @@ from pathlib import Path
 
 from enhsim_tf.common.console import Parser
 from enhsim_tf.detection import registry
-from enhsim_tf.detection.registry import option_name
+from enhsim_tf.detection.registry import RESIDUAL, option_name
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
 from enhsim_tf.enhanced_simulator.runs.options import NOISES, RUNGS
 from enhsim_tf.telemetry.registry import SOURCES
@@ -185,12 +185,15 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "Beside SCORES it writes the alarms, one per row, to a file that ends in .events.csv: begin, end, peak, duration_s,\n"
         "num_flagged, score and confidence. Flagged samples at most one window apart form one alarm. The command reports the\n"
         "expected number of false alarms per day at the threshold, with its 95 % interval.",
-        epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False) + f"\n{EXIT}",
+        epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
+        + f"\n{RESIDUAL}: judges the difference between the telemetry and the simulator that is aligned with it (docs/telemetry.md)\n{EXIT}",
         **form,
     )
     score.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
     _add_source(score)
-    score.add_argument("--detector", choices=DETECTORS, default="pca-residual", metavar="NAME", help="detector (default: %(default)s)")
+    score.add_argument(
+        "--detector", choices=(*DETECTORS, RESIDUAL), default="pca-residual", metavar="NAME", help="detector (default: %(default)s)"
+    )
     score.add_argument(
         "--windows", type=int, default=2_000, metavar="N", help="generated windows for training the detector (default: 2000)"
     )

@@ -16,10 +16,10 @@ def run_score(options: argparse.Namespace) -> int:
     Args:
         options: Parsed options of `score`.
     """
-    from enhsim_tf.detection.registry import DETECTORS, option_name
+    from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, events_path, score_channel, write_scores
 
-    detector = {option_name(name): name for name in DETECTORS}[options.detector]
+    detector = {option_name(name): name for name in (*DETECTORS, RESIDUAL)}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)
     from enhsim_tf.enhanced_simulator.model_folder import models_of

@@ -136,7 +136,7 @@ def in_one_process(tmp_path_factory):
     """Two channels fitted one after the other; a third channel cannot be fitted."""
     folder = tmp_path_factory.mktemp("one")
     failed, told = fit(folder, GIVEN, workers=1, window=32)
-    assert list(failed) == ["still"] and "periodic" in failed["still"] and len(told) == 2
+    assert list(failed) == ["still"] and "constant" in failed["still"] and len(told) == 2
     return folder
 
 
