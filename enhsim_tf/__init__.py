@@ -45,6 +45,7 @@ _PLACES = {
     "score_run": "enhanced_simulator.runs.scoring",
     "series_labelled": "datasets.labelled_windows",
     "to_series": "telemetry.pandas_series",
+    "update_simulator": "enhanced_simulator.updating",
 }
 __all__ = list(_PLACES)
 

@@ -21,7 +21,7 @@ with simulator.csv, a recorded run of your own simulator at the times of the tel
   python -m enhsim_tf fit telemetry.csv --coarse simulator.csv --out models
   python -m enhsim_tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
-python -m enhsim_tf fit --help shows the options of fit; generate, verify, score and inject have help texts too. A separate command,
+python -m enhsim_tf fit --help shows the options of fit; generate, verify, score, update and inject have help texts too. A separate command,
 python -m enhsim_tf.reproduce, reproduces the paper.
 """
 DETECTORS = tuple(map(option_name, registry.DETECTORS))
@@ -45,7 +45,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES + EXIT,
         **form,
     )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,inject}", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,update,inject}", required=True)
 
     fit = commands.add_parser(
         "fit",
@@ -204,6 +204,31 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     _add_coarse(coarse)
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(score)
+
+    update = commands.add_parser(
+        "update",
+        help="update simulators with newer nominal telemetry",
+        description="Goes on from fitted simulators with newer nominal telemetry, and reports what changed: level, gain, period, phase, noise,\n"
+        "and errors and alarms before and after on the held-out end of the new telemetry (docs/telemetry.md). The old simulators are kept.",
+        epilog=EXIT,
+        **form,
+    )
+    update.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
+    _add_source(update)
+    update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
+    update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
+    update.add_argument(
+        "--epochs", type=int, default=2, metavar="N", help="further epochs of the enhancer; 0 keeps its weights (default: 2)"
+    )
+    update.add_argument("--num-windows", type=int, default=1_000, metavar="N", help="training windows of these epochs (default: 1000)")
+    update.add_argument(
+        "--held-out",
+        type=float,
+        default=0.2,
+        metavar="SHARE",
+        help="share of the new telemetry on which the update is judged (default: 0.2)",
+    )
+    _add_seed(update)
 
     inject = commands.add_parser(
         "inject",
