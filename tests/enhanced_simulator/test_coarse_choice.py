@@ -3,8 +3,10 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from enhsim_tf.__main__ import main
 from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.degraded import Degraded
@@ -237,7 +239,7 @@ def test_the_columns_of_commands_are_not_channels(array, tmp_path):
     assert read_commands(tmp_path / "none.npy") is None
 
 
-def test_a_model_of_commands_reads_them_from_the_telemetry(array, refused, tmp_path):
+def test_a_model_of_commands_reads_them_from_the_telemetry(array, refused, tmp_path, capsys):
     values, commands = np.load(array)[:, 0], read_commands(array)
     model, report = fit_channel([telemetry(values, "S-1.0")], TINY, 0, commands=commands)
     assert isinstance(model, RunModel) and is_of_commands(model)
@@ -251,3 +253,10 @@ def test_a_model_of_commands_reads_them_from_the_telemetry(array, refused, tmp_p
     np.save(tmp_path / "plain.npy", values)
     with refused("25 or 55 columns", "plain.npy"):
         recording_of(loaded, tmp_path / "plain.npy")
+    # the commands score and generate
+    model.save(tmp_path / "models" / "S-1.0")
+    scores, copies = tmp_path / "scores.csv", tmp_path / "copies.parquet"
+    assert main(["score", str(tmp_path / "models"), str(array), "--windows", "50", "--detector", "residual", "--out", str(scores)]) == 0
+    assert "difference from the enhanced run" in capsys.readouterr().out and len(pd.read_csv(scores)) == len(values)
+    assert main(["generate", str(tmp_path / "models"), "--coarse", str(array), "--out", str(copies)]) == 0
+    assert len(pd.read_parquet(copies)) == len(values)
