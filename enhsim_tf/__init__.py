@@ -29,6 +29,7 @@ _PLACES = {
     "SquareWaveSimulator": "coarse_simulator.square_waves",
     "Telemetry": "telemetry.series",
     "TrustedRange": "enhanced_simulator.trusted_range",
+    "UpdateOptions": "enhanced_simulator.update_options",
     "build_enhancer": "enhancer.network",
     "clean": "telemetry.cleaning.clean",
     "extract_noise": "noise.extraction",

@@ -17,7 +17,9 @@ def run_update(options: argparse.Namespace) -> int:
     """
     from enhsim_tf.common.atomic_files import make_folder, replace_folder, write_json
     from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of, refuse_foreign
+    from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 
+    chosen = UpdateOptions(options.epochs, options.num_windows, options.held_out, options.seed)
     models = models_of(options.models)
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
     cleaning = cleaning_options(options, 2)
@@ -41,9 +43,7 @@ def run_update(options: argparse.Namespace) -> int:
                 f"Expected --out without a model of {printable(names[name])}, because update keeps the old one. Received: {folder}. "
                 "Give another --out, or --replace."
             )
-    from enhsim_tf.enhanced_simulator.updating import UpdateOptions, update_simulator
-
-    chosen = UpdateOptions(options.epochs, options.num_windows, options.held_out, options.seed)
+    from enhsim_tf.enhanced_simulator.updating import update_simulator
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)

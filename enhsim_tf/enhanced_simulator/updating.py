@@ -18,6 +18,7 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.enhanced_simulator.checks import check_parts, is_finite
 from enhsim_tf.enhanced_simulator.residual_detector import AlignedResidual
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 from enhsim_tf.enhanced_simulator.update_report import RATE, State, UpdateReport
 from enhsim_tf.enhancer.training_pairs import split_end, window_errors
 from enhsim_tf.keras_tools.backend import keras
@@ -35,30 +36,6 @@ _MOST_CHANGE = 0.2  # a period that differs by more is another wave, and the old
 _NEGLIGIBLE = 1e-3  # relative change of the period that is below what a record can show
 _THRESHOLD_WINDOWS = 200  # generated windows that set the threshold of alarms
 _MOST_ORDER = 40  # of a Gaussian autoregression
-
-
-@dataclasses.dataclass(frozen=True)
-class UpdateOptions:
-    """Settings of an update.
-
-    Args:
-        epochs: Passes of the enhancer over windows of the new telemetry; 0 keeps its weights.
-        num_windows: Number of these windows.
-        held_out: Share of the new telemetry, at its end, on which the update is judged; above 0.
-        seed: Random seed.
-
-    Raises:
-        InputError: If a value is out of range.
-    """
-
-    epochs: int = 2
-    num_windows: int = 1_000
-    held_out: float = 0.2
-    seed: int = 0
-
-    def __post_init__(self):
-        if self.epochs < 0 or self.num_windows < 10 or not 0 < self.held_out <= 0.5:
-            raise InputError(f"Expected epochs >= 0, num_windows >= 10 and 0 < held_out <= 0.5. Received: {self}.")
 
 
 def update_simulator(

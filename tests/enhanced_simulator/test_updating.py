@@ -10,7 +10,8 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-from enhsim_tf.enhanced_simulator.updating import UpdateOptions, update_simulator
+from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
+from enhsim_tf.enhanced_simulator.updating import update_simulator
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.gan import NoiseGAN
