@@ -29,6 +29,7 @@ _PLACES = {
     "SquareWaveSimulator": "coarse_simulator.square_waves",
     "Telemetry": "telemetry.series",
     "TrustedRange": "enhanced_simulator.trusted_range",
+    "UpdateOptions": "enhanced_simulator.update_options",
     "build_enhancer": "enhancer.network",
     "clean": "telemetry.cleaning.clean",
     "extract_noise": "noise.extraction",
@@ -45,6 +46,7 @@ _PLACES = {
     "score_run": "enhanced_simulator.runs.scoring",
     "series_labelled": "datasets.labelled_windows",
     "to_series": "telemetry.pandas_series",
+    "update_simulator": "enhanced_simulator.updating",
 }
 __all__ = list(_PLACES)
 

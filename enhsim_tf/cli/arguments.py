@@ -6,7 +6,7 @@ from pathlib import Path
 
 from enhsim_tf.common.console import Parser
 from enhsim_tf.detection import registry
-from enhsim_tf.detection.registry import option_name
+from enhsim_tf.detection.registry import RESIDUAL, option_name
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
 from enhsim_tf.enhanced_simulator.runs.options import NOISES, RUNGS
 from enhsim_tf.telemetry.registry import SOURCES
@@ -21,7 +21,7 @@ with simulator.csv, a recorded run of your own simulator at the times of the tel
   python -m enhsim_tf fit telemetry.csv --coarse simulator.csv --out models
   python -m enhsim_tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
-python -m enhsim_tf fit --help shows the options of fit; generate, verify, score and inject have help texts too. A separate command,
+python -m enhsim_tf fit --help shows the options of fit; generate, verify, score, update and inject have help texts too. A separate command,
 python -m enhsim_tf.reproduce, reproduces the paper.
 """
 DETECTORS = tuple(map(option_name, registry.DETECTORS))
@@ -45,13 +45,14 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES + EXIT,
         **form,
     )
-    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,inject}", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,update,inject}", required=True)
 
     fit = commands.add_parser(
         "fit",
         help="fit an enhanced simulator to nominal telemetry",
-        description="Fits an enhanced simulator to each channel of nominal, periodic telemetry. The last part of the telemetry is held out,\n"
-        "and the report evaluates the simulator on it. A fit takes about a minute and a half per channel on two cores.",
+        description="Fits an enhanced simulator to each channel of nominal telemetry. Its coarse simulator is a square wave, or the commands in an\n"
+        "array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
+        "report evaluates the simulator on it. A fit takes about a minute and a half per channel on two cores.",
         epilog=EXIT,
         **form,
     )
@@ -63,7 +64,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--window",
         type=int,
         metavar="N",
-        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500)",
+        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500 and to an eighth of the record)",
     )
     fit.add_argument(
         "--enhancer",
@@ -184,12 +185,15 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "Beside SCORES it writes the alarms, one per row, to a file that ends in .events.csv: begin, end, peak, duration_s,\n"
         "num_flagged, score and confidence. Flagged samples at most one window apart form one alarm. The command reports the\n"
         "expected number of false alarms per day at the threshold, with its 95 % interval.",
-        epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False) + f"\n{EXIT}",
+        epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
+        + f"\n{RESIDUAL}: judges the difference between the telemetry and the simulator that is aligned with it (docs/telemetry.md)\n{EXIT}",
         **form,
     )
     score.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
     _add_source(score)
-    score.add_argument("--detector", choices=DETECTORS, default="pca-residual", metavar="NAME", help="detector (default: %(default)s)")
+    score.add_argument(
+        "--detector", choices=(*DETECTORS, RESIDUAL), default="pca-residual", metavar="NAME", help="detector (default: %(default)s)"
+    )
     score.add_argument(
         "--windows", type=int, default=2_000, metavar="N", help="generated windows for training the detector (default: 2000)"
     )
@@ -200,6 +204,31 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     _add_coarse(coarse)
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(score)
+
+    update = commands.add_parser(
+        "update",
+        help="update simulators with newer nominal telemetry",
+        description="Goes on from fitted simulators with newer nominal telemetry, and reports what changed: level, gain, period, phase, noise,\n"
+        "and errors and alarms before and after on the held-out end of the new telemetry (docs/telemetry.md). The old simulators are kept.",
+        epilog=EXIT,
+        **form,
+    )
+    update.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
+    _add_source(update)
+    update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
+    update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
+    update.add_argument(
+        "--epochs", type=int, default=2, metavar="N", help="further epochs of the enhancer; 0 keeps its weights (default: 2)"
+    )
+    update.add_argument("--num-windows", type=int, default=1_000, metavar="N", help="training windows of these epochs (default: 1000)")
+    update.add_argument(
+        "--held-out",
+        type=float,
+        default=0.2,
+        metavar="SHARE",
+        help="share of the new telemetry on which the update is judged (default: 0.2)",
+    )
+    _add_seed(update)
 
     inject = commands.add_parser(
         "inject",
@@ -261,5 +290,13 @@ def _add_cleaning(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> 
     parser.add_argument(
         "--timezone", metavar="ZONE", help="time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
     )
-    parser.add_argument("--max-fill", type=int, default=5, metavar="N", help="longest gap, in samples, that is interpolated (default: 5)")
+    parser.add_argument(
+        "--max-fill", type=int, metavar="N", help="longest gap, in samples, that is filled (default: 5; any with --fill hold)"
+    )
+    parser.add_argument(
+        "--fill",
+        choices=("linear", "hold"),
+        default="linear",
+        help="fill gaps by straight lines (default), or hold the last value, for telemetry that is sent only when it changes",
+    )
     parser.add_argument("--drop-bad", action="store_true", help="drop and count values and times that cannot be read, instead of stopping")

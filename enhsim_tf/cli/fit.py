@@ -32,12 +32,12 @@ def run_fit(options: argparse.Namespace) -> int:
 
     workers = parse_workers(options.workers)
     from enhsim_tf.enhanced_simulator.fit_many import fit_channels  # imported here, because pandas is slow to import
+    from enhsim_tf.telemetry.commands import read_commands
     from enhsim_tf.telemetry.sources import read_source
 
-    cleaning = cleaning_options(options, options.window or 64)
+    cleaning = cleaning_options(options, options.window or 32)
     series = read_source(options.source, options.column, options.time, cleaning)
     is_terminal = sys.stdout.isatty()
-    failed = fit_channels(
-        series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, speaks=not is_terminal, run=run
-    )
+    commands = None if run is not None else read_commands(options.source)
+    failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, not is_terminal, run, commands)
     return tell_failed(failed)

@@ -70,6 +70,7 @@ def cleaning_options(options: argparse.Namespace, min_part: int) -> "Cleaning":
         on_bad_times=bad,
         on_bad_values=bad,
         max_fill=options.max_fill,
+        fill=options.fill,
         min_part=min_part,
     )
 

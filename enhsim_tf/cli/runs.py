@@ -12,6 +12,8 @@ from enhsim_tf.common.errors import InputError, printable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from enhsim_tf.coarse_simulator.recording import Recording
+    from enhsim_tf.enhanced_simulator.runs.model import RunModel
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
@@ -51,7 +53,6 @@ def generate_copies(options: argparse.Namespace) -> int:
     copies = 1 if options.copies is None else options.copies
     if copies < 1:
         raise InputError(f"Expected at least one copy. Received: --copies {copies}.")
-    from enhsim_tf.coarse_simulator.recording_files import read_recording
     from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
     from enhsim_tf.enhanced_simulator.model_folder import chosen_of, models_of
 
@@ -62,7 +63,7 @@ def generate_copies(options: argparse.Namespace) -> int:
 
     def write(channel: str) -> None:
         model = load_run_model(models[channel])
-        run = read_recording(options.coarse, model.columns, options.coarse_time, cleaning, model.interval_s)
+        run = _run_of(options.coarse, model, options.coarse_time, cleaning)
         num_rows = write_copies(paths[channel], model, run, copies, options.seed or 0)
         name = printable(channel)
         for line in (*run.notes, *coverage_lines(model, run)):
@@ -94,17 +95,17 @@ def score_runs(
         chosen: Settings of the scoring.
         cleaning: Settings of the cleaning.
     """
-    from enhsim_tf.coarse_simulator.recording_files import read_recording
     from enhsim_tf.enhanced_simulator.runs.scoring import score_run
     from enhsim_tf.enhanced_simulator.scoring import write_scores
     from enhsim_tf.telemetry.cleaning.clean import clean
 
-    refuse_same_file(paths, options.coarse)
+    coarse = options.coarse or options.source  # a model of commands reads them from the telemetry itself
+    refuse_same_file(paths, coarse)
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
         model = load_run_model(models[channel])
-        run = read_recording(options.coarse, model.columns, options.coarse_time, cleaning, model.interval_s)
+        run = _run_of(coarse, model, options.coarse_time, cleaning)
         frame = score_run(model, cleaned.parts, run, chosen)
         write_scores(paths[channel], frame)
         name = printable(channel)
@@ -125,6 +126,16 @@ def score_runs(
         tell(f"{name}: {events_line(frame, paths[channel])}")
 
     return for_each(series, write)
+
+
+def _run_of(source: str, model: "RunModel", time: str | None, cleaning: "Cleaning") -> "Recording":
+    """Reads the coarse run that a model needs: the commands of the file for a model of commands, otherwise a recorded run."""
+    from enhsim_tf.coarse_simulator.recording_files import read_recording
+    from enhsim_tf.enhanced_simulator.runs.commands import is_of_commands, recording_of
+
+    if is_of_commands(model):
+        return recording_of(model, source)
+    return read_recording(source, model.columns, time, cleaning, model.interval_s)
 
 
 def load_run_model(folder: Path):  # noqa: ANN201  its type imports TensorFlow

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from pathlib import Path
 
 from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, load, output_paths
 from enhsim_tf.cli.runs import refuse_without_coarse
@@ -15,10 +16,10 @@ def run_score(options: argparse.Namespace) -> int:
     Args:
         options: Parsed options of `score`.
     """
-    from enhsim_tf.detection.registry import DETECTORS, option_name
+    from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
     from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, events_path, score_channel, write_scores
 
-    detector = {option_name(name): name for name in DETECTORS}[options.detector]
+    detector = {option_name(name): name for name in (*DETECTORS, RESIDUAL)}[options.detector]
     chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)
     from enhsim_tf.enhanced_simulator.model_folder import models_of
@@ -40,7 +41,7 @@ def run_score(options: argparse.Namespace) -> int:
         if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
             raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
 
-    if options.coarse is not None:
+    if options.coarse is not None or all(map(_is_of_commands, (models[name] for name in series))):
         from enhsim_tf.cli.runs import score_runs
 
         return score_runs(options, series, models, paths, chosen, cleaning)
@@ -72,3 +73,11 @@ def run_score(options: argparse.Namespace) -> int:
         tell(f"{printable(channel)}: {events_line(frame, paths[channel])}")
 
     return for_each(series, write)
+
+
+def _is_of_commands(folder: Path) -> bool:
+    """Whether the model in a folder was fitted to the commands of a file of telemetry."""
+    from enhsim_tf.enhanced_simulator.saving import settings_of
+
+    kept = settings_of(folder).get("trained", {}).get("coarse", {})
+    return isinstance(kept, dict) and kept.get("kind") == "commands"

@@ -87,6 +87,11 @@ class SquareWaveSimulator:
         return sum(min(wave.low, wave.high) for wave in self.waves), sum(max(wave.low, wave.high) for wave in self.waves)
 
     @property
+    def is_constant(self) -> bool:
+        """Whether the simulator has no shape at all, as `constant_level.ConstantLevel`."""
+        return False
+
+    @property
     def shortest_period_s(self) -> float:
         """The shortest period in seconds."""
         return min(wave.period_s for wave in self.waves)
@@ -173,6 +178,10 @@ class SquareWaveSimulator:
     @classmethod
     def from_config(cls, config: dict) -> "SquareWaveSimulator":
         """Restores a simulator from the output of `get_config`."""
+        if "level" in config:
+            from enhsim_tf.coarse_simulator.constant_level import ConstantLevel  # imported here, because it is derived from this class
+
+            return ConstantLevel(**config)
         return cls([SquareWave(**wave) for wave in config["waves"]])
 
 

@@ -52,6 +52,11 @@ CONTROLS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path) 
 """The same for the controls."""
 
 
+RESIDUAL = "residual"
+"""Name of the detector that judges the difference between telemetry and a fitted simulator (`residual_size`, and
+`enhanced_simulator.residual_detector`). It needs a simulator, so it is no member of `DETECTORS`."""
+
+
 def option_name(name: str) -> str:
     """The form of a detector's name on the command line, for example `pca-residual` for `PCA residual`."""
     return name.casefold().replace(" ", "-")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.enhancer.ladder import LEVEL_AND_GAIN, RIDGE, RUNGS, fit_ladder, fit_rung
+from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, RIDGE, RUNGS, fit_ladder, fit_rung
 from enhsim_tf.enhancer.scaling import Scaling
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs
 from enhsim_tf.telemetry.series import Telemetry
@@ -33,7 +33,7 @@ def choose_enhancer(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], 
 
     Returns:
         For each rung, its `name`, `error` and `standard_error` on held-out time (NRMSE), `is_within`, whether it is within one
-        standard error of the best, and `is_chosen`.
+        standard error of the best, and `is_chosen`. Empty for a constant level, which needs no enhancer.
 
     Raises:
         InputError: If the telemetry is too short to hold out a third of it.
@@ -41,6 +41,9 @@ def choose_enhancer(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], 
     starts = random_window_starts(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
     pairs = cut_pairs(parts, simulator.coarse, starts, settings.window, settings.follow)
     pairs = pairs.drop_flat() if settings.follow else pairs
+    if getattr(simulator.coarse, "is_constant", False):  # nothing can be learnt from windows that are all the same
+        simulator.enhancer = fit_rung(COARSE, *_windows(simulator, pairs), scaling=_UNCHANGED).network
+        return []
     if settings.follow:
         for _ in range(_ALIGNMENTS):
             simulator.enhancer = fit_rung(RIDGE, *_windows(simulator, pairs), scaling=_UNCHANGED).network

@@ -24,6 +24,7 @@ from enhsim_tf.enhanced_simulator.saving import MANIFEST
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
 THREADS = 2  # per channel; fixed, because the rounding of sums depends on the number of threads and must not depend on the workers
@@ -57,6 +58,7 @@ class Job:
         verbose: Whether to show progress bars.
         speaks: Whether to print lines of progress that begin with the channel's name.
         run: The recorded run of a coarse simulator, for a run model; None for a simulator of square waves.
+        commands: Commands of the samples, shape `(samples, commands)`, or None.
     """
 
     channel: str
@@ -67,6 +69,7 @@ class Job:
     verbose: bool = False
     speaks: bool = False
     run: CoarseRun | None = None
+    commands: "np.ndarray | None" = None
 
 
 def fit_channels(
@@ -80,6 +83,7 @@ def fit_channels(
     engine: str = "local",
     speaks: bool = False,
     run: CoarseRun | None = None,
+    commands: "np.ndarray | None" = None,
 ) -> dict[str, str]:
     """Fits a simulator to each channel, saves it together with its report, and prints the report.
 
@@ -95,6 +99,7 @@ def fit_channels(
         engine: How worker processes are run: `local` or `ray`. The engine does not change the results.
         speaks: Whether each local worker prints a line of progress about every fifteen seconds.
         run: The recorded run of a coarse simulator, for run models; None for simulators of square waves.
+        commands: Commands of the samples, for channels that are not periodic, shape `(samples, commands)`; None if there are none.
 
     Returns:
         A dictionary from the name of each channel that could not be fitted to the reason.
@@ -111,7 +116,7 @@ def fit_channels(
     verbose = verbose and engine == "local" and min(num_cpus() if workers is None else workers, len(series)) <= 1
     here = Path(os.path.abspath(out))
     jobs = [
-        Job(name, each, folder_of(here, name), options, cleaning, verbose, speaks and engine == "local", run)
+        Job(name, each, folder_of(here, name), options, cleaning, verbose, speaks and engine == "local", run, commands)
         for name, each in series.items()
     ]
     for job in jobs:
@@ -221,10 +226,12 @@ def fit_job(job: Job) -> list[str]:
     verbose = "auto" if job.verbose else 0
     if job.run is None:
         from enhsim_tf.enhanced_simulator.fitting import fit_channel
+        from enhsim_tf.enhanced_simulator.report import ChannelReport
         from enhsim_tf.enhanced_simulator.report_figure import channel_figure
+        from enhsim_tf.enhanced_simulator.runs.figure import run_figure
 
-        simulator, report = fit_channel(parts, job.options, verbose, progress)
-        figure = channel_figure(report)
+        simulator, report = fit_channel(parts, job.options, verbose, progress, job.commands)
+        figure = channel_figure(report) if isinstance(report, ChannelReport) else run_figure(report)
     else:
         from enhsim_tf.coarse_simulator.recording_files import read_recording
         from enhsim_tf.enhanced_simulator.runs.figure import run_figure

@@ -1,50 +1,62 @@
-"""Fits an enhanced simulator to a user's channel and evaluates it on held-out telemetry.
+"""Fits a simulator to a user's channel and evaluates it on held-out telemetry.
 
 The last part of the telemetry is held out. It is not used for training the networks, nor for the offsets and gains of
-generated windows.
+generated windows. `coarse_choice` decides which coarse simulator the channel gets.
 """
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator.coarse_choice import COMMANDS, LEAST_SAMPLES, LEVEL, SQUARE_WAVES, CoarseChoice, choose_coarse
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.report_measure import ChannelReport, report_on
+from enhsim_tf.enhanced_simulator.runs.fitting import fit_run_model
+from enhsim_tf.enhanced_simulator.runs.model import RunModel
+from enhsim_tf.enhanced_simulator.runs.options import RunOptions
+from enhsim_tf.enhanced_simulator.runs.report import RunReport
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.training_pairs import split_end
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import num_window_starts
 
-LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
-_LEAST_EXPLAINED = 0.05  # minimum share of the variance that one square wave explains; for white noise, the best fit explains about 0.01
-_LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
-
 
 def fit_channel(
-    parts: Sequence[Telemetry], options: FitOptions | None = None, verbose: int | str = "auto", progress: Progress = SILENT
-) -> tuple[EnhancedSimulator, ChannelReport]:
-    """Fits an enhanced simulator to a channel and evaluates it on the held-out end of the telemetry.
+    parts: Sequence[Telemetry],
+    options: FitOptions | None = None,
+    verbose: int | str = "auto",
+    progress: Progress = SILENT,
+    commands: np.ndarray | None = None,
+) -> tuple[EnhancedSimulator | RunModel, ChannelReport | RunReport]:
+    """Fits a simulator to a channel and evaluates it on the held-out end of the telemetry.
 
     Args:
         parts: Regularly sampled parts of nominal telemetry on a common clock, as returned by `cleaning.clean`.
         options: Settings of the fit. None uses the defaults.
         verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
         progress: Reports the progress of the trainings as lines of text.
+        commands: Commands of the samples, shape `(samples, commands)`, as returned by `commands.read_commands`. They are used if
+            the telemetry is not periodic. None: there are none.
 
     Returns:
-        The simulator and the report.
+        The simulator and the report. A channel whose coarse run are its commands gets a run model and its report.
 
     Raises:
-        InputError: If the telemetry is too short, constant or not periodic.
+        InputError: If the telemetry is too short or constant.
     """
     options = options or FitOptions()
-    learnt, held_out = split_end(parts, options.held_out)
-    simulator = fit_simulator(learnt, options, verbose, progress)
+    learnt, held_out, note = _split(parts, options.held_out)
+    choice = choose_coarse(learnt, options.window, commands)
+    if choice.kind == COMMANDS:
+        said = f"{choice.said} {note}".strip()
+        return _fit_commands(parts, choice, options, learnt is parts, said, commands, verbose, progress)
+    simulator = _fit(learnt, choice, options, verbose, progress, note)
     usable = [part for part in learnt if len(part) >= simulator.window]
-    is_held_out = bool(options.held_out) and num_window_starts(held_out, simulator.window) >= simulator.window
+    is_held_out = bool(options.held_out) and not note and num_window_starts(held_out, simulator.window) >= simulator.window
     return simulator, report_on(simulator, usable, held_out if is_held_out else usable, is_held_out, options.seed)
 
 
@@ -53,8 +65,8 @@ def fit_simulator(
 ) -> EnhancedSimulator:
     """Fits an enhanced simulator to all of the given telemetry.
 
-    The coarse simulator is one square wave. It is aligned in time, offset and gain with each window. The noise is the
-    difference between the telemetry and the enhanced signal.
+    The coarse simulator is one square wave, or a constant level for telemetry that is not periodic. It is aligned in time,
+    offset and gain with each window. The noise is the difference between the telemetry and the enhanced signal.
 
     Args:
         parts: Regularly sampled parts of nominal telemetry on a common clock.
@@ -66,50 +78,79 @@ def fit_simulator(
         The trained simulator.
 
     Raises:
-        InputError: If the telemetry is too short, constant or not periodic.
+        InputError: If the telemetry is too short or constant.
     """
-    longest = max(parts, key=len)
-    coarse = SquareWaveSimulator.fit(longest)
-    period, samples = coarse.waves[0].period_s / longest.interval_s, len(longest)
-    explained = 1 - np.var(longest.values - coarse(longest.time_s)) / np.var(longest.values, dtype=np.float64)
-    if period > samples / 2 or explained < _LEAST_EXPLAINED:
-        raise InputError(
-            f"Expected periodic telemetry, at least two periods long. Received: {longest.name}, whose best square wave has a period of {period:.0f} "
-            f"of {samples} samples and explains {explained:.1%} of its variance. Give more telemetry or another channel."
+    return _fit(parts, choose_coarse(parts, options.window), options, verbose, progress)
+
+
+def _split(parts: Sequence[Telemetry], share: float) -> tuple[Sequence[Telemetry], Sequence[Telemetry], str]:
+    """Splits off the held-out end. Nothing is held out if the rest could not be learnt from; the text says so."""
+    learnt, held_out = split_end(parts, share)
+    values, whole = (np.concatenate([part.values for part in some]) for some in (learnt, parts))
+    if share and len(values) < LEAST_SAMPLES <= len(whole):
+        return parts, parts, f"Nothing is held out, because the record has only {len(whole):,} samples."
+    if share and np.ptp(values) == 0 < np.ptp(whole):
+        return parts, parts, f"Nothing is held out, because the first {1 - share:.0%} of the record is constant."
+    return learnt, held_out, ""
+
+
+def _fit(
+    parts: Sequence[Telemetry], choice: CoarseChoice, options: FitOptions, verbose: int | str, progress: Progress, note: str = ""
+) -> EnhancedSimulator:
+    """Fits the chosen simulator; if nothing can be learnt with square waves, fits a constant level instead, and says so."""
+    usable = [part for part in parts if len(part) >= choice.window]
+    try:
+        simulator = EnhancedSimulator.fit(
+            usable,
+            choice.coarse,
+            options.seed,
+            options.num_windows,
+            options.epochs,
+            options.num_iterations,
+            window=choice.window,
+            noise=options.noise,
+            extraction="enhancer",
+            held_out=0.0,
+            decay=True,
+            follow=True,
+            enhancer="coarse" if choice.kind == LEVEL else options.enhancer,
+            verbose=verbose,
+            progress=progress,
         )
-    window = options.window or window_of(coarse, parts[0].interval_s)
-    usable = [part for part in parts if len(part) >= window]
-    samples = sum(map(len, usable))
-    if samples < _LEAST_LEARNT * window:
-        raise InputError(
-            f"Expected at least {_LEAST_LEARNT} windows of {window} samples to learn from. Received: {samples} samples of {parts[0].name} "
-            "in parts at least as long as a window. Give more telemetry or a smaller window."
-        )
-    return EnhancedSimulator.fit(
-        usable,
-        coarse,
-        options.seed,
+    except InputError as error:
+        if choice.kind != SQUARE_WAVES:
+            raise
+        reason = f"nothing can be learnt from its best square wave ({str(error).rstrip('.')})"
+        return _fit(parts, choose_coarse(parts, options.window, refused=reason), options, verbose, progress, note)
+    simulator.trained["coarse"] = {"kind": choice.kind, "said": f"{choice.said} {note}".strip()}
+    return simulator
+
+
+def _fit_commands(
+    parts: Sequence[Telemetry],
+    choice: CoarseChoice,
+    options: FitOptions,
+    learns_all: bool,
+    said: str,
+    commands: np.ndarray | None,
+    verbose: int | str,
+    progress: Progress,
+) -> tuple[RunModel, RunReport]:
+    """Fits a run model whose coarse run are the traces of the commands."""
+    traces: CommandTraces | None = choice.traces
+    if traces is None or commands is None:
+        raise InputError("Expected commands. Received: none. Give those of the telemetry.")
+    run_options = RunOptions(
+        choice.window,
         options.num_windows,
         options.epochs,
         options.num_iterations,
-        window=window,
-        noise=options.noise,
-        extraction="enhancer",
-        held_out=0.0,
-        decay=True,
-        follow=True,
-        enhancer=options.enhancer,
-        verbose=verbose,
-        progress=progress,
+        options.noise,
+        None if options.enhancer == "best" else options.enhancer,
+        0.0,
+        0.0 if learns_all else options.held_out,
+        options.seed,
     )
-
-
-def window_of(coarse: SquareWaveSimulator, interval_s: float) -> int:
-    """Returns the default window length: two periods of the coarse simulator in samples, limited to the networks' range.
-
-    Args:
-        coarse: The coarse simulator.
-        interval_s: Sampling interval in seconds.
-    """
-    longest_s = max(wave.period_s for wave in coarse.waves)
-    return int(np.clip(round(2 * longest_s / interval_s), LEAST_WINDOW, MOST_WINDOW))
+    model, report = fit_run_model(parts, traces.recording(commands), run_options, verbose, progress)
+    model.trained |= {"coarse": {"kind": "commands", "name": "the commands", "config": traces.get_config()}}
+    return model, dataclasses.replace(report, coarse=said)

@@ -25,7 +25,7 @@ class ChannelReport:
     Args:
         channel: Name of the channel.
         window: Length of a window in samples.
-        period_s: Period of the coarse simulator in seconds, or in samples if the channel has no time.
+        period_s: Period of the coarse simulator in seconds, or in samples if the channel has no time. NaN without a period.
         is_held_out: Whether the telemetry of the evaluation was held out from training.
         num_windows: Number of real windows used for errors and false alarms. They may overlap.
         num_disjoint: How many of these windows can be chosen without overlap; this is the effective sample size.
@@ -48,6 +48,7 @@ class ChannelReport:
         noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for.
         noise_auc: AUC of a classifier that separates `generated` noise from that of the evaluation telemetry, and of one that
             separates `real` noise of the training telemetry from it. Empty if there is too little telemetry.
+        coarse: Which coarse simulator was chosen and why; the first line of the report.
     """
 
     channel: str
@@ -70,12 +71,14 @@ class ChannelReport:
     noise_model: str = "convolutional"
     noise_ladder: Sequence[Mapping[str, Any]] = ()
     noise_auc: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    coarse: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all fields except the examples, and the verdict, in plain JSON types."""
         plain = {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "examples"}
         nrmse = {name: None if np.isnan(error) else error for name, error in self.nrmse.items()}  # NaN is not valid JSON
         return plain | {
+            "period_s": self.period_s if np.isfinite(self.period_s) else None,
             "nrmse": nrmse,
             "noise": [dict(row) for row in self.noise],
             "ladder": [dict(each) for each in self.ladder],
@@ -154,7 +157,7 @@ class ChannelReport:
     def _of_the_noise(self) -> str:
         measured = [row for row in self.noise if row["ratio"] is not None]
         if not measured:
-            return "Noise: the telemetry is too short to compare its noise with generated noise."
+            return "Noise: the telemetry is too short to compare its noise with generated noise, or varies too seldom."
         different = sorted((row for row in measured if row["ratio"] > _SUSPICIOUS), key=lambda row: -row["ratio"])
         if not different:
             return f"Noise: none of {len(measured)} measures tells generated noise from the telemetry's."
@@ -198,12 +201,14 @@ class ChannelReport:
         return "telemetry it has not seen" if self.is_held_out else "the telemetry it learnt from (none was held out)"
 
     def lines(self) -> list[str]:
-        """Returns the report as lines of text: a heading and the verdict."""
+        """Returns the report as lines of text: the coarse simulator, a heading and the verdict."""
         windows = _counted(self.num_windows, "window")
         where = f"{windows} held out" if self.is_held_out else f"{windows} of the training telemetry"
-        head = f"windows of {self.window} samples, period {self.period_s:.6g} {self.time_unit}; measured on {where}"
+        period = f", period {self.period_s:.6g} {self.time_unit}" if np.isfinite(self.period_s) else ""
+        head = f"windows of {self.window} samples{period}; measured on {where}"
         warning = warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
-        return [f"{printable(self.channel)}: {head}{warning}", *self.verdict]
+        first = [f"{printable(self.channel)}: {self.coarse}"] if self.coarse else []
+        return [*first, f"{printable(self.channel)}: {head}{warning}", *self.verdict]
 
 
 def _counted(number: int, noun: str) -> str:

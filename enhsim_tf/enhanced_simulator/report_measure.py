@@ -62,15 +62,16 @@ def report_on(
     quick = {name: DETECTORS[name] for name in QUICK}
     cut = len(real) * 3 // 5  # later real windows set the threshold, with a gap in time, because neighbouring windows overlap
     gap = window * len(real) // max(1, sum(map(len, learnt)))
-    judged = {
-        "generated": evaluation.evaluate_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
-        "real": evaluation.evaluate_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
-    }
+    with np.errstate(divide="ignore", invalid="ignore"):  # of constant windows, PCA computes shares of a variance of 0, which are not used
+        judged = {
+            "generated": evaluation.evaluate_arm(generated[:_NUM_WINDOWS], generated[_NUM_WINDOWS:], trial, quick, seed),
+            "real": evaluation.evaluate_arm(real[: max(1, cut - gap)], real[cut:], trial, quick, seed),
+        }
     recall = {name: {row["kind"]: row["recall"] for row in judged["generated"]["recall"] if row["detector"] == name} for name in QUICK}
     return ChannelReport(
         learnt[0].name,
         window,
-        max(wave.period_s for wave in simulator.coarse.waves),
+        float("nan") if simulator.coarse.is_constant else max(wave.period_s for wave in simulator.coarse.waves),
         is_held_out,
         len(pairs),
         min(len(pairs), sum(len(part) // window for part in held_out)),
@@ -98,6 +99,7 @@ def report_on(
         simulator.trained.get("noise", "convolutional"),
         simulator.trained.get("noise_ladder", ()),
         _noise_auc(simulator, learnt, held_out, seed),
+        simulator.trained.get("coarse", {}).get("said", ""),
     )
 
 
@@ -140,6 +142,8 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
         return short, []
     residual = residual[:, : short * pieces].reshape(-1, short)
     half = len(residual) // 2
+    if np.count_nonzero(np.ptp(residual, axis=1) > 0) <= len(residual) - half or not np.ptp(residual[:half]) > 0:
+        return short, []  # where most windows are constant, measures of noise are not defined
     floor = real_floor.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
     clean = simulator.generate_clean(-(-half // pieces), seed=seed)
     generated = simulator.draw_noise(clean, seed)[:, : short * pieces].reshape(-1, short)[:half]

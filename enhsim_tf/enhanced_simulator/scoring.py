@@ -17,7 +17,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
-from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
+from enhsim_tf.enhanced_simulator.residual_detector import AlignedResidual
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -35,7 +36,8 @@ class ScoreOptions:
     """Settings for scoring telemetry.
 
     Args:
-        detector: Name of a detector in `detectors.DETECTORS`.
+        detector: Name of a detector in `detectors.DETECTORS`, or `RESIDUAL`, which judges the difference between the telemetry and the
+            simulator that is aligned with it.
         num_windows: Number of generated nominal windows for training the detector.
         false_alarm_rate: Share of generated nominal samples that the threshold flags. The threshold is set on a generated
             series of 1,000 windows; for a rate below 1 / 1,001, it is the largest score of that series.
@@ -51,8 +53,8 @@ class ScoreOptions:
     seed: int = 0
 
     def __post_init__(self):
-        if self.detector not in DETECTORS:
-            raise InputError(f"Expected a detector, one of: {', '.join(DETECTORS)}. Received: {self.detector!r}.")
+        if self.detector not in (*DETECTORS, RESIDUAL):
+            raise InputError(f"Expected a detector, one of: {', '.join((*DETECTORS, RESIDUAL))}. Received: {self.detector!r}.")
         if not 0 < self.false_alarm_rate < 0.5 or self.num_windows < 10:
             raise InputError(f"Expected 0 < false_alarm_rate < 0.5 and num_windows >= 10. Received: {self}.")
 
@@ -91,7 +93,7 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
             "Give more telemetry."
         )
     training = simulator.generate(options.num_windows, seed=options.seed)
-    detector = DETECTORS[options.detector](options.seed).fit(training)
+    detector = (AlignedResidual(simulator) if options.detector == RESIDUAL else DETECTORS[options.detector](options.seed)).fit(training)
     nominal = simulator.generate_series(_THRESHOLD_WINDOWS * window, seed=options.seed + 1)
     nominal_scores = score_trace(detector, nominal, window, stride)
     threshold, rate = metrics.finite_threshold(nominal_scores, options.false_alarm_rate, _THRESHOLD_WINDOWS)

@@ -236,9 +236,10 @@ class EnhancedSimulator:
             pairs: Pairs of windows that are aligned with the coarse simulator.
 
         Returns:
-            The realigned pairs; the same pairs if the coarse simulator is a sum of several waves, which is not periodic.
+            The realigned pairs; the same pairs if the coarse simulator is a sum of several waves, which is not periodic, or
+            a constant level, which has no phase.
         """
-        if len(self.coarse.waves) > 1:
+        if len(self.coarse.waves) > 1 or getattr(self.coarse, "is_constant", False):
             return pairs
         phases = self.coarse.waves[0].period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
         coarse = self.coarse.simulate(phases[:, None] + self.interval_s * np.arange(self.window))

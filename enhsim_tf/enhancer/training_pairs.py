@@ -121,6 +121,8 @@ def cut_pairs(parts: Sequence[Telemetry], coarse: SquareWaveSimulator, starts: n
     if not follow:
         return Pairs(coarse.simulate(times), target, np.zeros(len(target)), np.ones(len(target)), time_s)
     windows = coarse.simulate(coarse.synchronise(times, target))
+    if getattr(coarse, "is_constant", False):  # there is no shape to which a gain could be fitted
+        return Pairs(windows, target, (target - windows).mean(axis=1, dtype=np.float64), np.ones(len(target)), time_s)
     return Pairs(windows, target, *_least_squares(windows, target), time_s)
 
 

@@ -9,6 +9,8 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import MAX_COLUMNS, load_npy
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
+from enhsim_tf.telemetry.cleaning.report import Finding
+from enhsim_tf.telemetry.commands import has_commands
 from enhsim_tf.telemetry.tables import NO_TIME
 
 
@@ -38,7 +40,10 @@ def load_array(path: str | os.PathLike) -> np.ndarray:
 
 
 def read_array_channels(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
-    """Reads the columns of an array; see `sources.read_source`, which calls it. `options` has no effect, since there are no times."""
+    """Reads the columns of an array; see `sources.read_source`, which calls it. `options` has no effect, since there are no times.
+
+    Of an array in the layout of `commands`, only column 0 is read, unless columns are named.
+    """
     if time not in (None, NO_TIME):
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     array = load_array(path)
@@ -52,4 +57,9 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None,
                 f"Expected a column of {path.name}, a number from 0 to {len(known) - 1}. Received: {column!r}. Name one of these."
             )
     names = {column: path.stem if len(known) == 1 else f"{path.stem}.{column}" for column in known}
+    if columns is None and has_commands(array):
+        series = pd.Series(array[:, 0], name=names["0"])
+        text = f"columns 1 to {len(known) - 1} hold only 0 and 1 and were taken as commands, not as channels: {len(known) - 1}"
+        series.attrs["findings"] = [Finding("commands", len(known) - 1, text).to_dict()]
+        return {names["0"]: series}
     return {names[column]: pd.Series(array[:, int(column)], name=names[column]) for column in columns or known}

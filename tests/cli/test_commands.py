@@ -288,7 +288,7 @@ def test_a_channel_that_fails_does_not_stop_the_others(told, world, tmp_path):
 def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_path):
     code, out, errors = told("fit", "WORLD/still.csv", "--out", "models", "--workers", 1, *TINY)
     assert code == 2 and [line.split(": ")[1] for line in errors] == ["volts", "amps"] and out == ""
-    assert all(": Expected " in line and "periodic" in line for line in errors)
+    assert all(": Expected " in line and "constant" in line for line in errors)
     assert not list((tmp_path / "models").iterdir())
 
 

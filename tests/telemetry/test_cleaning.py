@@ -351,6 +351,23 @@ def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
     assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
 
 
+def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row(refused):
+    seconds, values = [0, 7, 8, 30, 31.2, 90], [1.0, 2.0, 2.5, 0.0, 4.0, 5.0]
+    series = pd.Series(values, pd.Timestamp("2020-03-01", tz="UTC") + pd.to_timedelta(seconds, unit="s"))
+    held = cleaned_of(series, interval_s=1.0, fill="hold")
+    expected = np.concatenate([[1.0] * 7, [2.0], [2.5] * 22, [0.0], [4.0] * 59, [5.0]])
+    (part,) = held.parts
+    np.testing.assert_array_equal(part.values, expected.astype(np.float32))
+    assert held.report.samples_filled == len(expected) - 6 and "filled with the value before them" in held.report.find("gaps filled").text
+    # the last of several rows in an interval counts, and a long gap splits the series if it is asked for
+    coarser = cleaned_of(series, interval_s=10.0, fill="hold")
+    np.testing.assert_array_equal(coarser.parts[0].values, np.float32([1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5]))
+    assert coarser.report.rows_in == coarser.report.rows_used + coarser.report.rows_left_out
+    assert cleaned_of(series, interval_s=1.0, fill="hold", max_fill=30).report.find("gaps").count == 1
+    with refused("fill"):
+        Cleaning(fill="nearest")
+
+
 def test_short_parts_are_left_out_and_counted(refused):
     series = CLEAN.drop(TIMES[[*range(100, 110), *range(115, 130)]])  # leaves an isolated part of five samples
     assert [len(part) for part in cleaned_of(series).parts] == [100, 5, 270]

@@ -38,6 +38,7 @@ class RunReport:
             separates `real` residuals of the training telemetry from them. Empty if there is too little telemetry.
         unit: Unit of the values.
         examples: A stretch for the figure: `coarse`, `enhanced`, `generated` and `real`.
+        coarse: Which coarse simulator was chosen and why; the first line of the report. Empty if the run was given.
     """
 
     channel: str
@@ -59,6 +60,7 @@ class RunReport:
     noise_auc: Mapping[str, float] = dataclasses.field(default_factory=dict)
     unit: str = "1"
     examples: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    coarse: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all fields except the examples, and the lines of text, in plain JSON types."""
@@ -102,7 +104,8 @@ class RunReport:
         """Returns the report as lines of text: a heading, the notes on the pairing, and the verdict."""
         head = f"{self.channel}: windows of {self.window} samples; inputs: {', '.join(self.columns)}"
         head += warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
-        return [printable(line) for line in (head, *self.notes, *self.verdict)]
+        first = [f"{self.channel}: {self.coarse}"] if self.coarse else []
+        return [printable(line) for line in (*first, head, *self.notes, *self.verdict)]
 
 
 def compare_noise(parts: Sequence[np.ndarray], generated: np.ndarray) -> dict[str, dict[str, float]]:

@@ -10,7 +10,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.evaluation import score_trace
 from enhsim_tf.detection.interface import Detector
-from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.detection.registry import DETECTORS, RESIDUAL
+from enhsim_tf.detection.residual_size import ResidualSize
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, event_rows, note_alarms
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
@@ -39,7 +40,7 @@ class ResidualDetector:
         self.window, self.stride = model.window, max(1, model.window // _STRIDES)
         clean = np.concatenate([*model.nominal_chunks(options.num_windows, np.random.default_rng([options.seed, 7]))])
         noise = model.draw_noise(clean, np.random.default_rng([options.seed, 3]))
-        self.detector: Detector = DETECTORS[options.detector](options.seed).fit(noise)
+        self.detector: Detector = (ResidualSize() if options.detector == RESIDUAL else DETECTORS[options.detector](options.seed)).fit(noise)
         clean = model.nominal_series(_THRESHOLD_WINDOWS * self.window)
         series, further = (model.draw_noise(clean, np.random.default_rng([options.seed, number])) for number in (4, 6))
         scores = score_trace(self.detector, series, self.window, self.stride)

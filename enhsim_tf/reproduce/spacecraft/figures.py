@@ -58,7 +58,7 @@ def errors(found: Findings) -> matplotlib.figure.Figure:
 
 def alarms_and_finds(found: Findings) -> matplotlib.figure.Figure:
     """False alarms at own thresholds, and labelled sequences found at matched false-alarm rates, for each training arm and control."""
-    rows = {arm: (found["arms"][arm], _colour(arm)) for arm in ARMS}
+    rows = {arm: (found["arms"][arm], _colour(arm)) for arm in ARMS if arm in found["arms"]}
     rows |= {f"one line: {name}": (about, QUIET) for name, about in found["controls"].items()}
     finds = {name: next(each["mean"] for each in about["matched"] if each["rate"] == PRIMARY) for name, (about, _) in rows.items()}
     best = max(

@@ -35,7 +35,7 @@ CONTRASTS = (
 """Differences between arms or controls that were declared before the run."""
 KEPT = KeptTables(
     TABLES,
-    labels=("arm", "detector", "channel", "class", "method", "rule"),
+    labels=("arm", "detector", "channel", "class", "method", "rule", "dropped"),
     digits=5,
     kind="study",
     command="python -m enhsim_tf.reproduce --experiment labelled --data FOLDER",
@@ -51,7 +51,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     rates = rates_of(tables)
     channels = {name: _channel(tables, rates, name) for name in rates.names}
     usable = [name for name, about in channels.items() if not about["told_apart"]]
-    arms = {arm: _arm(tables, rates, rates.of_arm(arm), usable) for arm in (*ARMS, DEGRADED_ARM)}
+    arms = {arm: _arm(tables, rates, rates.of_arm(arm), usable) for arm in (*ARMS, DEGRADED_ARM) if rates.of_arm(arm).any()}
     for arm, about in arms.items():
         rows = {detector: rates.of_arm(arm) & (rates.cells["detector"] == detector).to_numpy() for detector in rates.detectors(arm)}
         about["by_detector"] = {detector: _short(tables, rates, chosen) for detector, chosen in rows.items()}
@@ -63,7 +63,7 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         "arms": arms,
         "controls": controls,
         "oracle": {"vus_pr": float(oracle["vus_pr"].mean()), "auc_pr": float(oracle["auc_pr"].mean())},
-        "contrasts": [_contrast(rates, *pair) for pair in CONTRASTS],
+        "contrasts": [_contrast(rates, *pair) for pair in CONTRASTS if {*pair} <= {*arms, *controls}],
         "num_sequences": rates.num_sequences,
         "seeds": rates.seeds,
         "rates": list(RATES),
@@ -75,12 +75,14 @@ def _channel(tables: "Mapping[str, pd.DataFrame]", rates: Rates, name: str) -> d
     about = tables["channels"].query("channel == @name").iloc[0]
     enhancement = tables["enhancement"].query("channel == @name").groupby("method", sort=False)
     cells = rates.cells.query("channel == @name")
-    by_arm = {arm: cells[rates.of_arm(arm)[cells.index]]["own"].mean() for arm in ARMS}
+    there = [arm for arm in ARMS if rates.of_arm(arm)[cells.index].any()]  # an arm that could not be made is missing
+    by_arm = {arm: cells[rates.of_arm(arm)[cells.index]]["own"].mean() for arm in there}
     noisy = float(np.median([rate for arm, rate in by_arm.items() if arm not in CLEAN_ARMS]))
     by_detector = {
-        arm: cells[rates.of_arm(arm)[cells.index]].groupby("detector", sort=False)["own"].mean().to_dict() for arm in (*ARMS, DEGRADED_ARM)
+        arm: cells[rates.of_arm(arm)[cells.index]].groupby("detector", sort=False)["own"].mean().to_dict() for arm in (*there, DEGRADED_ARM)
     }
-    return {
+    dropped = sorted({reason for reason in _of_channel(tables, name).get("dropped", ()) if reason and reason != "nan"})
+    return ({"dropped": dropped} if dropped else {}) | {
         "window": int(about["window"]),
         "period": float(about["period"]),
         "num_train_windows": int(about["train_samples"] // about["window"]),
@@ -92,12 +94,16 @@ def _channel(tables: "Mapping[str, pd.DataFrame]", rates: Rates, name: str) -> d
         "false_alarms_by_arm": {arm: float(rate) for arm, rate in by_arm.items()},
         "median_arm": noisy,
         "told_apart": noisy > SATURATED,
-        "found": {arm: rates.found(rates.of_arm(arm), PRIMARY, [name]) for arm in ARMS},
+        "found": {arm: rates.found(rates.of_arm(arm), PRIMARY, [name]) for arm in there},
         "sequences": [
             {"sequence": int(row["sequence"]), "class": row["class"], "length": int(row["stop"] - row["start"]), "found": found}
             for row, found in rates.by_sequence(name, [*ARMS, *CONTROLS])
         ],
     }
+
+
+def _of_channel(tables: "Mapping[str, pd.DataFrame]", name: str) -> "pd.DataFrame":
+    return tables["channels"].query("channel == @name")
 
 
 def _arm(tables: "Mapping[str, pd.DataFrame]", rates: Rates, rows: np.ndarray, usable: list[str]) -> dict[str, Any]:
@@ -112,8 +118,8 @@ def _arm(tables: "Mapping[str, pd.DataFrame]", rates: Rates, rows: np.ndarray, u
         "found_past": _found(rates, rows, "past"),
         "matched": [{"rate": rate, **_found(rates, rows, rate)} for rate in RATES],
         "usable": {
-            "false_alarms": float(cells[cells["channel"].isin(usable)]["own"].mean()) if usable else None,
-            "found": rates.found(rows, PRIMARY, usable) if usable else None,
+            "false_alarms": float(cells[cells["channel"].isin(usable)]["own"].mean()) if cells["channel"].isin(usable).any() else None,
+            "found": rates.found(rows, PRIMARY, usable) if cells["channel"].isin(usable).any() else None,
         },
         "median_delay": rates.median_delay(rows),
         "vus_pr": float(ranking["vus_pr"].mean()),
@@ -139,19 +145,26 @@ def _ranking_of(tables: "Mapping[str, pd.DataFrame]", cells: "pd.DataFrame") -> 
 def _crossed(cells: "pd.DataFrame", value: str) -> dict[str, float]:
     """Mean over detectors, channels and seeds, with its interval by the crossed bootstrap over channels and seeds."""
     means = cells.groupby(["channel", "seed"], as_index=False)[value].mean()
-    found = statistics.crossed_interval(means, value, ["channel", "seed"])
+    found = statistics.crossed_interval(_with_all_seeds(means), value, ["channel", "seed"])
     return {"mean": found.estimate, "low": found.low, "high": found.high}
+
+
+def _with_all_seeds(rows: "pd.DataFrame") -> "pd.DataFrame":
+    """Returns the channels that have the most seeds. An arm that could not be made with one seed leaves out that channel."""
+    counts = rows.groupby("channel")["seed"].transform("count")
+    return rows[counts == counts.max()]
 
 
 def _found(rates: Rates, rows: np.ndarray, rule: float | str) -> dict[str, float]:
     """Share of the labelled sequences that is found, its interval over channels and sequences in them, and chance."""
     interval = statistics.hierarchical_interval(rates.shares(rows, rule), "found", ["channel", "sequence"])
     chance, p_value = chance_of(rates.counts_by_shift(rows, rule))
+    sequences = len(rates.shares(rows, rule))
     return {
         "mean": interval.estimate,
         "low": interval.low,
         "high": interval.high,
-        "chance": chance / rates.num_sequences,
+        "chance": chance / sequences,
         "p_value": p_value,
     }
 
@@ -160,10 +173,10 @@ def _contrast(rates: Rates, first: str, second: str) -> dict[str, Any]:
     """Differences of two arms in false alarms and in finds at the primary matched rate, with the channels as replicates."""
     rows = [rates.of_control(name) if name in CONTROLS else rates.of_arm(name) for name in (first, second)]
     alarms = [rates.cells[each].groupby(["channel", "seed"])["own"].mean() for each in rows]
-    difference = (alarms[0] - alarms[1]).rename("difference").reset_index()
-    interval = statistics.crossed_interval(difference, "difference", ["channel", "seed"])
+    difference = (alarms[0] - alarms[1]).dropna().rename("difference").reset_index()  # channels that have both
+    interval = statistics.crossed_interval(_with_all_seeds(difference), "difference", ["channel", "seed"])
     shares = [rates.shares(each, PRIMARY).set_index(["channel", "sequence"])["found"] for each in rows]
-    finds = (shares[0] - shares[1]).reset_index()
+    finds = (shares[0] - shares[1]).dropna().reset_index()
     found = statistics.hierarchical_interval(finds, "found", ["channel", "sequence"])
     return {
         "first": first,

@@ -69,10 +69,11 @@ class Rates:
         return ((self.cells["arm"] == "real") & (self.cells["detector"] == name)).to_numpy()
 
     def _chosen(self, rows: np.ndarray, rule: float | str, channels: Sequence[str] | None = None) -> "Iterator[tuple[str, np.ndarray]]":
-        """Finds of the chosen rows of each channel by one rule, shape `(shifts, rows, sequences)`."""
+        """Finds of the chosen rows of each channel by one rule, shape `(shifts, rows, sequences)`. Channels without such rows are left out."""
         names, column = self.cells["channel"].to_numpy(), _COLUMNS.index(rule)
         for name in channels or self.names:
-            yield name, self.finds[name][:, column][:, rows[names == name]]
+            if rows[names == name].any():
+                yield name, self.finds[name][:, column][:, rows[names == name]]
 
     def found(self, rows: np.ndarray, rule: float | str, channels: Sequence[str] | None = None) -> float:
         """Share of the labelled sequences that is found, mean over rows.
@@ -81,9 +82,12 @@ class Rates:
             rows: Mask of rows of `cells`.
             rule: A rate at which thresholds are matched, or a rule by which they are set.
             channels: Names of channels; None for all.
+
+        Returns:
+            The share; NaN if none of the rows belongs to the channels.
         """
         shares = [found[0].mean(axis=0) for _, found in self._chosen(rows, rule, channels)]
-        return float(np.concatenate(shares).mean())
+        return float(np.concatenate(shares).mean()) if shares else float("nan")
 
     def shares(self, rows: np.ndarray, rule: float | str) -> "pd.DataFrame":
         """For each labelled sequence, the share `found` of the rows that find it, with its `channel` and `sequence`."""
@@ -110,7 +114,8 @@ class Rates:
     def by_sequence(self, channel: str, names: Sequence[str]) -> "Iterator[tuple[Any, dict[str, float]]]":
         """For each labelled sequence of a channel, its row and the share of detectors of each arm or control that find it at 5 %."""
         rows = {name: self.of_arm(name) if self.of_arm(name).any() else self.of_control(name) for name in names}
-        shares = {name: next(self._chosen(chosen, PRIMARY, [channel]))[1][0].mean(axis=0) for name, chosen in rows.items()}
+        found = {name: list(self._chosen(chosen, PRIMARY, [channel])) for name, chosen in rows.items()}
+        shares = {name: each[0][1][0].mean(axis=0) for name, each in found.items() if each}
         for row in self.sequences[self.sequences["channel"] == channel].to_dict("records"):
             yield row, {name: float(share[row["sequence"]]) for name, share in shares.items()}
 

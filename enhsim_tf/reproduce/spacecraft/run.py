@@ -127,7 +127,10 @@ def table(found: dict[str, Any]) -> str:
     ]
     for name, about in found["channels"].items():
         cells = [f"{about['nrmse'][method]:.3f}" for method in ("coarse", "ridge", "ridge, own clock", "enhanced")]
-        cells += [_percent(about["false_alarms_by_arm"][arm]) for arm in ("real", GENERATED_ARM, RIDGE_ARM)]
+        cells += [
+            _percent(about["false_alarms_by_arm"][arm]) if arm in about["false_alarms_by_arm"] else "-"
+            for arm in ("real", GENERATED_ARM, RIDGE_ARM)
+        ]
         rows.append(f"| {name} | {' | '.join(cells)} | {'told apart' if about['told_apart'] else ''} |")
     num_windows = [about["num_train_windows"] for about in found["channels"].values()]
     return "\n".join(rows) + (
@@ -154,11 +157,16 @@ def lines(found: dict[str, Any]) -> list[str]:
 
     said = []
     for name, about in found["channels"].items():
-        error = about["nrmse"]
+        error, alarms = about["nrmse"], about["false_alarms_by_arm"]
         said.append(
             f"{name:6} NRMSE {error['enhanced']:.2f} (coarse {error['coarse']:.2f}, ridge {error['ridge, own clock']:.2f}); false alarms trained on generated telemetry "
-            f"{about['false_alarms_by_arm'][GENERATED_ARM]:.1%}, on real {about['false_alarms_by_arm']['real']:.1%}{'; told apart' if about['told_apart'] else ''}"
+            f"{alarms.get(GENERATED_ARM, float('nan')):.1%}, on real {alarms['real']:.1%}{'; told apart' if about['told_apart'] else ''}"
         )
+    said += [
+        f"{name:6} left out for one seed or more: {reason}"
+        for name, about in found["channels"].items()
+        for reason in about.get("dropped", ())
+    ]
     for name, about in (found["arms"] | found["controls"]).items():
         matched = ", ".join(f"{each['mean']:.0%} at {each['rate']:.0%}" for each in about["matched"])
         said.append(f"{name:26} false alarms {about['false_alarms']['mean']:6.1%}; sequences found {matched} false alarms")

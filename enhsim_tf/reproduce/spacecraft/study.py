@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.enhanced_simulator.checks import check_finite
 from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.reproduce.settings import Settings
@@ -64,6 +66,7 @@ class ChannelStudy:
     def __init__(self, channel: LabelledChannel, settings: Settings, stages: Stages, verbose: int = 0):
         self.channel, self.settings, self.stages, self.verbose = channel, settings, stages, verbose
         self.name, self.seed = channel.labels.channel, settings.seed
+        self.dropped: dict[str, str] = {}  # arms that could not be made for this channel, with the reasons
 
     @functools.cached_property
     def _data(self) -> tuple:
@@ -112,7 +115,7 @@ class ChannelStudy:
         told = self.stages.progress.loop("noise GAN, iteration", chosen.num_iterations)
         gan.fit(self.residuals, chosen.num_iterations, verbose=bool(self.verbose), on_iteration=told)
         seeds = {"training": self.seed + 1, "held_out": self.seed + 2}
-        save_arrays(folder, {name: gan.generate(chosen.num_arm_windows, seed) for name, seed in seeds.items()})
+        save_arrays(folder, {name: check_finite(gan.generate(chosen.num_arm_windows, seed)) for name, seed in seeds.items()})
 
     @functools.cached_property
     def residuals(self) -> np.ndarray:
@@ -125,7 +128,11 @@ class ChannelStudy:
         """Every table of `TABLES` by name."""
         import pandas as pd
 
-        _ = self.gan_noise
+        _ = self.simulator  # a channel without a simulator is left out
+        try:
+            _ = self.gan_noise
+        except InputError as error:  # the channel keeps its other arms
+            self.dropped["enhanced + GAN"] = str(error)
         after = (f"fit {self.name}", f"GAN {self.name}")
         depends = (*self._data, self.settings.labelled, self.seed)
         folder = self.stages.run(f"study {self.name}", self._make, ("reproduce.spacecraft.study",), depends, after=after)
@@ -134,11 +141,19 @@ class ChannelStudy:
     def _make(self, folder: Path) -> None:
         import pandas as pd
 
+        if getattr(self.simulator.coarse, "is_constant", False):
+            raise InputError(
+                f"Expected a periodic channel, because the study compares enhancers of square waves. Received: {self.name}, whose coarse simulator is "
+                "a constant level. Use another channel."
+            )
         judge = Judge(self.channel, self.simulator.window, self._period, self.settings.labelled.false_alarm_rate)
         real, starts = self.real_windows
         training, held_out = self.arms(training=True), self.arms(training=False)
-        told = self.stages.progress.loop("arm", len(ARMS))
-        for number, arm in enumerate(ARMS):
+        for arm, reason in self.dropped.items():
+            self.stages.tell(f"  {arm:26} left out: {reason}")
+        kept = [arm for arm in ARMS if arm not in self.dropped]
+        told = self.stages.progress.loop("arm", len(kept))
+        for number, arm in enumerate(kept):
             detectors = DETECTORS | (CONTROLS if arm == "real" else {})
             for done, (name, make) in enumerate(detectors.items(), 1):
                 score = make(self.seed).fit(training[arm]).score
@@ -150,8 +165,9 @@ class ChannelStudy:
                 told(number + done / len(detectors))
             alarms = judge.share_of_alarms(arm).values()
             self.stages.tell(f"  {arm:26} false alarms {', '.join(f'{rate:.0%}' for rate in alarms)}")
-        classify = _classifier(training[GENERATED_ARM], self.degraded(self.seed + 3), self.seed)
-        judge.add(DEGRADED_ARM, "boosted trees", classify(judge.windows), classify(held_out[GENERATED_ARM]), classify(real))
+        if GENERATED_ARM in kept:
+            classify = _classifier(training[GENERATED_ARM], self.degraded(self.seed + 3), self.seed)
+            judge.add(DEGRADED_ARM, "boosted trees", classify(judge.windows), classify(held_out[GENERATED_ARM]), classify(real))
         judge.rank("real", "oracle", judge.labels.astype(float))
         for name, found in (judge.rows | self._descriptions(judge)).items():
             pd.DataFrame(found).assign(channel=self.name, seed=self.seed).to_parquet(folder / f"{name}.parquet")
@@ -160,6 +176,7 @@ class ChannelStudy:
         labels, simulator = self.channel.labels, self.simulator
         stride = int(judge.begins[1] - judge.begins[0]) if len(judge.begins) > 1 else judge.window
         record = {"samples": len(self.channel.test), "train_samples": len(self.channel.train), "penalty": self.no_network.ridge.penalty}
+        record |= {"dropped": "; ".join(f"{arm}: {reason}" for arm, reason in self.dropped.items())}
         return {
             "channels": [record | {"window": judge.window, "stride": stride, "period": self._period}],
             "sequences": [
@@ -181,15 +198,15 @@ class ChannelStudy:
         """Tuned ridge regression and its residual windows, from the same train part."""
         return RidgeSimulator.fit(self.channel.train, self.simulator.coarse, self.simulator.window, self.settings.labelled.num_windows)
 
-    @functools.cached_property
-    def noises(self) -> dict[str, Any]:
-        """Models of the residual noise of the train part, by name, except the paper's GAN."""
+    @property
+    def noises(self) -> dict[str, Callable[[], Any]]:
+        """Functions that return the models of the residual noise of the train part, by name, except the paper's GAN."""
         window, chosen = self.simulator.window, self.settings.labelled
         return {
-            "Gaussian": GaussianNoise.fit(self.residuals),
-            "AR": GaussianAutoregression.fit(self.residuals, min(chosen.max_order, window - 1)),
-            "bootstrap": BlockBootstrap.fit(self.residuals, min(chosen.block, window)),
-            "convolutional": self.simulator.noise,
+            "Gaussian": lambda: GaussianNoise.fit(self.residuals),
+            "AR": lambda: GaussianAutoregression.fit(self.residuals, min(chosen.max_order, window - 1)),
+            "bootstrap": lambda: BlockBootstrap.fit(self.residuals, min(chosen.block, window)),
+            "convolutional": lambda: self.simulator.noise,
         }
 
     @functools.cached_property
@@ -205,15 +222,27 @@ class ChannelStudy:
         Args:
             training: Whether detectors are trained on these windows. If not, they set thresholds, and `real` is missing, because the
                 thresholds of that arm are cross-fitted.
+
+        An arm that cannot be made, because its noise diverged or cannot be fitted, is missing, and `dropped` says why.
         """
         number, simulator = self.settings.labelled.num_arm_windows, self.simulator
         seed = self.seed + (1 if training else 2)
         clean = simulator.generate_clean(number, seed=seed)
-        arms = {"coarse": simulator.generate_coarse(number, seed=seed), "enhanced": clean}
-        arms["enhanced + GAN"] = clean + self.gan_noise["training" if training else "held_out"]
-        arms |= {f"enhanced + {name}": clean + noise.generate(number, seed) for name, noise in self.noises.items()}
-        arms[RIDGE_ARM] = self.no_network.generate(number, seed)
-        return arms | ({"real": self.real_windows[0]} if training else {})
+        make: dict[str, Callable[[], np.ndarray]] = {
+            "coarse": lambda: simulator.generate_coarse(number, seed=seed),
+            "enhanced": lambda: clean,
+            "enhanced + GAN": lambda: clean + self.gan_noise["training" if training else "held_out"],
+        }
+        make |= {f"enhanced + {name}": lambda fit=fit: clean + fit().generate(number, seed) for name, fit in self.noises.items()}
+        make[RIDGE_ARM] = lambda: self.no_network.generate(number, seed)
+        arms = {"real": self.real_windows[0]} if training else {}
+        for arm, each in make.items():
+            if arm not in self.dropped:
+                try:
+                    arms[arm] = check_finite(each())
+                except InputError as error:
+                    self.dropped[arm] = str(error)
+        return arms
 
     def degraded(self, seed: int) -> np.ndarray:
         """Windows of every degraded mode at every severity."""

@@ -31,7 +31,9 @@ _CHOICES = {
     "on_bad_values": ("refuse", "drop"),
     "same_time": ("mean", "first", "last", "refuse"),
     "other_rates": ("resample", "leave out"),
+    "fill": ("linear", "hold"),
 }
+_MAX_FILL = {"linear": 5, "hold": 1_000_000}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +53,10 @@ class Cleaning:
         same_time: Treatment of different values at the same time: take their "mean", the "first" or the "last", or "refuse".
         max_jitter: Largest distance of a time from the regular grid, in intervals, at most 0.5. The series is split where the
             distance is larger.
-        max_fill: Longest gap that is filled by linear interpolation, in samples. The series is split at longer gaps.
+        max_fill: Longest gap that is filled, in samples. The series is split at longer gaps. None: 5, or 1,000,000 with
+            `fill="hold"`.
+        fill: How gaps are filled: "linear", by straight lines, or "hold", with the last value before the gap, for telemetry that is
+            sent only when its value changes. With "hold", the last of several rows in an interval is used, not their mean.
         other_rates: Treatment of stretches with another sampling rate: "resample" or "leave out".
         min_part: Shortest part that is kept, in samples.
 
@@ -68,7 +73,8 @@ class Cleaning:
     decimal: str | None = None
     same_time: str = "mean"
     max_jitter: float = 0.25
-    max_fill: int = 5
+    max_fill: int | None = None
+    fill: str = "linear"
     other_rates: str = "resample"
     min_part: int = 2
 
@@ -78,12 +84,17 @@ class Cleaning:
                 raise InputError(f"Expected {name}, one of: {', '.join(choices)}. Received: {name}={getattr(self, name)!r}.")
         if self.interval_s is not None and not 1e-9 <= self.interval_s <= 1e9:
             raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
-        if not (0 <= self.max_jitter <= 0.5 and self.max_fill >= 0 and self.min_part >= 1):
+        if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
             raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
         if self.time_unit is not None and self.time_unit not in UNITS_NS:
             raise InputError(f"Expected time_unit, one of: {', '.join(UNITS_NS)}. Received: time_unit={self.time_unit!r}.")
         if self.decimal not in (None, ".", ","):
             raise InputError(f"Expected decimal, '.' or ','. Received: decimal={self.decimal!r}.")
+
+    @property
+    def longest_gap(self) -> int:
+        """Longest gap that is filled, in samples."""
+        return _MAX_FILL[self.fill] if self.max_fill is None else self.max_fill
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,6 +131,7 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         InputError: If the input is not a series of numbers, or has no regularly sampled part.
     """
     options = options or Cleaning()
+    holds, max_fill = options.fill == "hold", options.longest_gap
     is_series = isinstance(series, pd.Series)
     name = "telemetry" if not is_series or series.name is None else str(series.name)
     about = series.attrs if is_series else {}
@@ -151,17 +163,18 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         if regular_step_fraction(rows.times, interval) < _MIN_REGULAR_FRACTION:
             raise InputError(
                 f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
-                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. Give interval_s to average over."
+                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. Give interval_s, and fill='hold' for telemetry that is sent only when it changes."
             )
-        rows = resample_to_common_interval(rows, interval, log, options.other_rates == "resample", options.max_fill)
+        if not holds:  # a long step of telemetry that is held is no slower rate
+            rows = resample_to_common_interval(rows, interval, log, options.other_rates == "resample", max_fill)
     else:
         raise InputError(f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s.")
-    if options.interval_s is not None:
-        segments = find_binned_segments(rows.times, interval, options.max_fill + 1)
+    if options.interval_s is not None or holds:
+        segments = find_binned_segments(rows.times, interval, max_fill + 1)
     else:
-        segments = find_regular_segments(rows.times, interval, options.max_jitter, options.max_fill + 1)
-    same_place = "mean" if options.interval_s is not None else options.same_time
-    parts, used = build_parts(rows, segments, interval, log, name, same_place, options.max_fill, options.min_part)
+        segments = find_regular_segments(rows.times, interval, options.max_jitter, max_fill + 1)
+    same_place = "last" if holds else "mean" if options.interval_s is not None else options.same_time
+    parts, used = build_parts(rows, segments, interval, log, name, same_place, max_fill, options.min_part, holds)
     describe_values(parts, log)
 
     first = parts[0].begin if has_time else -base

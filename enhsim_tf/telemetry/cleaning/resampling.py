@@ -189,9 +189,17 @@ def _resample_segment(rows: Rows, interval: float, segment: OtherRateSegment, fr
 
 
 def build_parts(
-    rows: Rows, segments: Sequence[Segment], interval: float, log: CleaningLog, name: str, same_place: str, max_fill: int, min_part: int
+    rows: Rows,
+    segments: Sequence[Segment],
+    interval: float,
+    log: CleaningLog,
+    name: str,
+    same_place: str,
+    max_fill: int,
+    min_part: int,
+    hold: bool = False,
 ) -> tuple[list[Part], int]:
-    """Builds regular parts and fills their short gaps by linear interpolation.
+    """Builds regular parts and fills their short gaps.
 
     Args:
         rows: The rows.
@@ -202,6 +210,7 @@ def build_parts(
         same_place: Which of several rows at one grid point is kept: mean, first, last or refuse.
         max_fill: Longest gap inside a segment, in samples.
         min_part: Shortest part that is kept, in samples.
+        hold: Whether gaps are filled with the value before them, and not by linear interpolation.
 
     Returns:
         The parts, and the number of source rows that their samples represent.
@@ -226,7 +235,8 @@ def build_parts(
         merged.append(left)
         places, samples = np.unique(segment.places), np.arange(length)
         previous = np.searchsorted(places, samples, "right") - 1
-        parts.append(Part(segment.begin, np.interp(samples, places, inside.values), inside.source_row[previous]))
+        values = inside.values[previous] if hold else np.interp(samples, places, inside.values)
+        parts.append(Part(segment.begin, values, inside.source_row[previous]))
         used += int(inside.from_source.sum())
         gaps.append(inside.source_row[:-1][np.diff(places) > 1])
         num_filled += length - len(places)
@@ -246,7 +256,8 @@ def build_parts(
         numbers = np.concatenate([*found, rows.source_row[:0]])
         log.add(kind, numbers, text, rows_left_out=len(numbers))
     begins = np.concatenate(gaps)
-    text = f"gaps of up to {max_fill} samples, filled by straight lines with {num_filled:,} samples in total: {{count}}"
+    how = "filled with the value before them," if hold else "filled by straight lines with"
+    text = f"gaps of up to {max_fill} samples, {how} {num_filled:,} samples in total: {{count}}"
     log.add("gaps filled", begins, text, samples_filled=num_filled)
     log.set_samples_filled("coarser stretches", num_coarse)
     return parts, used

@@ -1,7 +1,9 @@
 """The study of labelled telemetry, run as a user does on a small data set whose channels are known."""
 
 import json
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -153,7 +155,49 @@ def test_every_arm_and_control_has_finds_chance_and_p_values(found):
 
 
 def test_a_channel_that_cannot_be_used_is_left_out_and_said_so(found):
-    assert list(found["skipped"]) == ["flat"] and "periodic" in found["skipped"]["flat"]
+    assert list(found["skipped"]) == ["flat"] and "constant" in found["skipped"]["flat"]
+
+
+def test_an_arm_that_cannot_be_made_is_left_out_and_the_channel_stays(data, cache, out, found, tmp_path, monkeypatch, capsys):
+    def diverge(self, folder):
+        raise InputError("Expected finite noise. Received: noise that diverged. Fit it again.")
+
+    monkeypatch.setattr(study.ChannelStudy, "_make_gan_noise", diverge)
+    monkeypatch.setattr(
+        study.GaussianAutoregression, "fit", lambda *_: SimpleNamespace(generate=lambda number, seed: np.full((number, 1), np.nan))
+    )
+    command = [
+        "--budget",
+        "smoke",
+        "--experiment",
+        "labelled",
+        "--data",
+        str(data),
+        "--out",
+        str(tmp_path),
+        "--cache",
+        str(tmp_path / "cache"),
+    ]
+    shutil.copytree(cache, tmp_path / "cache", ignore=lambda _, names: [name for name in names if name.startswith(("GAN", "study"))])
+    assert main([*command, "--channels", "W-1"]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "enhanced + GAN             left out: Expected finite noise" in said
+        and "enhanced + AR              left out: Expected a simul" in said
+    )
+    tables = KEPT.read(tmp_path / "labelled")
+    assert set(tables["thresholds"]["arm"]) == {*ARMS, DEGRADED_ARM} - {"enhanced + GAN", "enhanced + AR"}
+    less = json.loads((tmp_path / "labelled" / "findings.json").read_text())
+    assert "enhanced + GAN" not in less["arms"] and "noise that diverged" in less["channels"]["W-1"]["dropped"][0]
+    assert less["channels"]["W-1"]["false_alarms"]["coarse"] == found["channels"]["W-1"]["false_alarms"]["coarse"]
+    assert "| W-1 |" in table(less)
+    # next to channels and seeds that have every arm, shares are those of the rows that have it
+    whole = KEPT.read(out)
+    second = {name: pd.concat([tables[name], each.query("channel == 'W-2'")]).assign(seed=1) for name, each in whole.items()}
+    both = summarise({name: pd.concat([each, second[name]], ignore_index=True) for name, each in whole.items()})
+    for one, other in zip(both["arms"]["enhanced + GAN"]["matched"], found["arms"]["enhanced + GAN"]["matched"], strict=True):
+        assert (one["mean"], one["chance"]) == pytest.approx((other["mean"], other["chance"]))
+    assert both["channels"]["W-1"]["dropped"] == less["channels"]["W-1"]["dropped"] and "dropped" not in both["channels"]["W-2"]
 
 
 def test_findings_are_those_of_the_tables(out, found):
