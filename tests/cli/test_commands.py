@@ -332,7 +332,7 @@ GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
 INJECT = ["inject", "WORLD/one.csv", "--out", "x.csv"]
 SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
 WRONG = {
-    "no command": ([], "{fit,generate,verify,score,inject}"),
+    "no command": ([], "{fit,generate,verify,score,update,inject}"),
     "unknown command": (["train"], "'train'"),
     "fit without a source": (["fit", "--out", "models"], "SOURCE"),
     "fit without a place": (["fit", "WORLD/one.csv"], "--out"),
