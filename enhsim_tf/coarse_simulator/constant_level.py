@@ -14,7 +14,7 @@ class ConstantLevel(SquareWaveSimulator):
     """A constant level, in the form of a square wave whose two levels are equal.
 
     The degraded modes `drift` and `dropout` change it, because they act on the sensor. The modes of a mechanism do not, because
-    nothing moves.
+    nothing moves; but in a series, telemetry that is stuck no longer follows the levels of the record.
 
     Args:
         level: The level, in the unit of the telemetry.

@@ -108,7 +108,7 @@ def choose_coarse(
     rare = f" The value changes only {steps} times in the record." if steps < max(_LEAST_STEPS, len(longest) // 200) else ""
     said = (
         f"coarse simulator: none, only a constant level, because {about_wave}, and {about_commands}. The simulator knows no shape and no times: "
-        f"it generates noise around levels of the record, and only the degraded modes drift and dropout change it.{rare}"
+        f"it generates noise around levels of the record. Of the degraded modes, only drift and dropout change it, and in a series stuck.{rare}"
     )
     level = ConstantLevel(values.mean(), values.std(), 2 * fitting * longest.interval_s)
     return CoarseChoice(LEVEL, fitting, said, level)
