@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.__main__ import main
-from enhsim_tf.coarse_simulator.commands import CommandTraces
+from enhsim_tf.coarse_simulator.commands import HELD, CommandTraces
 from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
@@ -110,6 +110,19 @@ def test_commands_are_used_if_they_explain_more_than_a_wave():
     # a wave that explains more than the commands
     wave = choose_coarse([telemetry(np.sin(2 * np.pi * T[:2_600] / 90))], None, commands)
     assert wave.kind == SQUARE_WAVES
+
+
+def test_commands_after_which_the_telemetry_jumps_become_states():
+    commands = commands_of(1_800, number=54)
+    values = switched(commands)
+    found = CommandTraces.fit(values, commands)
+    assert {(1, HELD), (2, HELD)} <= set(found.chosen) and found.columns[0] == "command 1, until another"
+    held = CommandTraces([(1, HELD), (2, HELD)])
+    np.testing.assert_array_equal(held.traces(commands)[:, 0], values)  # on, until off
+    first = np.flatnonzero(commands[:, :2].any(axis=1))[0]
+    assert not held.traces(commands)[:first].any()
+    choice = choose_coarse([telemetry(values + noise(1_800))], None, commands)
+    assert choice.kind == COMMANDS and "explain 9" in choice.said
 
 
 def test_a_trace_is_an_exponential_decay_after_each_command():
