@@ -228,7 +228,7 @@ def warning_of(auc: float | None, real_auc: float | None) -> str:
     if auc is None or auc <= noise_choice.TOLD_APART:
         return ""
     return (
-        f"; WARNING: a classifier tells its noise from the telemetry's (AUC {auc:.2f}; {real_auc:.2f} between two parts of the telemetry's)"
+        f"WARNING: a classifier tells its noise from the telemetry's (AUC {auc:.2f}; {real_auc:.2f} between two parts of the telemetry's). "
     )
 
 

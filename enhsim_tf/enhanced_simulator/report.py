@@ -207,8 +207,8 @@ class ChannelReport:
         period = f", period {self.period_s:.6g} {self.time_unit}" if np.isfinite(self.period_s) else ""
         head = f"windows of {self.window} samples{period}; measured on {where}"
         warning = warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
-        first = [f"{printable(self.channel)}: {self.coarse}"] if self.coarse else []
-        return [*first, f"{printable(self.channel)}: {head}{warning}", *self.verdict]
+        first, *rest = [*([self.coarse] if self.coarse else []), head]
+        return [f"{printable(self.channel)}: {warning}{first}", *(f"{printable(self.channel)}: {line}" for line in rest), *self.verdict]
 
 
 def _counted(number: int, noun: str) -> str:

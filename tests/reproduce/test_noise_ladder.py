@@ -1,5 +1,8 @@
 """The experiment on noise: its lists, its choice and its limits."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,7 +12,7 @@ from enhsim_tf.noise.ladder import RUNGS
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.noise_gallery import GALLERY
 from enhsim_tf.reproduce.noise_ladder import findings
-from enhsim_tf.reproduce.noise_ladder.page import fill_page
+from enhsim_tf.reproduce.noise_ladder.page import families, fill_page, limits, unrealistic
 
 
 def test_the_lists_of_the_command_are_those_of_the_gallery_and_the_ladder():
@@ -91,8 +94,8 @@ def test_the_summary_counts_what_a_table_says():
 def test_the_page_says_what_the_findings_say(tmp_path):
     measured = {"alarms": 0.031, "excess": 0.021, "recall_difference": 0.01, "realism_within": 0.5, "beyond": {"rank": 4.2, "energy": 7.1}}
     about = {"half": "unseen", "rungs": {"real": measured | {"alarms": 0.01}, "autoregressive network": measured}, "chosen": ["gaussian"]}
-    families = {"bursts": about | {"regret": 0.0, "best": "autoregressive network", "seeds": [7]}}
-    found = {"families": families, "limits": findings._limits(families), "seeds": [7], "budget": "full"}
+    kinds = {"bursts": about | {"regret": 0.0, "best": "autoregressive network", "seeds": [7]}}
+    found = {"families": kinds, "limits": findings._limits(kinds), "seeds": [7], "budget": "full"}
     page = tmp_path / "noise.md"
     names = ("families", "limits", "unrealistic", "learning curve")
     page.write_text("".join(f"<!-- {name}: generated -->\nold\n<!-- end of {name} -->\n" for name in names), encoding="utf-8")
@@ -102,3 +105,13 @@ def test_the_page_says_what_the_findings_say(tmp_path):
     assert "at most 3 points: 1 of 1 families; the largest excess is 2.1 points (bursts)" in text
     assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
     assert text.count("\nold\n") == 1  # the part of the other experiment
+
+
+def test_the_published_findings_and_the_page_come_from_the_published_tables(near):
+    root = Path(__file__).parents[2]
+    kept = json.loads((root / "figures" / "noise" / "findings.json").read_text(encoding="utf-8"))
+    again = findings.summarise(findings.KEPT.read(root / "figures" / "noise"))
+    assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again}) and kept["budget"] == "full"
+    text = (root / "docs" / "noise.md").read_text(encoding="utf-8")
+    for part in (families(kept), limits(kept), unrealistic(kept)):
+        assert part in text

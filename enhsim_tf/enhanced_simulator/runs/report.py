@@ -102,10 +102,11 @@ class RunReport:
 
     def lines(self) -> list[str]:
         """Returns the report as lines of text: a heading, the notes on the pairing, and the verdict."""
-        head = f"{self.channel}: windows of {self.window} samples; inputs: {', '.join(self.columns)}"
-        head += warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
-        first = [f"{self.channel}: {self.coarse}"] if self.coarse else []
-        return [printable(line) for line in (*first, head, *self.notes, *self.verdict)]
+        head = f"windows of {self.window} samples; inputs: {', '.join(self.columns)}"
+        warning = warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
+        first, *rest = [*([self.coarse] if self.coarse else []), head]
+        heads = [f"{self.channel}: {warning}{first}", *(f"{self.channel}: {line}" for line in rest)]
+        return [printable(line) for line in (*heads, *self.notes, *self.verdict)]
 
 
 def compare_noise(parts: Sequence[np.ndarray], generated: np.ndarray) -> dict[str, dict[str, float]]:

@@ -55,7 +55,13 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
                 "recall": float(rows["recall"].mean()),
                 "recall_at_real_rate": float(rows["recall_at_real_rate"].mean()),
                 "realism_within": float(np.mean(ratios <= MAX_REALISM_RATIO)),
-                "beyond": {name: float(ratio) for name, ratio in by_measure.items() if not ratio <= MAX_REALISM_RATIO},
+                "beyond": {
+                    name: float(ratio)
+                    if np.isfinite(ratio)
+                    else None  # None: the noise has no such measure, for example because it is zero
+                    for name, ratio in by_measure.items()
+                    if not ratio <= MAX_REALISM_RATIO
+                },
             }
         for values in rungs.values():
             values["excess"] = values["alarms"] - rungs[REAL]["alarms"]

@@ -82,7 +82,7 @@ def unrealistic(found: Findings) -> str:
     for family, about in found["families"].items():
         if rung not in about["rungs"]:
             continue
-        beyond = about["rungs"][rung].get("beyond", {})
+        beyond = {name: ratio for name, ratio in about["rungs"][rung]["beyond"].items() if ratio is not None}
         worst = sorted(beyond, key=beyond.get, reverse=True)[:_NAMED]
         if worst:
             named = ", ".join(f"{name} ({beyond[name]:.1f} times its floor)" for name in worst)
