@@ -508,7 +508,8 @@ class EnhancedSimulator:
         numbers = np.array([self.interval_s, self.offset, self.scale, *([] if self.quantisation is None else [self.quantisation.step])])
         parts = {
             "enhancer": is_finite(self.enhancer.get_weights()),
-            "noise": noise.is_finite,
+            **{name: is_finite(network.get_weights()) for name, network in noise.networks.items()},
+            "noise": bool(noise.networks) or noise.is_finite,
             "units or levels": is_finite([numbers, *([] if self.levels is None else [self.levels])]),
         }
         bad = [name for name, is_good in parts.items() if not is_good]

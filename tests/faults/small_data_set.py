@@ -30,10 +30,13 @@ class Plain:
 
     def __init__(self, noise_sd=0.1, levels=None):
         self.coarse, self.noise, self.levels, self.interval_s = COARSE, GaussianNoise(noise_sd, WINDOW), levels, INTERVAL_S
-        self.noise_sd, self.scale = noise_sd, 1.0
+        self.noise_sd, self.scale, self.quantisation = noise_sd, 1.0, None
 
     def enhance(self, coarse):
         return coarse
+
+    def draw_noise(self, clean, rng):
+        return self.noise.generate(len(clean), rng)
 
 
 class PlainMaker(ShardMaker):
