@@ -67,7 +67,9 @@ last = {key: float(values[-1]) for key, values in history.items()}
 both = (last["accuracy_real"] + last["accuracy_generated"]) / 2
 mean_loss = (last["loss_real"] + last["loss_generated"]) / 2
 half = slice(len(history["iteration"]) // 2, None)
-together = np.corrcoef(history["accuracy_real"][half], history["accuracy_generated"][half])[0, 1]
+of_real, of_generated = (history[f"accuracy_{kind}"][half] for kind in ("real", "generated"))
+varies = of_real.std() > 0 and of_generated.std() > 0  # at smoke budget they may not
+together = np.corrcoef(of_real, of_generated)[0, 1] if varies else 0.0
 say(
     f"At the end, over both kinds: accuracy **{both:.2f}**, loss **{mean_loss:.2f}** (ln 2 = {np.log(2):.2f}). Correlation of the two "
     f"accuracies in the second half: **{together:.2f}**."
