@@ -1,106 +1,206 @@
 # %% [markdown]
-# # Figure 2: source and target
+# # Source and target (Figure 2)
+#
+# **Question:** what does a crude simulator know about the signal, and what does it not know?
+#
+# - **After this lesson** you can write the paper's coarse simulator, compute its error in closed form, and say how many different
+#   windows it can ever produce.
+# - **You should know** sines, mean and variance.
+# - **Running time:** the first cell prints it.
+# - **Terms:** [coarse simulator](../docs/glossary.md#coarse-simulator), [window](../docs/glossary.md#window);
+#   [NRMSE](../docs/glossary.md#nrmse): $\sqrt{\mathrm{mean}(\hat x-x)^2}\,/\,\mathrm{sd}(x)$ for an estimate $\hat x$ of a signal $x$.
 #
 # **What the paper says** (sections 1, 2 and 2.1): a coarse simulation is enough to start from, since "a square wave can be used for
 # nearly any periodic waveform". The signals are sines with periods of 8 and 2 minutes. Figure 2 shows the coarse source and the target
 # that the enhancer has to make of it.
 
 # %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
 import numpy as np
 
-from enhsim_tf.reproduce.notebook import claim, open_experiment, show
+from enhsim_tf.common.plot_style import COARSE, DASHED, REAL
+from enhsim_tf.reproduce.lesson import check_answer, say
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment()
+experiment = open_experiment(lesson="02")
 claim("C1")
 
 # %% [markdown]
-# ## How it is built
+# ## The simulator and the truth
 #
-# The simulator is a sum of square waves, the truth a sum of sines of the same periods and amplitudes:
+# The truth is a sum of two sines: the orbit (480 s) and the rotation (120 s) of a satellite. The simulator knows both periods and draws
+# a square wave for each: high where the sine is positive, low where it is negative.
+
+# %%
+periods, amplitudes = (480.0, 120.0), (0.5, 0.25)
+
+
+def true_signal(time_s):
+    return sum(A * np.sin(2 * np.pi * time_s / P) for P, A in zip(periods, amplitudes))
+
+
+def square_waves(time_s):
+    return sum(np.where(time_s % P < P / 2, A, -A) for P, A in zip(periods, amplitudes))
+
+
+time_s = np.arange(10 * 480.0)  # ten orbits, one sample a second
+coarse, truth = square_waves(time_s), true_signal(time_s)
+
+# %% [markdown]
+# The package has the same simulator. Both must give the same values, to the bit:
 
 # %%
 from enhsim_tf import SquareWave, SquareWaveSimulator
-from enhsim_tf.reproduce.paper.signals import sines
 
-orbit = SquareWave(period_s=480, low=-0.5, high=0.5)
-rotation = SquareWave(period_s=120, low=-0.25, high=0.25)
-simulator = SquareWaveSimulator([orbit, rotation])
+simulator = SquareWaveSimulator([SquareWave(P, low=-A, high=A) for P, A in zip(periods, amplitudes)])
+np.testing.assert_array_equal(simulator(time_s), coarse)
 assert simulator.get_config() == experiment.data.channels[0].coarse.get_config()
 
-time_s = np.arange(10 * 480.0)  # ten orbits
-coarse, truth = simulator(time_s), sines(time_s, periods_s=(480, 120), amplitudes=(0.5, 0.25))
-
 # %% [markdown]
-# Training pairs are cut from the series at random offsets, 500 samples each; the source is simulated for the same times:
+# Training pairs are windows of 500 samples, cut from the telemetry at random times. The source is simulated for exactly the same times:
+# without this alignment, a network would learn the mean over all shifts, which is flat.
 
 # %%
 pairs = show(experiment, "fig02_source_target")
 
 # %% [markdown]
-# *What to see:* the source is right about *when* and wrong about *how*: it switches exactly where the sines cross zero, and is wrong in
-# between by an amount that can be computed.
+# *What to see:* the source is right about *when* and wrong about *how*. It switches exactly where a sine crosses zero, and is wrong in
+# between.
 
 # %%
-from enhsim_tf.realism.measures import nrmse
-
-for wave in simulator.waves:
-    between = time_s % (wave.period_s / 2) != 0  # at a crossing itself the sine has no sign
-    assert (wave(time_s)[between] * np.sin(2 * np.pi * time_s / wave.period_s)[between] > 0).all()
-error, closed_form = nrmse(coarse, truth), np.sqrt(3 - 8 / np.pi)
-print(f"error in standard deviations of the truth: {error:.4f}, in closed form {closed_form:.4f}")
-assert abs(error - closed_form) < 0.01
+for P, A in zip(periods, amplitudes):
+    wave, sine = np.where(time_s % P < P / 2, A, -A), np.sin(2 * np.pi * time_s / P)
+    between = time_s % (P / 2) != 0  # at a crossing itself the sine has no sign
+    assert (wave[between] * sine[between] > 0).all()
 
 # %% [markdown]
-# One more thing hides in the figure, and later matters more than any other. Both periods are whole numbers of samples, and the longer
-# is a multiple of the shorter, so the simulator repeats itself after 480 samples:
+# ## How wrong?
+#
+# Over half a period, a square wave of levels $\pm A$ differs from a sine of amplitude $A$ by $A(1-\sin x)$. The mean square of that is
+# $A^2\left(\tfrac32-\tfrac4\pi\right)$, and the variance of the sine is $A^2/2$. So the NRMSE is $\sqrt{3-8/\pi}$ for each wave, and
+# also for their sum if their errors are uncorrelated.
 
 # %%
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.realism import measures
 
-windows = cut_windows(simulator(np.arange(20_000.0)), np.arange(19_000), 500)
+
+def nrmse(estimate, truth):
+    return np.sqrt(np.mean((estimate - truth) ** 2)) / truth.std()
+
+
+error, closed_form = nrmse(coarse, truth), np.sqrt(3 - 8 / np.pi)
+np.testing.assert_allclose(error, measures.nrmse(coarse, truth), rtol=1e-9)
+say(
+    f"NRMSE of the simulator: **{error:.4f}**; in closed form **{closed_form:.4f}**. The errors of the two waves are only nearly "
+    f"uncorrelated, which explains the difference."
+)
+assert abs(error - closed_form) < 0.01
+
+# %%
+x = np.linspace(0, 1, 500)
+alt = "The mean square error of a square wave for a sine, by the height of the square wave"
+best_height = 2 / np.pi
+title = f"A square wave as high as the sine is not the best one; {best_height:.2f} of that height is best"
+heights = np.linspace(0, 1.2, 121)
+by_height = [np.sqrt(np.mean((h - np.sin(np.pi * x)) ** 2) * 2) for h in heights]
+with drawing(alt, 2, 2.1, title) as panels:
+    panels[0].plot(x, np.sin(np.pi * x), color=REAL, label="sine")
+    panels[0].plot(x, np.ones(500), color=COARSE, label="height 1")
+    panels[0].plot(
+        x, np.full(500, best_height), color=COARSE, linestyle=DASHED, label=f"height {best_height:.2f}"
+    )
+    panels[0].set(xlabel="time (half periods)", ylabel="value (amplitudes of the sine)", ylim=(0, 1.3))
+    panels[0].legend(frameon=False, ncols=3, loc="upper center")
+    panels[1].plot(heights, by_height, color=COARSE)
+    panels[1].set(xlabel="height of the square wave (amplitudes)", ylabel="NRMSE", ylim=(0, None))
+
+# %% [markdown]
+# *What to see:* the error has its minimum where the height is the mean of the sine over half a period, $2/\pi$. The enhancer can rescale
+# its input as it likes, so the height hardly matters to it. What it reads is *when* the levels switch.
+
+# %%
+say(
+    f"Smallest error on the right: **{min(by_height):.3f}** at a height of {heights[np.argmin(by_height)]:.2f}."
+)
+assert abs(heights[np.argmin(by_height)] - 2 / np.pi) < 0.01
+
+# %% [markdown]
+# ## How many different windows are there?
+#
+# One more thing hides in the figure. Both periods are whole numbers of samples, and the longer is a multiple of the shorter, so
+# the simulator repeats itself after 480 samples:
+
+# %%
+windows = np.lib.stride_tricks.sliding_window_view(square_waves(np.arange(20_000.0)), 500)
 distinct = len(np.unique(windows, axis=0))
-print(f"{distinct} different windows among {len(windows):,}")
+say(f"**{distinct}** different windows among {len(windows):,}.")
 assert distinct == 480
 
 # %% [markdown]
 # However much telemetry is recorded, the enhancer only ever sees these inputs. "Held out" in this example means other noise and other
 # times, not other inputs. A real channel, whose period is no whole number of samples, is harder.
-
-# %% [markdown]
+#
 # ## Exercises
 #
-# 1. Derive the closed form above: the error of a square wave of levels $\pm A$ for a sine of amplitude $A$, in standard deviations of
-#    the sine.
-# 2. A square wave as high as the sine is not the best one. Which levels make the error smallest, and what is it then? Would it change
-#    what the enhancer can learn?
+# **1.** What is the smallest NRMSE that a square wave of the right period can have for a sine? Give a formula or a number with three
+# decimals.
 
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
+# %%
+smallest_nrmse = None  # your answer
+
+# %%
+check_answer(
+    smallest_nrmse,
+    lambda answer: abs(answer - np.sqrt(2 * np.var(np.sin(np.pi * np.linspace(0, 1, 100_001))))) < 1e-3,
+    "At the best height, the mean square error over half a period is the variance of the sine there.",
+)
+
+# %% [markdown]
+# **2.** Another satellite rotates in 100 s instead of 120 s, on the same orbit of 480 s. How many different windows does its
+# simulator have? And with a rotation of 120.5 s? Complete the function.
+
+
+# %%
+def num_distinct(orbit_s, rotation_s): ...  # your code: an argument in whole numbers, or a count as above
+
+
+# %%
+def counted(orbit_s, rotation_s):
+    waves = SquareWaveSimulator(
+        [SquareWave(orbit_s, low=-0.5, high=0.5), SquareWave(rotation_s, low=-0.25, high=0.25)]
+    )
+    series = waves(np.arange(60_000.0))
+    return len(np.unique(np.lib.stride_tricks.sliding_window_view((series * 4).astype(np.int8), 500), axis=0))
+
+
+check_answer(
+    num_distinct(480, 100),
+    lambda number: number == counted(480, 100),
+    "After how many samples do both waves start again together?",
+)
+
+# %% [markdown]
 # ## Solution
 #
-# <details><summary>1. The closed form</summary>
+# <details><summary>1. The best square wave</summary>
 #
-# Over half a period the error is $A(1-\sin x)$, so its mean square is
-# $A^2\,\left(1-2\cdot\tfrac{2}{\pi}+\tfrac12\right)=A^2\left(\tfrac32-\tfrac4\pi\right)$. The variance of the sine is $A^2/2$. The
-# ratio is $3-8/\pi$, and the error its root. The two waves have the same ratio, and their errors are nearly uncorrelated over an orbit,
-# so the sum has it too, up to the small difference printed above.
+# ```python
+# smallest_nrmse = np.sqrt(1 - 8 / np.pi**2)
+# ```
+#
+# The best constant for half a period is the mean of the sine there, $2A/\pi$. Then the mean square error is
+# $A^2\left(\tfrac12-\tfrac4{\pi^2}\right)$, which in units of the variance $A^2/2$ is $1-8/\pi^2$.
 #
 # </details>
 
 # %% [markdown]
-# <details><summary>2. The best levels</summary>
+# <details><summary>2. Different windows</summary>
 #
-# The best constant for half a period is the mean of the sine there, $2A/\pi$. Then the mean square error is
-# $A^2\left(\tfrac12-\tfrac4{\pi^2}\right)$, in units of the variance $1-8/\pi^2$. The cell below checks it. For the enhancer nothing
-# changes: the first Dense layer can scale its input as it likes. What the enhancer reads is *when* the levels switch.
+# ```python
+# def num_distinct(orbit_s, rotation_s):
+#     return int(np.lcm(orbit_s, rotation_s))
+# ```
+#
+# The least common multiple of 480 and 100 is 2,400. With 120.5 s, both waves meet again only after 115,680 samples, more than a
+# day. The inputs become many, and an enhancer can no longer learn each of them by heart.
 #
 # </details>
-
-# %%
-waves = [SquareWave(480, low=-1 / np.pi, high=1 / np.pi), SquareWave(120, low=-0.5 / np.pi, high=0.5 / np.pi)]
-best = nrmse(SquareWaveSimulator(waves)(time_s), truth)
-print(f"error with the best levels: {best:.4f}, in closed form {np.sqrt(1 - 8 / np.pi**2):.4f}")
-assert best < error and abs(best - np.sqrt(1 - 8 / np.pi**2)) < 0.01

@@ -1,123 +1,317 @@
 # %% [markdown]
-# # Figure 4: the enhanced simulation
+# # The enhanced simulation, and a matrix (Figure 4)
+#
+# **Question:** does a network of 13.7 million parameters do better than one matrix?
+#
+# - **After this lesson** you can compute the error of an enhancer (NRMSE), solve ridge regression in closed form, choose its penalty by
+#   cross-validation over time, and find out where an enhancer stops working.
+# - **You should know** the enhancer (notebook 03) and what a matrix inverse is.
+# - **Running time:** the first cell prints it.
+# - **Terms:** [NRMSE](../docs/glossary.md#nrmse), [ridge regression](../docs/glossary.md#ridge-regression),
+#   [nearest windows](../docs/glossary.md#nearest-windows),
+#   [degraded mode, severity, onset](../docs/glossary.md#degraded-mode-severity-onset); *roughness*: the standard deviation of the steps
+#   from sample to sample.
 #
 # **What the paper says** (section 2.2): after 40 epochs the network turns the quantised simulation into a smooth waveform, at hardly
 # any cost. And then it says what is wrong with the result: "The signal is too clean."
 
 # %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
 import numpy as np
 
-from enhsim_tf.common.plot_style import COARSE, ENHANCED, REAL
+from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
+from enhsim_tf.reproduce.lesson import check_answer, say, slider
 from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment()
+experiment = open_experiment(lesson="04")
 claim("C1", "C2", "C3")
 
 # %% [markdown]
-# ## How it is built
+# ## The error of an estimate
 #
-# `simulator.enhance` is one pass through network one. The error is measured on held-out windows against the true signal, which only an
-# example like this one knows.
+# The *normalised root-mean-square error* compares an estimate $\hat x$ with the true signal $x$ in units of the signal's own standard
+# deviation:
+#
+# $$\mathrm{NRMSE}=\frac{\sqrt{\mathrm{mean}(\hat x-x)^2}}{\mathrm{sd}(x)}$$
+#
+# 0 is perfect. A constant at the mean of the signal has an NRMSE of 1.
+
 
 # %%
-from enhsim_tf.realism.measures import nrmse, roughness
+def nrmse(estimate, truth):
+    return np.sqrt(np.mean((estimate.astype(float) - truth) ** 2)) / truth.std(dtype=float)
+
+
+from enhsim_tf.realism import measures
 
 held_out = experiment.data.windows("test", None)
-enhanced = experiment.simulator.enhance(held_out["coarse"])
-print("windows, samples:", enhanced.shape, f" error {nrmse(enhanced, held_out['truth']):.3f}")
+coarse, truth = held_out["coarse"], held_out["truth"].astype(float)
+enhanced = experiment.simulator.enhance(coarse)  # one pass through the network of notebook 03
+np.testing.assert_allclose(nrmse(enhanced, truth), measures.nrmse(enhanced, truth), rtol=1e-6)
+say(
+    f"NRMSE on {len(truth):,} held-out windows: coarse **{nrmse(coarse, truth):.3f}**, enhanced **{nrmse(enhanced, truth):.3f}**."
+)
 
 # %%
 arrays = show(experiment, "fig04_enhanced_simulation")
 
 # %% [markdown]
-# *What to see:* the error is a fraction of the simulator's own, but the enhanced signal is not smooth: it follows the true signal with
-# a small, rough error.
+# *What to see:* the error is a fraction of the simulator's own. But the enhanced signal is not as smooth as the truth: the steps from
+# sample to sample are larger.
+
 
 # %%
-signals = {"truth": held_out["truth"], "enhanced": enhanced, "telemetry": held_out["target"]}
-rough = {name: roughness(windows) for name, windows in signals.items()}
-print("standard deviation of the steps from sample to sample:")
-print({name: round(value, 3) for name, value in rough.items()})
+def roughness(windows):
+    return np.diff(windows.astype(float), axis=1).std()
 
-error = float(arrays["nrmse"])
-assert abs(error - nrmse(enhanced, held_out["truth"])) < 1e-3
-assert error < {"full": 0.15, "smoke": 1.0}[experiment.settings.budget]
+
+rough = {
+    "truth": roughness(truth),
+    "enhanced": roughness(enhanced),
+    "telemetry": roughness(held_out["target"]),
+}
+say("Roughness: " + ", ".join(f"{name} **{value:.3f}**" for name, value in rough.items()) + ".")
+assert nrmse(enhanced, truth) < {"full": 0.15, "smoke": 1.0}[experiment.settings.budget]
 assert rough["enhanced"] > 2 * rough["truth"]
 
 # %% [markdown]
-# This error is noise of the training targets that the network has memorised. Is so large a network needed at all? Ridge
-# regression is one matrix from 500 to 500 samples. With a penalty that is chosen by cross-validation on the same training windows, it is
-# nearer to the truth than the network, and so is the mean of the nearest training windows:
+# This rough error is noise of the training targets that the network has memorised (notebook 03).
+#
+# ## A matrix instead of a network
+#
+# *Ridge regression* maps a coarse window to an enhanced one by one matrix $W$ of 500 × 500 numbers. It minimises the squared error on the
+# training windows plus a penalty $\lambda$ on large weights, and has a closed form:
+#
+# $$W=\arg\min_W\lVert Y-XW\rVert^2+\lambda\lVert W\rVert^2=(X^\mathsf{T}X+\lambda I)^{-1}X^\mathsf{T}Y$$
+#
+# The rows of $X$ and $Y$ are the training windows, coarse and telemetry, less their mean window. $X$ is divided by one standard deviation,
+# so that $\lambda$ does not depend on its unit.
 
 # %%
-found = {key: float(value) for key, value in experiment.enhancement.items()}
-print({key: round(found[key], 3) for key in ("identity_nrmse", "ridge_nrmse", "nearest_nrmse", "nrmse")})
-print(f"held-out coarse windows that occur in training as they are: {found['test_windows_seen']:.0%}")
-if experiment.settings.budget == "full":
-    assert found["ridge_nrmse"] < found["nearest_nrmse"] < found["nrmse"]
+train = experiment.data.windows("train", experiment.settings.telemetry.num_windows, "training windows")
+inputs, targets, starts = train["coarse"].astype(float), train["target"].astype(float), train["start"]
+
+
+def fit_ridge(inputs, targets, penalty):
+    mean, target_mean = inputs.mean(axis=0), targets.mean(axis=0)
+    scale = np.sqrt(np.mean((inputs - mean) ** 2))
+    X, Y = (inputs - mean) / scale, targets - target_mean
+    W = np.linalg.solve(X.T @ X + penalty * np.eye(X.shape[1]), X.T @ Y)
+    return lambda windows: (windows - mean) / scale @ W + target_mean
+
 
 # %% [markdown]
-# The last line explains why training and held-out error agree so well: a periodic simulator has few different windows (notebook 02),
-# and the network has met nearly all of them.
+# How large should the penalty be? It must not be chosen on the test windows: that would be cheating. *Cross-validation* leaves out one
+# fifth of the training time, fits the rest, and measures the error on that fifth; and so on for each fifth. Windows that overlap the
+# fifth are left out of the fit, too, because they share samples with it.
+
+# %%
+penalties = np.logspace(-3, 6, 10)
+fifths = np.array_split(np.argsort(starts, kind="stable"), 5)
+squares = np.zeros(len(penalties))
+for fifth in fifths:
+    first, last = starts[fifth].min(), starts[fifth].max()
+    others = np.setdiff1d(np.arange(len(starts)), fifth)
+    apart = others[(starts[others] <= first - 500) | (starts[others] >= last + 500)]
+    for number, penalty in enumerate(penalties):
+        predicted = fit_ridge(inputs[apart], targets[apart], penalty)(inputs[fifth])
+        squares[number] += np.sum((predicted - targets[fifth]) ** 2)
+penalty = penalties[np.argmin(squares)]
+ridge = fit_ridge(inputs, targets, penalty)
+
+# %% [markdown]
+# The package solves the same equations by an eigendecomposition, once for all penalties. It must choose the same penalty, and predict the
+# same windows but for rounding in its 32-bit result:
+
+# %%
+from enhsim_tf.enhancer import ridge as packaged
+
+reference = packaged.fit_ridge(inputs, targets, starts, penalties=penalties)
+assert reference.penalty == penalty
+np.testing.assert_allclose(ridge(coarse), reference.predict(coarse), atol=1e-4)
+nearest = packaged.nearest_windows(
+    inputs, targets, coarse, packaged.choose_num_neighbours(inputs, targets, starts)
+)
+errors = {
+    "coarse simulator": nrmse(coarse, truth),
+    "network": nrmse(enhanced, truth),
+    "mean of the nearest training windows": nrmse(nearest, truth),
+    "ridge, one matrix": nrmse(ridge(coarse), truth),
+}
+
+# %%
+alt = (
+    "NRMSE on held-out windows of the coarse simulator, the network, the nearest windows and ridge regression"
+)
+title = f"One matrix has an error of {errors['ridge, one matrix']:.3f}, the network one of {errors['network']:.3f}"
+with drawing(alt, height=1.7, title=title) as panel:
+    colors = [COARSE, ENHANCED, QUIET, QUIET]
+    bars = panel.barh(list(errors), list(errors.values()), color=colors)
+    panel.bar_label(bars, [f"{error:.3f}" for error in errors.values()], padding=3)
+    panel.set(xlabel="NRMSE on held-out windows (standard deviations of the true signal)", xlim=(0, 0.75))
+    panel.invert_yaxis()
+
+# %% [markdown]
+# *What to see:* all three estimates are far better than the simulator, and the simplest comes closest to the truth. In this example,
+# the map from square waves to sines of the same phase is close to linear on the few windows that occur. So few that nearly all
+# held-out inputs occurred in training:
+
+# %%
+seen = {window.tobytes() for window in train["coarse"]}
+share = np.mean([window.tobytes() in seen for window in coarse])
+say(
+    f"**{share:.0%}** of the held-out coarse windows occur in training as they are. Chosen penalty: **{penalty:,.0f}**. "
+    f"*Held out* means here: other noise, not other inputs (notebook 02)."
+)
+if experiment.settings.budget == "full":
+    assert errors["ridge, one matrix"] < errors["mean of the nearest training windows"] < errors["network"]
+
+# %% [markdown]
+# ## The verdicts
 #
-# ## The verdict
+# The speed (C2) depends on the machine and on what else it does. Elsewhere in this book it comes from another run, and differs.
 
 # %%
 records = verdict(experiment, "C1", "C2", "C3")
 assert [record["id"] for record in records] == ["C1", "C2", "C3"]
 
 # %% [markdown]
-# ## Exercises
+# ## Where it stops working
 #
-# 1. Write the ridge regression yourself in three lines of NumPy and get below half of the coarse error. How does the error depend on the
-#    penalty?
-# 2. The paper hopes that the enhancer also serves in degraded modes (C9). Plot a window that gets stuck: coarse, enhanced, truth. In
-#    which modes does enhancing make the error larger, and why?
-
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
-# ## Solution
-
-# %%
-train = experiment.data.windows("train", 1_000, "exercise")
-source, target = train["coarse"].astype(float), train["target"]
-ridge_error = {}
-for penalty in (1.0, 300.0, 10_000.0):
-    matrix = np.linalg.solve(source.T @ source + penalty * np.eye(500), source.T @ target)
-    ridge_error[penalty] = nrmse(held_out["coarse"] @ matrix, held_out["truth"])
-    print(f"ridge regression, penalty {penalty:7,.0f}: {ridge_error[penalty]:.3f}")
-assert min(ridge_error.values()) == ridge_error[300.0] < found["identity_nrmse"] / 2
+# The paper hopes that the enhancer also serves for faults that nobody recorded (C9). Here the amplitude falls from sample 125 on, in the
+# simulator as in the truth. At a *severity* of 0.5, half of the amplitude is lost. The slider changes the severity.
 
 # %%
 from enhsim_tf import Degraded
 
-stuck, alt = Degraded("stuck", severity=0.5), "A window that gets stuck: coarse, enhanced and true"
-coarse = experiment.data.degraded_coarse(stuck)[:1]
-truth = experiment.data.degraded_truth(stuck, noisy=False)[0]
-with drawing(alt, height=2.0) as panel:
-    panel.plot(coarse[0], color=COARSE, label="coarse")
-    panel.plot(experiment.simulator.enhance(coarse)[0], color=ENHANCED, label="enhanced")
-    panel.plot(truth, color=REAL, linestyle="--", label="truth")
-    panel.set(xlabel="sample", ylabel="value")
-    panel.legend(frameon=False)
 
-# %%
-modes = experiment.degraded
-for mode, after, before in zip(modes["modes"], modes["nrmse"], modes["identity_nrmse"]):
-    print(f"{mode:14} coarse {before:.2f}   enhanced {after:.2f}   {'better' if after < before else 'worse'}")
+def draw(severity):
+    fault = Degraded("gain_loss", severity)
+    source, true = experiment.data.degraded_coarse(fault), experiment.data.degraded_truth(fault, noisy=False)
+    estimate = experiment.simulator.enhance(source)
+    title = f"Severity {severity}: NRMSE of the coarse signal {nrmse(source, true):.2f}, enhanced {nrmse(estimate, true):.2f}"
+    alt = f"A window that loses amplitude at severity {severity}: coarse, enhanced and true"
+    with drawing(alt, height=1.8, title=title) as panel:
+        panel.plot(source[0], color=COARSE, linewidth=0.8, label="coarse")
+        panel.plot(estimate[0], color=ENHANCED, label="enhanced")
+        panel.plot(true[0], color=REAL, linestyle=DASHED, label="truth")
+        panel.axvline(125, color=QUIET, linestyle=":", linewidth=0.8)
+        panel.set(xlabel="time (s)", ylabel="value (dimensionless)", ylim=(-1, 1))
+        panel.legend(frameon=False, loc="upper right", ncols=3)
+
+
+slider(draw, "severity", [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0], shown=(0.5, 0.0, 1.0))
 
 # %% [markdown]
-# <details><summary>What to say about it</summary>
+# *What to see:* the network has learned which healthy waveform goes with which healthy input. A faulty simulator is no healthy input, and
+# what comes out is a compromise of healthy waveforms. Each output sample depends on the *whole* window, so a fault can change the
+# output even before its onset. For all modes at severity 0.5:
+
+# %%
+found = experiment.degraded
+pairs = {
+    str(mode): (float(a), float(b))
+    for mode, a, b in zip(found["modes"], found["nrmse"], found["identity_nrmse"])
+}
+for mode, (after, before) in pairs.items():
+    print(
+        f"{mode:14} NRMSE coarse {before:.2f}, enhanced {after:.2f}: {'better' if after < before else 'worse'}"
+    )
+worse = [mode for mode, (after, before) in pairs.items() if after >= before]
+say(
+    f"Enhancing makes the error larger in {len(worse)} of {len(pairs) - 1} faulty modes: {', '.join(worse) or 'none'}."
+)
+assert experiment.settings.budget == "smoke" or pairs["nominal"][0] < pairs["nominal"][1]
+
+# %% [markdown]
+# Notebook 23 asks which of these modes can be recognised.
 #
-# 1. The matrix knows no relu and no epochs, and yet the network adds little to it, or nothing: the verdict on C1 depends on that
-#    comparison. In this example the map from a square wave to the sine of the same phase is close to linear on the few windows that
-#    occur.
-# 2. The enhancer has learned one thing: which healthy waveform goes with which healthy input. A stuck simulator is no healthy input,
-#    and what comes out is a compromise of healthy waveforms, moving where the truth stands still. Where the mode keeps the rhythm and
-#    changes little (friction), enhancing still helps. Where it changes level or tempo (drift, dropout, period change), it can be better
-#    to leave the coarse signal alone.
+# ## Exercises
+#
+# **1.** The matrix of ridge regression has 250,000 numbers. How many are needed? Replace the matrix by its best approximation of rank $r$
+# (by its singular values). What is the smallest $r$ whose NRMSE is at most 10 % above that of the full matrix?
+
+# %%
+center = ridge(inputs.mean(axis=0))
+matrix = ridge(np.eye(500) + inputs.mean(axis=0)) - center  # row i: what a change of input sample i changes
+smallest_rank = None  # your answer
+
+# %%
+U, S, V = np.linalg.svd(matrix)
+
+
+def error_of_rank(r):
+    return nrmse((coarse - inputs.mean(axis=0)) @ (U[:, :r] * S[:r]) @ V[:r] + center, truth)
+
+
+check_answer(
+    smallest_rank,
+    lambda r: error_of_rank(r) <= 1.1 * errors["ridge, one matrix"] < error_of_rank(r - 1),
+    "U, S, V = np.linalg.svd(matrix); the approximation is (U[:, :r] * S[:r]) @ V[:r].",
+)
+
+# %% [markdown]
+# **2.** Does the matrix do better than the network when the simulator is faulty? Complete the function with the NRMSE of both for a mode
+# at severity 0.5.
+
+
+# %%
+def errors_in_mode(mode):
+    fault = Degraded(mode, 0.5)
+    source, true = experiment.data.degraded_coarse(fault), experiment.data.degraded_truth(fault, noisy=False)
+    # your code: return the NRMSE of the network and of ridge
+    return None
+
+
+# %%
+def of_ridge(mode):
+    fault = Degraded(mode, 0.5)
+    windows, true = experiment.data.degraded_coarse(fault), experiment.data.degraded_truth(fault, noisy=False)
+    return measures.nrmse(reference.predict(windows), true)
+
+
+check_answer(
+    errors_in_mode("drift"),
+    lambda _: all(
+        np.allclose(errors_in_mode(mode), [pairs[mode][0], of_ridge(mode)], atol=0.01)
+        for mode in ("drift", "gain_loss")
+    ),
+    "Use experiment.simulator.enhance(source), ridge(source) and nrmse.",
+)
+
+# %% [markdown]
+# ## Solution
+#
+# <details><summary>1. The rank of the matrix</summary>
+#
+# ```python
+# full = nrmse(ridge(coarse), truth)
+# U, S, V = np.linalg.svd(matrix)
+# ranks = range(1, 501)
+# of_rank = ((coarse - inputs.mean(axis=0)) @ (U[:, :r] * S[:r]) @ V[:r] + center for r in ranks)
+# smallest_rank = next(r for r, estimate in zip(ranks, of_rank) if nrmse(estimate, truth) <= 1.1 * full)
+# print(smallest_rank)
+# ```
+#
+# At full budget four: two sines of fixed periods and any phase span four dimensions, a sine and a cosine of each.
+#
+# </details>
+
+# %% [markdown]
+# <details><summary>2. The matrix and faults</summary>
+#
+# ```python
+# def errors_in_mode(mode):
+#     fault = Degraded(mode, 0.5)
+#     source, true = experiment.data.degraded_coarse(fault), experiment.data.degraded_truth(fault, noisy=False)
+#     return nrmse(experiment.simulator.enhance(source), true), nrmse(ridge(source), true)
+#
+#
+# for mode in pairs:
+#     if mode != "nominal":
+#         print(f"{mode:14} network {errors_in_mode(mode)[0]:.2f}, ridge {errors_in_mode(mode)[1]:.2f}")
+# ```
+#
+# A linear map passes a smaller input on as a smaller output, so it follows a loss of amplitude that the network ignores. No map that was
+# fitted to healthy windows knows how a stuck mechanism looks. Compare the two columns before you trust either.
 #
 # </details>

@@ -1,78 +1,114 @@
 # %% [markdown]
-# # Figures 5 to 7: real or generated?
+# # Real or generated? (Figures 5 to 7)
+#
+# **Question:** if you cannot see the difference between real and generated telemetry, is there none?
+#
+# - **After this lesson** you can test your own eye honestly, measure what it misses, and find out what a classifier looks at.
+# - **You should know** how the noise is generated (notebook 09). The quiz comes first; do not read ahead.
+# - **Running time:** the first cell prints it.
+# - **Terms:** [AUC](../docs/glossary.md#auc): the probability that a classifier gives a generated window a higher score than a real one,
+#   0.5 by chance and 1 if it always does; [effective rank](../docs/glossary.md#effective-rank): the number of dimensions in which a set
+#   of windows varies.
 #
 # **What the paper says** (section 2.3): Figures 5, 6 and 7 are faces made by another system, StyleGAN2, "completely synthetic", to show
 # what adversarial networks can do. They show nothing of this paper's data and cannot be made from it. These are *counterparts* in the
 # paper's own domain, not reproductions: real telemetry among generated telemetry, for you to tell apart.
 
 # %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
 import numpy as np
 
-from enhsim_tf.reproduce.notebook import claim, open_experiment, show, verdict
+from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
+from enhsim_tf.reproduce.lesson import check_answer, say
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment()
+experiment = open_experiment(lesson="05")
 claim("C6", "C7")
 
 # %% [markdown]
-# ## Windows of telemetry
+# ## The quiz
 #
-# `simulator.generate` beside windows cut from held-out telemetry, in random order. Guess before you read the foot of the figure.
+# Four of these windows were made by `simulator.generate`, and four were cut from held-out telemetry. Enter the four letters of the
+# generated ones before you read the foot of the figure, for example `"aceg"`.
 
 # %%
 windows = show(experiment, "fig05_real_or_generated")
 
+# %%
+my_guess = None  # your answer, four letters
+
+# %%
+letters = "abcdefgh"
+truly_generated = {letter for letter, made in zip(letters, windows["is_generated"]) if made}
+if my_guess is None:
+    print("Not yet answered.")
+else:
+    print(f"{len(set(my_guess) & truly_generated)} of {len(truly_generated)} right.")
+
 # %% [markdown]
-# *What to see:* no window that stands out at a glance. If you found three or four of the four, was it skill?
+# *What to see:* no window that stands out at a glance. If three or four of your four letters are right, was it skill? By pure guessing,
+# the number of right letters has a hypergeometric distribution: $P(k)=\binom4k\binom4{4-k}/\binom84$.
 
 # %%
 from math import comb
 
 lucky = sum(comb(4, right) * comb(4, 4 - right) for right in (3, 4)) / comb(8, 4)
-print(f"three or four right by pure guessing: {lucky:.0%}")
-assert windows["is_generated"].sum() == 4 and round(lucky, 2) == 0.24
+say(f"Three or four right by pure guessing: **{lucky:.0%}**. One try of eight windows is no test.")
+assert len(truly_generated) == 4
 
 # %% [markdown]
-# One try of eight windows is no test. A thousand windows, a classifier and held-out folds are:
+# A thousand windows of each kind, a classifier, and windows that it was not trained on are a test:
 
 # %%
 (record,) = verdict(experiment, "C7")
-print(f"a classifier separates sum and telemetry with an AUC of {record['value']:.2f}; chance is 0.5")
+say(f"AUC of the classifier: **{record['value']:.2f}**. Chance is 0.5.")
 assert record["value"] > 0.8
 
 # %% [markdown]
-# ## Windows of noise
+# ## The noise alone
 
 # %%
 noise = show(experiment, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* again nothing at a glance. Draw the generated ones over each other: they begin with small values and rise and fall
-# together, since all share the same pattern. With that in mind, the eye finds them.
+# *What to see:* again nothing at a glance. But what is shared is invisible in a single window. Here the four real ones and the four
+# generated ones are drawn over each other, each as the mean of four:
 
 # %%
 rows, is_generated = noise["rows"], noise["is_generated"]
-shared = {}
-for name, four in {"generated": rows[is_generated], "real": rows[~is_generated]}.items():
-    shared[name] = (np.corrcoef(four).sum() - 4) / 12  # the twelve pairs of two different windows
-    begin = four[:, :60].std() / four.std()
-    print(
-        f"{name:9} correlation of two windows {shared[name]:5.2f}, sd of the first minute {begin:.2f} of all"
-    )
-assert shared["generated"] > {"full": 0.3, "smoke": 0.1}[experiment.settings.budget] > abs(shared["real"])
-quiet = rows[is_generated][:, :60].std() / rows[is_generated].std()
-assert experiment.settings.budget == "smoke" or quiet < 0.85
-
-# %% [markdown]
-# *What to see:* the effective ranks under the title differ greatly. Notebook 21 explains them.
+groups = {"real": (rows[~is_generated], REAL, "-"), "generated": (rows[is_generated], GENERATED, DASHED)}
+means = {name: group.mean(axis=0) for name, (group, _, _) in groups.items()}
+alt = "Mean of four real and of four generated windows of noise"
+title = "The mean of four generated windows is as large as one window: they share a pattern"
+with drawing(alt, 2, 1.8, title, sharey=True) as panels:
+    for panel, (name, (_, color, _)) in zip(panels, groups.items()):
+        panel.plot(means[name], color=color, linewidth=0.6)
+        panel.set(title=f"mean of the four {name} windows", xlabel="time (s)")
+    panels[0].set_ylabel("noise (dimensionless)")
 
 # %%
-share = float(noise["rank_generated"] / noise["rank_real"])
-print(f"effective rank of generated noise as a share of the real: {share:.0%}")
-assert share < {"full": 0.2, "smoke": 0.6}[experiment.settings.budget]  # few windows have little rank to lose
+ratio = {name: means[name].std() / group.std() for name, (group, _, _) in groups.items()}
+correlation = {name: (np.corrcoef(group).sum() - 4) / 12 for name, (group, _, _) in groups.items()}
+say(
+    f"Standard deviation of the mean, in units of that of a window: **{ratio['real']:.2f}** real (independent windows: 0.50), "
+    f"**{ratio['generated']:.2f}** generated. Mean correlation of two windows: **{correlation['real']:.2f}** real, "
+    f"**{correlation['generated']:.2f}** generated."
+)
+assert (
+    correlation["generated"]
+    > {"full": 0.3, "smoke": 0.1}[experiment.settings.budget]
+    > abs(correlation["real"])
+)
+
+# %% [markdown]
+# Windows that share a pattern vary in few dimensions. The *effective rank* counts them:
+
+# %%
+rank_generated, rank_real = float(noise["rank_generated"]), float(noise["rank_real"])
+say(
+    f"Effective rank of {float(noise['rank_windows']):,.0f} windows: **{rank_generated:.0f}** generated, **{rank_real:.0f}** real, "
+    f"a share of {rank_generated / rank_real:.0%}."
+)
+assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[experiment.settings.budget]
 
 # %% [markdown]
 # ## Long stretches
@@ -86,37 +122,42 @@ series = show(experiment, "fig07_real_or_generated_series")
 # *What to see:* no stretch has seams, and all keep the rhythm of the satellite for as long as you look.
 
 # %%
-from enhsim_tf.realism.measures import autocorrelation
-
-rhythm = [autocorrelation(row[None], 480)[480] for row in series["rows"]]
-print("correlation of each stretch with itself one orbit later:", np.round(rhythm, 2))
+orbit = 480  # samples
+rhythm = [np.corrcoef(row[:-orbit], row[orbit:])[0, 1] for row in series["rows"]]
+say(
+    "Correlation of each stretch with itself one orbit later: "
+    + ", ".join(f"{value:.2f}" for value in rhythm)
+    + "."
+)
 assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[experiment.settings.budget]
 
 # %% [markdown]
-# What no seam betrays, the noise does. Each window brings the pattern that all of them hold, so the noise of a generated series repeats
+# The noise betrays them all the same. Each window brings the shared pattern along, so that the noise of a generated series repeats
 # itself every half window, however long the series is:
 
 # %%
-from enhsim_tf.noise.extraction import extract_noise
+from enhsim_tf import extract_noise
 
 repeats = []
-for row, is_generated in zip(series["rows"], series["is_generated"]):
+for row, made in zip(series["rows"], series["is_generated"]):
     rest, _ = extract_noise(row, experiment.settings.noise.moving_average)
     repeats.append(np.corrcoef(rest[:-250], rest[250:])[0, 1])
-    print("generated" if is_generated else "real     ", f"correlation after half a window: {repeats[-1]:.2f}")
-is_generated = np.array(series["is_generated"])
+    print(
+        "generated" if made else "real     ",
+        f"correlation of the noise with itself 250 samples later: {repeats[-1]:.2f}",
+    )
+made, repeats = np.array(series["is_generated"]), np.array(repeats)
 least = {"full": 0.3, "smoke": 0.05}[experiment.settings.budget]
-assert np.min(np.array(repeats)[is_generated]) > least > np.max(np.array(repeats)[~is_generated])
+assert repeats[made].min() > least > repeats[~made].max()
 
 # %% [markdown]
+# So the answer to the question is no. A difference that nobody sees can be the one that a detector sees best (notebook 13).
+#
 # ## Exercises
 #
-# 1. A classifier beats your eye, so what does it look at? Rank the features of `two_sample.window_features` by how well each one alone
-#    separates generated from real noise.
-# 2. How many windows would you have to classify, and how many of them correctly, before you may claim to see a difference?
-
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
-# ## Solution
+# **1.** A classifier beats your eye, so what does it look at? The table below has 14 features of each window. Which *single* feature
+# separates real from generated noise best, and how well? Set `best_auc` to its AUC (an AUC of 0.1 separates as well as one of 0.9, so
+# give the larger of the AUC and 1 − AUC).
 
 # %%
 from sklearn.metrics import roc_auc_score
@@ -125,24 +166,61 @@ from enhsim_tf.realism.window_features import window_features
 
 real = experiment.data.noise_windows("test", None)
 generated = experiment.simulator.noise.generate(len(real), seed=1)
-features = window_features(np.concatenate([generated, real]))
-is_generated = np.repeat([1, 0], len(real))
-alone = np.array([roc_auc_score(is_generated, column) for column in features.T])
+features, label = window_features(np.concatenate([generated, real])), np.repeat([1, 0], len(real))
+names = ["mean", "log sd", "kurtosis", "maximum", "log sd of steps", "lag-1 correlation"]
+names += [f"power in band {band}" for band in range(features.shape[1] - len(names))]
+best_auc = None  # your answer
 
 # %%
-names = ["mean", "log sd", "kurtosis", "maximum", "log sd of steps", "lag-1 correlation"]
-names += [f"power in band {band}" for band in range(len(alone) - len(names))]
-for best in np.argsort(-np.abs(alone - 0.5))[:4]:
-    print(f"{names[best]:18} AUC {alone[best]:.2f}")
-assert np.abs(alone - 0.5).max() > 0.25
+alone = [roc_auc_score(label, column) for column in features.T]
+check_answer(
+    best_auc,
+    lambda answer: abs(answer - max(max(auc, 1 - auc) for auc in alone)) < 0.005,
+    "roc_auc_score(label, features[:, 0]) is the AUC of the first feature.",
+)
 
 # %% [markdown]
-# <details><summary>What to say about it</summary>
+# **2.** How many of $n=100$ windows, half of them generated, must you classify correctly before you may claim to see a difference, at a
+# chance of error of 5 %? Treat your answers as independent guesses.
+
+# %%
+needed = None  # your answer: the smallest number of right answers that pure guessing reaches in at most 5 % of tries
+
+# %%
+from scipy.stats import binom
+
+check_answer(
+    needed,
+    lambda number: binom.sf(number - 1, 100, 0.5) <= 0.05 < binom.sf(number - 2, 100, 0.5),
+    "The number of right guesses is binomial with n = 100 and p = 1/2.",
+)
+
+# %% [markdown]
+# ## Solution
 #
-# 1. (An AUC of 0 separates as well as one of 1.) At full budget a single feature is enough: the power in the band of four to seven
-#    cycles a window. The 2-minute wave lies there, of which the moving average leaves a little in the real noise (notebook 08), in
-#    every window the same amount. The generator misses it.
-# 2. For a chance of error of 5 % in a test of $n$ windows, half of them generated, you need about $n/2+0.8\sqrt n$ right: 8 windows ask
-#    for all, 100 windows for 58 to 59. The eye's failure on eight windows says little about it, and its success would too.
+# <details><summary>1. What the classifier looks at</summary>
+#
+# ```python
+# aucs = [roc_auc_score(label, column) for column in features.T]
+# best = max(range(len(aucs)), key=lambda number: abs(aucs[number] - 0.5))
+# best_auc = max(aucs[best], 1 - aucs[best])
+# print(f"{names[best]}: AUC {best_auc:.2f}")
+# ```
+#
+# At full budget a single feature is enough: the power in a band of low frequencies. The 2-minute wave lies there, of which the moving
+# average leaves a little in the real noise (notebook 08), in every window the same amount. The generator misses it.
+#
+# </details>
+
+# %% [markdown]
+# <details><summary>2. How many right answers</summary>
+#
+# ```python
+# needed = next(number for number in range(101) if binom.sf(number - 1, 100, 0.5) <= 0.05)
+# print(needed)
+# ```
+#
+# About $n/2+0.8\sqrt n$. For eight windows in groups of four, all must be right. The eye's failure on eight windows says little about it,
+# and its success would too.
 #
 # </details>

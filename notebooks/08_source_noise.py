@@ -1,116 +1,260 @@
 # %% [markdown]
-# # Figure 8: the source noise
+# # Noise from a moving average (Figure 8)
+#
+# **Question:** how can the noise be separated from telemetry if nobody knows the true signal?
+#
+# - **After this lesson** you can write the moving-average filter of the paper, predict from a formula what it removes and what it leaves
+#   behind, and choose its width.
+# - **You should know** mean, variance and correlation.
+# - **Running time:** the first cell prints it.
+# - **Terms:** [moving average](../docs/glossary.md#moving-average), standard deviation (sd), *lag-k correlation*: the correlation of a
+#   series with itself $k$ samples later, $\rho_k=\mathrm{mean}\left((x_t-\bar x)(x_{t+k}-\bar x)\right)/\mathrm{var}(x)$.
+#   *White* noise has $\rho_k=0$ for all $k>0$.
 #
 # **What the paper says** (section 2.3): "Noise and other stochastic environmental effects of real telemetry are extracted using a
 # moving average filter. This average is subtracted from the original signal, leaving the noise that needs to be simulated." It cites
-# pandas' rolling mean and gives no width; this project uses 25 samples.
+# the rolling mean of pandas and gives no width. This project uses 25 samples.
 
 # %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
 import numpy as np
 
-from enhsim_tf.common.plot_style import AVERAGE, COARSE, REAL
+from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
+from enhsim_tf.reproduce.lesson import check_answer, say, slider
 from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment()
+experiment = open_experiment(lesson="08")
 claim("C6")
 
 # %% [markdown]
-# ## How it is built
+# ## The filter
 #
-# `extract_noise` splits a series into its centred moving average and the rest. Samples at the edges that have no full average are cut:
-# padding with zeros would invent noise there.
+# The average of $w$ samples around a sample estimates the signal there, and what is left is called noise:
+#
+# $$a_t=\frac1w\sum_{k=-h}^{h}x_{t+k},\qquad n_t=x_t-a_t,\qquad w=2h+1$$
+#
+# The first and the last $h$ samples have no full average. They are cut off. If they were padded with zeros, the edges would get noise
+# that is not in the telemetry.
+
+# %%
+telemetry = experiment.data.channels[0].train
+values, width = telemetry.values.astype(float), experiment.settings.noise.moving_average
+
+
+def moving_average(values, width):
+    return np.convolve(values, np.ones(width) / width, mode="valid")  # "valid": full averages only
+
+
+def extract(values, width):
+    half = width // 2
+    return values[half:-half] - moving_average(values, width)
+
+
+noise = extract(values, width)
+say(f"{len(values):,} samples of telemetry, a width of {width} samples, {len(noise):,} samples of noise.")
+
+# %% [markdown]
+# The package does the same. It stores 32-bit numbers, which for values below 1 are rounded by less than $10^{-7}$, so both results may
+# differ by a little more than that:
 
 # %%
 from enhsim_tf import extract_noise
 
-width = experiment.settings.noise.moving_average
-telemetry = experiment.data.channels[0].train
-noise, average = extract_noise(telemetry.values, width)
-assert len(noise) == len(telemetry) - width + 1
+packaged, _ = extract_noise(telemetry.values, width)
+np.testing.assert_allclose(noise, packaged, atol=1e-6)
 
 # %%
 arrays = show(experiment, "fig08_source_noise")
 
 # %% [markdown]
-# *What to see:* an even band of noise, almost as wide as the noise that was put in. "Almost" can be computed. The average holds a 25th
-# of each sample's own noise, so white noise of variance $\sigma^2$ leaves $\sigma^2(1-1/w)$. And it smooths the waves a little, so that
-# a small share of each stays in the noise.
+# *What to see:* an even band of noise. In this example the true noise is known, because the telemetry was made by adding white noise to
+# two sines. The filter finds almost its standard deviation:
 
 # %%
-half, chosen = width // 2, experiment.settings.telemetry
+chosen = experiment.settings.telemetry
+true_sd, half = chosen.noise_sd, width // 2
+say(f"Standard deviation of the noise: **{noise.std():.4f}** extracted, **{true_sd}** put in.")
+assert abs(noise.std() / true_sd - 1) < 0.03
+
+# %% [markdown]
+# ## Why "almost"
+#
+# Two errors can be computed beforehand.
+#
+# 1. The average contains $1/w$ of each sample's own noise. White noise of variance $\sigma^2$ therefore leaves
+#    $\sigma^2\,(1-1/w)$.
+# 2. The average also flattens the waves. Of a sine of period $P$ it keeps the share $c=\frac1w\sum_{k=-h}^{h}\cos(2\pi k/P)$, so
+#    $1-c$ of its amplitude $A$ is called noise, with a variance of $A^2(1-c)^2/2$.
+
+# %%
 periods = np.array([chosen.orbit_period_s, chosen.rotation_period_s])
 amplitudes = np.array([chosen.orbit_amplitude, chosen.rotation_amplitude])
 
-# what the average keeps of each sine, and what it therefore leaves in the noise
-kept = np.cos(2 * np.pi * np.arange(-half, half + 1) / periods[:, None]).mean(axis=1)
-left = amplitudes * (1 - kept)
-expected = np.sqrt(chosen.noise_sd**2 * (1 - 1 / width) + np.sum(left**2) / 2)
-print(f"standard deviation of the noise: {noise.std():.5f} measured, {expected:.5f} computed")
-print(f"left of the 2-minute wave: {left[1] / amplitudes[1]:.1%} of its amplitude")
-assert abs(noise.std() / expected - 1) < 0.01
+
+def left_of_the_waves(width):
+    steps = np.arange(-(width // 2), width // 2 + 1)
+    kept = np.cos(2 * np.pi * steps / periods[:, None]).mean(axis=1)
+    return amplitudes * (1 - kept)
+
+
+def predicted_sd(width):
+    return np.sqrt(true_sd**2 * (1 - 1 / width) + np.sum(left_of_the_waves(width) ** 2) / 2)
+
+
+left = left_of_the_waves(width)
+say(
+    f"Predicted: **{predicted_sd(width):.5f}**; measured: **{noise.std():.5f}**. Of the 2-minute wave, "
+    f"**{left[1] / amplitudes[1]:.1%}** of the amplitude stay in the noise."
+)
+assert abs(noise.std() / predicted_sd(width) - 1) < 0.01
 
 # %% [markdown]
-# So what the noise networks learn from is not quite white, though white noise was put in. Subtracting an average makes neighbours repel
-# each other; the closed form below holds for lags up to half the width.
+# ## Which width?
+#
+# The slider changes the width. The left panel shows one window of telemetry and its average, the right one what is left.
 
 # %%
-from enhsim_tf.realism.measures import autocorrelation
+piece = values[: 500 + 242]
 
+
+def draw(width):
+    half, extracted = width // 2, extract(values[:100_000], width)
+    title = (
+        f"Width {width}: the noise has a standard deviation of {extracted.std():.3f}; {true_sd} was put in"
+    )
+    with drawing(
+        f"Telemetry, its moving average over {width} samples, and the rest", 2, 1.9, title
+    ) as panels:
+        panels[0].plot(piece[121:621], color=REAL, linewidth=0.5, label="telemetry")
+        panels[0].plot(moving_average(piece, width)[121 - half :][:500], color=AVERAGE, label="average")
+        panels[0].set(xlabel="time (s)", ylabel="value (dimensionless)")
+        panels[0].legend(frameon=False)
+        panels[1].plot(extract(piece, width)[121 - half :][:500], color=REAL, linewidth=0.5)
+        panels[1].set(xlabel="time (s)", ylabel="telemetry − average", ylim=(-0.8, 0.8))
+
+
+slider(draw, "width", range(3, 242, 2), shown=(25, 3, 121), unit="samples")
+
+# %% [markdown]
+# *What to see:* a narrow average follows the noise itself and removes it. A wide one no longer follows the 2-minute wave, which then is
+# called noise. The formula says the same for all widths:
+
+# %%
+widths = np.arange(3, 122, 2)
+measured = np.array([extract(values[:50_000], each).std() for each in widths])
+predicted = np.array([predicted_sd(each) for each in widths])
+alt = "Standard deviation of the extracted noise by the width of the moving average, measured and predicted"
+title = "A narrow average removes noise, and a wide one adds a part of the wave"
+with drawing(alt, height=2.1, title=title) as panel:
+    panel.plot(widths, predicted, color=AVERAGE, label="predicted")
+    panel.plot(widths[::3], measured[::3], "o", color=REAL, markersize=2.5, label="measured")
+    panel.axhline(true_sd, color=QUIET, linestyle=":", label="put in")
+    panel.set(
+        xlabel="width of the moving average (samples)",
+        ylabel="sd of the noise (dimensionless)",
+        xlim=(0, 122),
+    )
+    panel.legend(frameon=False)
+assert np.abs(measured / predicted - 1).max() < 0.03
+
+# %% [markdown]
+# ## The filter leaves a mark
+#
+# White noise was put in, but what comes out is not quite white, because near samples share most of the average that was subtracted. For
+# a lag $k$ up to half the width, the covariance of the noise alone is $-\sigma^2\,(w+k)/w^2$. The remains of the waves add a little at
+# all lags.
+
+# %%
 lags = np.arange(1, 40)
-near, far = (width - lags) / width**2 - 2 / width, np.clip(width - lags, 0, None) / width**2
-of_noise = chosen.noise_sd**2 * np.where(lags <= half, near, far)
+near, far = -(width + lags) / width**2, np.clip(width - lags, 0, None) / width**2
+of_noise = true_sd**2 * np.where(lags <= half, near, far)
 of_waves = left**2 / 2 @ np.cos(2 * np.pi * lags / periods[:, None])
-closed_form = (of_noise + of_waves) / expected**2
-measured = autocorrelation(noise[None, :50_000], 39)[1:]
+closed_form = (of_noise + of_waves) / predicted_sd(width) ** 2
 
-# %%
-alt = "Correlation of the extracted noise with itself, measured and in closed form"
-with drawing(alt, height=1.8) as panel:
-    panel.plot(lags, closed_form, color=AVERAGE, label="closed form")
+centred = noise[:100_000] - noise[:100_000].mean()
+measured = np.array([np.mean(centred[:-lag] * centred[lag:]) for lag in lags]) / centred.var()
+
+alt = "Correlation of the extracted noise with itself by lag, measured and in closed form"
+title = "Extracted noise is not white: near samples are negatively correlated"
+with drawing(alt, height=2.1, title=title) as panel:
+    panel.plot(lags, closed_form, color=AVERAGE, linestyle=DASHED, label="closed form")
     panel.plot(lags, measured, "o", color=REAL, markersize=2.5, label="measured")
-    panel.set(xlabel="lag in samples", ylabel="correlation")
+    panel.axhline(0, color=QUIET, linewidth=0.5)
+    panel.set(xlabel="lag (samples; one sample is 1 s)", ylabel="correlation")
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* small negative correlations at short lags, a step at half the width, and the points on the line.
+# *What to see:* negative correlations up to lag 12, a step there, and the measured points on the line. The noise networks of the next
+# lessons learn from this noise, and have to learn this mark too.
 
 # %%
-print(f"lag 1: {measured[0]:.4f} measured, {closed_form[0]:.4f} computed")
+say(f"Lag 1: **{measured[0]:.3f}** measured, **{closed_form[0]:.3f}** computed.")
 assert np.abs(measured - closed_form).max() < 0.02
 
 # %% [markdown]
 # ## Exercises
 #
-# 1. Choose the width yourself. Plot the standard deviation of the extracted noise for widths from 3 to 121. Where is it closest to what
-#    was put in, and what goes wrong on either side?
-# 2. Most of the noise in a real channel is not white. Which noise would a moving average of 25 samples not see at all?
-
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
-# ## Solution
+# **1.** For which odd width from 3 to 121 is the standard deviation of the extracted noise closest to the one that was put in? Is the
+# extracted noise then the noise that was put in?
 
 # %%
-widths = np.arange(3, 122, 2)
-deviations = [extract_noise(telemetry.values[:50_000], int(candidate))[0].std() for candidate in widths]
-alt = "Standard deviation of the extracted noise by the width of the moving average"
-with drawing(alt, height=1.8) as panel:
-    panel.plot(widths, deviations, color=REAL)
-    panel.axhline(chosen.noise_sd, color=COARSE, linestyle=":")
-    panel.set(xlabel="width in samples", ylabel="standard deviation", xlim=(0, 121))
-best = widths[np.argmin(np.abs(np.array(deviations) - chosen.noise_sd))]
-print("closest to the noise that was put in:", best, "samples")
-assert 15 < best < 45
+best_width = None  # your answer, in samples
+
+# %%
+errors = {int(each): abs(extract(values[:50_000], each).std() - true_sd) for each in widths}
+check_answer(
+    best_width,
+    lambda answer: errors[answer] <= sorted(errors.values())[1],  # the two best are equal but for chance
+    "Compute extract(values, width).std() for each width, or read it off the plot above.",
+)
 
 # %% [markdown]
-# <details><summary>What to say about it</summary>
+# **2.** Real noise is often slow, for example a thermal drift. The cell makes noise of standard deviation 0.1 whose memory fades
+# over 500 samples. Which share of its standard deviation is left after the extraction?
+
+# %%
+slow, kicks = np.zeros(100_000), np.random.default_rng(0).standard_normal(100_000)
+for t in range(1, len(slow)):
+    slow[t] = 0.998 * slow[t - 1] + 0.1 * np.sqrt(1 - 0.998**2) * kicks[t]
+
+
+def surviving_share(
+    series, width
+): ...  # your code: the standard deviation after the extraction, divided by that of the series
+
+
+# %%
+check_answer(
+    surviving_share(slow, 25),
+    lambda share: abs(share - extract_noise(slow, 25)[0].std() / slow.std()) < 1e-3,
+    "Use extract(series, width).",
+)
+
+# %% [markdown]
+# ## Solution
 #
-# 1. A narrow average swallows part of the noise: each sample is a third, a fifth, ... of its own average. A wide one smooths the
-#    2-minute wave away and calls it noise. In between the two errors cancel in the standard deviation, and *only* there: the noise
-#    still holds a trace of the wave. The right width is short against the fastest signal and long against the noise.
-# 2. Slow noise. A drift over hours passes the average untouched and ends up in the *waveform*, for which the enhancer has no input. Red
-#    noise (random walks, thermal drifts) is mostly of this kind.
+# <details><summary>1. The best width</summary>
+#
+# ```python
+# best_width = int(widths[np.argmin([abs(extract(values[:50_000], each).std() - true_sd) for each in widths])])
+# ```
+#
+# Noise is missing and wave is added, and at this width both cancel in the standard deviation. They cancel *only* there: the extracted
+# noise still holds a trace of the wave. A good width is short against the fastest signal and long against the memory of the noise.
+#
+# </details>
+
+# %% [markdown]
+# <details><summary>2. Slow noise</summary>
+#
+# ```python
+# def surviving_share(series, width):
+#     return extract(series, width).std() / series.std()
+#
+#
+# print(f"{surviving_share(slow, 25):.0%} of the slow noise is left")
+# ```
+#
+# Almost nothing. The average follows slow noise as it follows the signal, so that the noise ends up in the *waveform*, for which the
+# enhancer has no input. What the paper calls noise is its fast part.
 #
 # </details>

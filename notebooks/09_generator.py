@@ -1,113 +1,275 @@
 # %% [markdown]
-# # Figure 9: the generator
+# # The generator (Figure 9)
+#
+# **Question:** how can a network turn 16 random numbers into 500 samples of noise, and what limits the noise that it can make?
+#
+# - **After this lesson** you can write the generator and one update of it in plain Keras, and find the bottleneck of a generator by
+#   counting dimensions.
+# - **You should know** what a Dense layer and a gradient are. The moving average is explained in notebook 08.
+# - **Running time:** the first cell prints it.
+# - **Terms:** [generator and discriminator](../docs/glossary.md#generator-and-discriminator),
+#   [adversarial loss](../docs/glossary.md#adversarial-loss), [effective rank](../docs/glossary.md#effective-rank).
 #
 # **What the paper says** (section 2.3): "The 16-element latent vector is densely connected to a layer of 64 neurons. These are then
 # normalized and spread to a layer of 500 neurons, the number of samples in the time series."
 
 # %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
 import numpy as np
 
-from enhsim_tf.common.plot_style import AVERAGE, GENERATED, REAL
+from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
+from enhsim_tf.reproduce.lesson import check_answer, say
 from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment()
+experiment = open_experiment(lesson="09")
 claim("C6")
 
 # %% [markdown]
-# ## How it is built
+# ## The network
+#
+# The *latent vector* $z$ holds 16 independent random numbers from a normal distribution. Each draw of $z$ gives one window of noise
+# $G(z)$. The tanh keeps the noise between −1 and 1.
+
+# %%
+import keras
+from keras import layers
+
+generator = keras.Sequential(
+    [
+        keras.Input((16,)),
+        layers.Dense(64, activation="relu", kernel_initializer="he_uniform"),
+        layers.BatchNormalization(),
+        layers.Dense(500, activation="tanh", kernel_initializer="he_uniform"),
+        layers.Reshape((500, 1)),
+    ]
+)
+table = show(experiment, "fig09_generator")
+
+# %% [markdown]
+# *What to see:* a small network, and a narrow one. All that it knows of noise enters through 16 numbers and passes 64 neurons. A Dense
+# layer from $m$ to $n$ has $n\,(m+1)$ parameters, and a normalisation four for each neuron, of which two are running means and
+# variances that no gradient changes:
+
+# %%
+by_hand = [64 * (16 + 1), 4 * 64, 500 * (64 + 1), 0]
+say(f"Parameters by layer: {by_hand}, together **{generator.count_params():,}**.")
+assert table["parameters"].tolist() == by_hand and generator.count_params() == sum(by_hand) == table["total"]
+
+# %% [markdown]
+# ## One update
+#
+# A second network, the *discriminator* $D$, returns the probability that a window is real (notebook 10). The generator has no noise to
+# copy. It learns only from the discriminator's answer to its own windows, by minimising
+#
+# $$L_G=-\mathrm{mean}\,\ln D(G(z)),$$
+#
+# the binary cross-entropy for the label "real". The gradient flows through the discriminator to the generator's weights, and only these
+# are changed.
+
+# %%
+import tensorflow as tf
+
+
+def update_generator(generator, discriminator, optimizer, latent):
+    with tf.GradientTape() as tape:
+        judged = discriminator(generator(latent, training=True), training=True)
+        loss = -tf.reduce_mean(
+            tf.math.log(judged)
+        )  # small if the discriminator takes the windows for real ones
+    gradients = tape.gradient(loss, generator.trainable_variables)  # not those of the discriminator
+    optimizer.apply(gradients, generator.trainable_variables)
+    return float(loss)
+
+
+# %% [markdown]
+# The package has the same step in its class `NoiseGAN`. From the same weights and the same latent vectors, both must arrive at the same
+# weights. Adam moves each weight by about its learning rate of 0.001 in the first step; the tolerance is a hundredth of it, for
+# rounding.
+
+# %%
+from enhsim_tf import NoiseGAN
+
+packaged, discriminator = experiment.untrained_noise_networks()
+generator.set_weights(packaged.get_weights())
+gan = NoiseGAN(packaged, discriminator, seed=0)
+latent = keras.random.normal((200, 16), seed=keras.random.SeedGenerator(0))  # what the package draws first
+
+first = generator.get_weights()
+loss = update_generator(generator, discriminator, keras.optimizers.Adam(0.001), latent)
+gan._update_generator()
+for ours, theirs in zip(generator.get_weights(), packaged.get_weights()):
+    np.testing.assert_allclose(ours, theirs, atol=1e-5)
+moved = float(np.abs(generator.get_weights()[0] - first[0]).max())
+say(
+    f"Loss before the update: **{loss:.2f}**: neither network is trained, and this discriminator happens to take nearly "
+    f"everything for real. The weights of the first layer moved by up to {moved:.4f}."
+)
+
+# %% [markdown]
+# Notebook 11 repeats this a thousand times, in turn with the update of the discriminator. From here on, this lesson looks at the
+# generator that was trained so.
+#
+# ## What the narrowness means
+#
+# The last Dense layer writes every window as a sum of 64 fixed shapes, the rows of its kernel $K$, and tanh then bends it a little:
+#
+# $$G(z)=\tanh\Big(b+\sum_{i=1}^{64}h_i(z)\,K_i\Big)$$
+#
+# Before the tanh, a thousand windows therefore vary in at most 64 of the 500 dimensions. Real noise varies in all of them. To see it,
+# sort the dimensions by their share of the variance, which are the squared singular values of the windows:
+
+# %%
+trained = experiment.simulator.noise.generator
+first, normalise, last, _ = trained.layers
+latent = np.random.default_rng(0).standard_normal((1_000, 16), "float32")
+hidden = np.asarray(normalise(first(latent)), float)
+before_tanh = hidden @ np.asarray(last.kernel, float) + np.asarray(last.bias, float)
+generated = np.asarray(trained(latent))[:, :, 0]
+np.testing.assert_allclose(np.tanh(before_tanh), generated, atol=1e-4)  # 32-bit sums of 64 products
+
+real = experiment.data.noise_windows("train", 1_000, "notebook")
+
+
+def shares_of_variance(windows):
+    energy = np.linalg.svd(windows - windows.mean(axis=0, dtype=float), compute_uv=False) ** 2
+    return energy / energy.sum()
+
+
+parts = {"real noise": real, "generated": generated, "generated, before the tanh": before_tanh}
+shares = {name: shares_of_variance(windows) for name, windows in parts.items()}
+
+# %%
+alt = "Share of the variance by dimension, sorted: real noise, generated noise, and the same before the tanh"
+title = "Generated noise fills few dimensions: before the tanh exactly 64, real noise all 500"
+styles = ((REAL, "-"), (GENERATED, DASHED), (GENERATED, ":"))
+with drawing(alt, height=2.3, title=title) as panel:
+    for (name, values), (color, style) in zip(shares.items(), styles):
+        panel.plot(np.arange(1, 501), values, color=color, linestyle=style, label=name)
+    panel.set(
+        xlabel="dimension, sorted",
+        ylabel="share of the variance",
+        yscale="log",
+        ylim=(1e-9, 1),
+        xlim=(0, 500),
+    )
+    panel.legend(frameon=False)
+
+# %% [markdown]
+# *What to see:* the shares of real noise decrease slowly. Those of generated noise fall steeply, and before the tanh they end at 64. One
+# number says it: the *effective rank*, the exponential of the entropy of the shares $p_i$,
+#
+# $$\mathrm{rank}=\exp\Big(-\sum_i p_i\ln p_i\Big).$$
+
+# %%
+from enhsim_tf.realism.measures import effective_rank
+
+
+def rank(windows):
+    p = shares_of_variance(windows)
+    p = p[p > 0]
+    return np.exp(-np.sum(p * np.log(p)))
+
+
+for windows in parts.values():
+    np.testing.assert_allclose(rank(windows), effective_rank(windows), rtol=1e-5)
+beyond = {name: values[64:].sum() for name, values in shares.items()}
+say(
+    f"Effective rank of 1,000 windows: **{rank(generated):.0f}** generated, **{rank(real):.0f}** real. "
+    f"Beyond 64 dimensions lie {beyond['real noise']:.0%} of the variance of real noise, and {beyond['generated']:.2%} of that of "
+    f"generated noise."
+)
+assert beyond["generated, before the tanh"] < 1e-9 and beyond["real noise"] > 0.5
+assert rank(generated) < rank(real) / 2
+
+# %% [markdown]
+# For a detector this difference matters more than any other, as notebook 13 shows: the residual outside the main dimensions is exactly
+# what many detectors look at.
+#
+# ## Exercises
+#
+# **1.** Sixteen numbers go in, and 64 dimensions come out. Where do the others come from? Say first: what is the rank of the windows
+# if relu, normalisation and tanh are left out?
+
+# %%
+rank_without_relu = None  # your answer
+
+# %%
+linear = keras.Sequential([keras.Input((16,)), layers.Dense(64), layers.Dense(500)])
+windows = linear.predict(latent, verbose=0)
+check_answer(
+    rank_without_relu,
+    lambda answer: answer == np.linalg.matrix_rank(windows, tol=1e-2),
+    "Without relu and tanh, the network is a product of matrices.",
+)
+
+# %% [markdown]
+# **2.** Which change raises the effective rank of an untrained generator more: 256 latent numbers instead of 16, or 512 hidden neurons
+# instead of 64? Complete the function, and compare.
+
+
+# %%
+def rank_of_untrained(latent, hidden):
+    keras.utils.set_random_seed(0)
+    # your code: build the generator with these sizes and return rank(windows) of 1,000 windows
+    return None
+
 
 # %%
 from enhsim_tf.noise.generator import build_generator
 
-untrained = build_generator(window=500, latent=16, hidden_units=64, activation="tanh", seed=0)
-layers = show(experiment, "fig09_generator")
+
+def expected(number, units):
+    draws = np.random.default_rng(0).standard_normal((1_000, number), "float32")
+    return effective_rank(
+        build_generator(latent=number, hidden_units=units).predict(draws, verbose=0)[:, :, 0]
+    )
+
+
+check_answer(
+    None
+    if rank_of_untrained(16, 64) is None
+    else [rank_of_untrained(*sizes) for sizes in ((16, 64), (256, 512))],
+    lambda found: np.allclose(found, [expected(16, 64), expected(256, 512)], rtol=0.15),
+    "Draw latent vectors of shape (1000, latent), predict, and drop the last axis: windows[:, :, 0].",
+)
 
 # %% [markdown]
-# *What to see:* a small network, and a narrow one. All that it knows of noise enters through 16 numbers and passes 64 neurons.
-
-# %%
-total, resting = int(layers["total"]), int(layers["total"] - layers["trainable"])
-print(f"{total:,} parameters; {resting} of them are running means and variances")
-assert layers["parameters"].tolist() == [64 * (16 + 1), 4 * 64, 500 * (64 + 1), 0]
-assert resting == 2 * 64 and untrained.count_params() == total
-
-# %% [markdown]
-# ## What that narrowness means
-#
-# The last Dense layer writes every window as a sum of 64 fixed shapes, the rows of its kernel, and tanh then bends it a little. Before
-# the tanh, no thousand windows can fill more than 64 of the 500 dimensions. Real noise fills them all. Sort the dimensions by how much
-# of the variance they hold:
-
-# %%
-generator = experiment.simulator.noise.generator
-latent = np.random.default_rng(0).standard_normal((1_000, generator.input_shape[1]), "float32")
-first, normalise, last, _ = generator.layers
-hidden = np.asarray(normalise(first(latent)), float)
-before_tanh = hidden @ np.asarray(last.kernel, float) + np.asarray(last.bias, float)
-generated = np.asarray(generator(latent))[:, :, 0]
-assert np.abs(np.tanh(before_tanh) - generated).max() < 1e-4
-
-# %%
-real = experiment.data.noise_windows("train", 1_000, "notebook")
-parts = {"real noise": real, "generated": generated, "generated, before tanh": before_tanh}
-energy = {
-    name: np.linalg.svd(rows - rows.mean(axis=0, dtype=float), compute_uv=False) ** 2
-    for name, rows in parts.items()
-}
-
-# %%
-alt = "Share of the variance by dimension, sorted: real noise, generated noise, and the same before the tanh"
-with drawing(alt, height=2.2) as panel:
-    for (name, shares), color in zip(energy.items(), (REAL, GENERATED, AVERAGE)):
-        panel.plot(np.arange(1, 501), shares / shares.sum(), color=color, label=name)
-    panel.set(xlabel="dimension", ylabel="share of the variance", yscale="log", ylim=(1e-9, 1))
-    panel.legend(frameon=False)
-
-# %% [markdown]
-# *What to see:* real noise falls off gently; generated noise falls off a cliff, and before the tanh the cliff stands at 64 sharp.
-
-# %%
-beyond = {name: shares[64:].sum() / shares.sum() for name, shares in energy.items()}
-print("variance beyond 64 dimensions:", {name: f"{share:.1g}" for name, share in beyond.items()})
-assert beyond["generated, before tanh"] < 1e-9 and beyond["real noise"] > 0.5
-
-# %% [markdown]
-# ## Exercises
-#
-# 1. Sixteen numbers, but 64 dimensions: where do the others come from? How many would be left without the relu?
-# 2. Would a longer latent vector help? Build untrained generators with 4 to 256 latent elements and compare the effective rank of what
-#    they make. What is the next thing to widen?
-
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
 # ## Solution
-
-# %%
-import keras
-
-from enhsim_tf.realism.measures import effective_rank
-
-linear = keras.Sequential([keras.Input((16,)), keras.layers.Dense(64), keras.layers.Dense(500)])
-print("rank without relu and tanh:", np.linalg.matrix_rank(linear.predict(latent, verbose=0), tol=1e-2))
-
-# %%
-rng = np.random.default_rng(0)
-for number, units in ((4, 64), (16, 64), (64, 64), (256, 64), (256, 512)):
-    model = build_generator(latent=number, hidden_units=units, seed=0)
-    made = model.predict(rng.standard_normal((1_000, number), "float32"), verbose=0)[:, :, 0]
-    print(f"latent {number:3}, hidden {units:3}: effective rank {effective_rank(made):5.1f}")
-print(f"real noise: {effective_rank(real):.1f}")
+#
+# <details><summary>1. Without relu</summary>
+#
+# ```python
+# rank_without_relu = 16
+# ```
+#
+# Without relu everything is one linear map from 16 dimensions, so 16 is the rank. The relu folds the 16-dimensional space, so that its
+# image bends through up to 64 dimensions.
+#
+# </details>
 
 # %% [markdown]
-# <details><summary>What to say about it</summary>
+# <details><summary>2. Which change helps</summary>
 #
-# 1. The relu folds the 16-dimensional space, so that its image bends through up to 64 dimensions. Without it everything is one linear
-#    map from 16 dimensions, and 16 is the rank.
-# 2. A longer vector helps until the 64 hidden neurons are the bottleneck; then they must be widened too. Even then, training decides
-#    how much of the room is used. A generator that gets a random number for *every sample*, and works along time, does not have the
-#    problem at all.
+# ```python
+# def rank_of_untrained(latent, hidden):
+#     keras.utils.set_random_seed(0)
+#     model = keras.Sequential(
+#         [
+#             keras.Input((latent,)),
+#             layers.Dense(hidden, activation="relu", kernel_initializer="he_uniform"),
+#             layers.BatchNormalization(),
+#             layers.Dense(500, activation="tanh", kernel_initializer="he_uniform"),
+#         ]
+#     )
+#     draws = np.random.default_rng(0).standard_normal((1_000, latent), "float32")
+#     return rank(model.predict(draws, verbose=0))
+#
+#
+# for sizes in ((16, 64), (256, 64), (16, 512), (256, 512)):
+#     print(sizes, f"effective rank {rank_of_untrained(*sizes):.0f}")
+# ```
+#
+# Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it. Only
+# both together come near the rank of real noise, and training still decides how much of the room is used. A generator that gets a
+# random number for *every sample* and works along time does not have the problem at all.
 #
 # </details>

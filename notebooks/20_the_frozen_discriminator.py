@@ -1,35 +1,43 @@
 # %% [markdown]
-# # The frozen discriminator: a trap
+# # The frozen discriminator: a pitfall of Keras 3
+#
+# **Question:** why does the classic way to train a GAN teach the discriminator nothing under Keras 3, and why does nobody notice?
+#
+# - **After this lesson** you can recognise the pitfall in code, explain it, write the step that works, and write the test that would
+#   have found it.
+# - **You should know** adversarial training (notebook 11).
+# - **Running time:** the first cell prints it.
+# - **Terms:** [generator and discriminator](../docs/glossary.md#generator-and-discriminator),
+#   [adversarial loss](../docs/glossary.md#adversarial-loss); *freezing* a network: a step uses its weights and does not change them.
 #
 # **What the paper says** (section 2.3): after the discriminator's turn its "weights are frozen, and the generator is trained as part of
 # the entire GAN model". The paper ran on TensorFlow 2.1, and so did the classic way to write that sentence down: compile the
-# discriminator, set `trainable = False`, compile the stack. Countless tutorials have it. Under Keras 3 it trains nothing, and hardly
-# says so. This notebook runs it, watches, and mends it.
-
-# %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
-import numpy as np
-
-from enhsim_tf.common.plot_style import GENERATED, REAL
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
-
-experiment = open_experiment()
-claim("C5")
+# discriminator, set `trainable = False`, compile the stack. Many tutorials have it. Under Keras 3 it does not train the discriminator,
+# and hardly says so.
 
 # %%
 import warnings
 
+import numpy as np
+
+from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
+from enhsim_tf.reproduce.lesson import check_answer, say
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
+
+experiment = open_experiment(lesson="20")
+claim("C5")
+
+# %%
 import keras
+import tensorflow as tf
+from keras import layers
 
 print("Keras", keras.__version__)
 
 # %% [markdown]
 # ## The plan
 #
-# Both ways draw the same picture, so we keep it in view. In each phase one network learns and the other is frozen:
+# In each phase one network learns and the other is frozen:
 
 # %%
 _ = show(experiment, "fig11_gan_training")
@@ -39,28 +47,59 @@ _ = show(experiment, "fig11_gan_training")
 #
 # A small pair of networks and the real noise, so that sixty iterations take seconds.
 
+
 # %%
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.generator import build_generator
+def small_pair():
+    keras.utils.set_random_seed(0)  # the same first weights each time
+    he = {"kernel_initializer": "he_uniform"}
+    generator = keras.Sequential(
+        [
+            keras.Input((16,)),
+            layers.Dense(64, "relu", **he),
+            layers.BatchNormalization(),
+            layers.Dense(100, "tanh", **he),
+            layers.Reshape((100, 1)),
+        ]
+    )
+    discriminator = keras.Sequential(
+        [
+            keras.Input((100, 1)),
+            layers.Conv1D(32, 20, strides=4, activation="relu", **he),
+            layers.GlobalMaxPooling1D(),
+            layers.Dense(25, "relu", **he),
+            layers.Dense(1, "sigmoid", **he),
+        ]
+    )
+    return generator, discriminator
+
 
 real_noise = experiment.data.noise_windows("train", 1_000, "notebook")[:, :100, None]
-discriminator, generator = build_discriminator(100, filters=32, seed=0), build_generator(100, seed=0)
+generator, discriminator = small_pair()
 
 discriminator.compile("adam", "binary_crossentropy")
 discriminator.trainable = False  # meant for the stack below
 combined = keras.Sequential([generator, discriminator])
 combined.compile("adam", "binary_crossentropy")
 
+# %% [markdown]
+# The loop of the tutorials. The losses are computed separately, because the numbers that `train_on_batch` returns in Keras 3 are running
+# means over all its calls.
+
 # %%
-rng, real, generated = np.random.default_rng(0), np.ones((64, 1)), np.zeros((64, 1))
-start, frozen = discriminator.get_weights(), []
+rng, real_tags, generated_tags = np.random.default_rng(0), np.ones((64, 1)), np.zeros((64, 1))
+loss, start, classic_losses = keras.losses.BinaryCrossentropy(), discriminator.get_weights(), []
 with warnings.catch_warnings(record=True) as heard:
     warnings.simplefilter("always")
     for _ in range(60):
         latent = rng.standard_normal((64, 16))
-        of_real = discriminator.train_on_batch(rng.choice(real_noise, 64), real)
-        of_generated = discriminator.train_on_batch(generator.predict_on_batch(latent), generated)
-        frozen.append((of_real, of_generated, combined.train_on_batch(latent, real)))  # tags reversed
+        batches = (
+            (rng.choice(real_noise, 64), real_tags),
+            (generator.predict_on_batch(latent), generated_tags),
+        )
+        classic_losses.append([float(loss(tags, discriminator(rows))) for rows, tags in batches])
+        for rows, tags in batches:
+            discriminator.train_on_batch(rows, tags)
+        combined.train_on_batch(latent, real_tags)  # tags reversed
 
 # %% [markdown]
 # The loop ran to its end without an error and returned losses that move. Did the discriminator?
@@ -74,7 +113,7 @@ assert [warning.category for warning in heard] == [UserWarning]
 
 # %% [markdown]
 # *What to see:* six times zero. `discriminator.train_on_batch` computed a loss, took the gradient with respect to an empty list of
-# weights, and told nobody but in one warning, once.
+# weights, and told it in one warning, once.
 #
 # ## Why
 #
@@ -94,104 +133,168 @@ assert trainable["discriminator"] == 0 and trainable["stack"] == trainable["gene
 # %% [markdown]
 # ## The right way
 #
-# Do not rely on a moment. Freezing is not a state of a layer but a *list*: the weights that the optimiser is handed. The package names
-# them in each phase:
+# Do not rely on a moment. Freezing is not a state of a layer but a *list*: the weights that the optimiser is handed. Both updates name
+# theirs:
 
 # %%
-import inspect
+generator, discriminator = small_pair()
+optimizers = [keras.optimizers.Adam(0.001) for _ in range(2)]
 
-from enhsim_tf import NoiseGAN
 
-print(inspect.getsource(NoiseGAN._update_discriminator))
+def update(optimizer, weights, error):
+    with tf.GradientTape() as tape:
+        value = error()
+    optimizer.apply(tape.gradient(value, weights), weights)  # these weights move, and no others
+    return float(value)
 
-# %% [markdown]
-# The same networks with the same first weights, trained for as long:
 
-# %%
-pair = build_generator(100, seed=0), build_discriminator(100, filters=32, seed=0)
-gan = NoiseGAN(*pair, batch_size=64, seed=0)
-history = gan.fit(real_noise[:, :, 0], num_iterations=60, record_every=1, verbose=False)
-rightly_moved = [
-    float(np.abs(now - before).max()) for now, before in zip(gan.discriminator.get_weights(), start)
-]
+rng, named_losses = np.random.default_rng(0), []
+for _ in range(60):
+    latent = rng.standard_normal((64, 16), "float32")
+    batches = (rng.choice(real_noise, 64), real_tags), (generator(latent), generated_tags)
+    weights = discriminator.trainable_variables
+    named_losses.append(
+        [update(optimizers[0], weights, lambda: loss(tags, discriminator(rows))) for rows, tags in batches]
+    )
+    weights = generator.trainable_variables
+    update(optimizers[1], weights, lambda: loss(real_tags, discriminator(generator(latent, training=True))))
+
+rightly_moved = [float(np.abs(now - before).max()) for now, before in zip(discriminator.get_weights(), start)]
 print("largest change of each of its weights:", np.round(rightly_moved, 3))
 assert min(rightly_moved) > 0
 
+# %% [markdown]
+# `NoiseGAN` in the package does the same (notebook 11 asserts it, number by number). Now look at the losses of both ways:
+
 # %%
 losses = {
-    "compile, freeze, compile": np.array(frozen).T[:2],
-    "named weights": (history["loss_real"], history["loss_generated"]),
+    "compile, freeze, compile: it never learns": np.array(classic_losses),
+    "named weights: it learns": np.array(named_losses),
 }
 alt = "Loss of the discriminator on real and generated noise: the classic pattern, and named weights"
-with drawing(alt, 2, 2.3, sharey=True) as panels:
-    for panel, (name, (of_real, of_generated)) in zip(panels, losses.items()):
-        panel.plot(of_real, color=REAL, label="real")
-        panel.plot(of_generated, color=GENERATED, linestyle="--", label="generated")
-        panel.set(title=name, xlabel="iteration", ylabel="loss of the discriminator", ylim=(0, None))
+title = "Both ways draw curves that look like training"
+with drawing(alt, 2, 2.4, title, sharey=True) as panels:
+    for panel, (name, curves) in zip(panels, losses.items()):
+        panel.plot(curves[:, 0], color=REAL, label="real noise")
+        panel.plot(curves[:, 1], color=GENERATED, linestyle=DASHED, label="generated noise")
+        panel.set(title=name, xlabel="iteration", ylabel="cross-entropy of the discriminator", ylim=(0, None))
         panel.legend(frameon=False)
 
 # %% [markdown]
 # *What to see:* both losses change, so both look like training. On the left only the generator learns, against a discriminator
-# that does not: the loss on generated noise *rises*. On the right the discriminator learns to recognise generated noise within a few
-# steps.
+# that does not. On the right the discriminator learns to recognise generated noise within a few steps.
 
 # %%
-first, last = np.array(frozen)[[0, -1], 1], history["loss_generated"][[0, -1]]
-print("loss on generated noise, first and last: classic", first.round(2), " named weights", last.round(2))
-assert first[1] > first[0] and last[1] < last[0] / 2
+(classic_first, classic_last), (named_first, named_last) = (
+    np.array(curves)[[0, -1], 1] for curves in losses.values()
+)
+say(
+    f"Loss on generated noise, first and last: **{classic_first:.2f} → {classic_last:.2f}** with the classic pattern, "
+    f"**{named_first:.2f} → {named_last:.2f}** with named weights."
+)
+assert classic_last > classic_first and named_last < named_first / 2
 
 # %% [markdown]
 # ## Exercises
 #
-# 1. Keras 3 reads `trainable` when the training step is *built*. Rescue the classic pattern with one added line, and say why you would
-#    still not use it.
-# 2. Write the test that would have caught this, in at most five lines, for any function that makes a training step.
+# **1.** Keras 3 reads `trainable` when the training step is *built*. Rescue the classic pattern: change one line of the function, or add
+# one. Then say why you would still not use it.
 
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
-# ## Solution
 
 # %%
-rescued = build_discriminator(100, filters=32, seed=0)
-rescued.compile("adam", "binary_crossentropy")
-rescued.train_on_batch(real_noise[:64], real)  # the added line: it builds the step while all is trainable
-rescued.trainable = False
-before = rescued.get_weights()
-rescued.train_on_batch(real_noise[:64], real)
-moved = [bool((now != old).any()) for now, old in zip(rescued.get_weights(), before)]
-print("moved after the freeze:", moved)
-assert all(moved)
+def rescued_pattern():
+    _, judge = small_pair()
+    judge.compile("adam", "binary_crossentropy")
+    # your code: one line
+    judge.trainable = False
+    return judge
+
 
 # %%
-before = rescued.get_weights()
+judge, was = rescued_pattern(), small_pair()[1].get_weights()
 with warnings.catch_warnings(action="ignore"):  # the warning that we know
-    rescued.train_on_batch(real_noise[:32], real[:32])  # a new batch shape: the step is built anew
-moved = [bool((now != old).any()) for now, old in zip(rescued.get_weights(), before)]
-print("moved by a batch of another size:", moved)
-assert not any(moved)
-
-
-# %%
-def moves_exactly(step, learns, rests):
-    before = [weight.numpy().copy() for weight in learns + rests]
-    step()
-    moved = [bool((weight.numpy() != old).any()) for weight, old in zip(learns + rests, before)]
-    assert moved == [True] * len(learns) + [False] * len(rests)
-
-
-# %%
-rows, tags = keras.ops.convert_to_tensor(real_noise[:64]), keras.ops.ones((64, 1))
-learns, rests = gan.discriminator.trainable_variables, gan.generator.trainable_variables
-moves_exactly(lambda: gan._update_discriminator(rows, tags), learns, rests)
+    judge.train_on_batch(real_noise[:64], real_tags)
+changed = [bool((now != before).any()) for now, before in zip(judge.get_weights(), was)]
+check_answer(
+    changed if any(changed) else None,
+    lambda moves: all(moves) and not judge.trainable,
+    "The step is built at the first call that trains.",
+)
 
 # %% [markdown]
-# <details><summary>What to say about it</summary>
+# **2.** Write the test that would have found the pitfall, for any function `step()`: return whether it moves *every* weight of the list
+# `learns` and *no* weight of the list `rests`.
+
+
+# %%
+def moves_exactly(step, learns, rests): ...  # your code; weight.numpy() is the value of a weight
+
+
+# %%
+def honest():
+    update(
+        optimizers[0],
+        discriminator.trainable_variables,
+        lambda: loss(real_tags, discriminator(real_noise[:64])),
+    )
+
+
+def lazy():
+    pass
+
+
+def greedy():
+    honest()
+    generator.trainable_variables[0].assign_add(tf.ones_like(generator.trainable_variables[0]))
+
+
+lists = discriminator.trainable_variables, generator.trainable_variables
+answers = [moves_exactly(step, *lists) for step in (honest, lazy, greedy)]
+check_answer(
+    None if answers[0] is None else answers,
+    lambda found: [bool(answer) for answer in found] == [True, False, False],
+    "Copy all weights before the step, and compare each of them after it.",
+)
+
+# %% [markdown]
+# ## Solution
 #
-# 1. A step that was built keeps the weights it was built with. The rescue works by the same accident that broke the pattern: what is
-#    trained depends on *when something was first called*. A new batch shape, another `compile`, a saved and loaded model: each builds
-#    the step again, frozen. (Setting `trainable` to `True` and `False` around the calls works no better: what counts is its value when
-#    the step is built.)
-# 2. Take the weights that should learn and those that should rest, do one step, and compare. The package's own tests do this for both
-#    phases over several steps, and turn Keras' UserWarnings into errors. A plot of losses would not have caught it; the left panel
-#    above is the proof.
+# <details><summary>1. The rescue</summary>
+#
+# ```python
+# def rescued_pattern():
+#     _, judge = small_pair()
+#     judge.compile("adam", "binary_crossentropy")
+#     judge.train_on_batch(real_noise[:64], real_tags)  # builds the step while all is trainable
+#     judge.trainable = False
+#     return judge
+#
+#
+# judge = rescued_pattern()
+# before = judge.get_weights()
+# with warnings.catch_warnings(action="ignore"):
+#     judge.train_on_batch(real_noise[:32], real_tags[:32])  # a new batch shape: the step is built anew
+# print("moved by a batch of another size:", [bool((now != old).any()) for now, old in zip(judge.get_weights(), before)])
+# ```
+#
+# A step that was built keeps the weights it was built with. The rescue works by the same accident that broke the pattern: what is
+# trained depends on *when something was first called*. A new batch shape, another `compile`, a saved and loaded model: each builds
+# the step again, frozen.
+#
+# </details>
+
+# %% [markdown]
+# <details><summary>2. The test</summary>
+#
+# ```python
+# def moves_exactly(step, learns, rests):
+#     before = [weight.numpy().copy() for weight in (*learns, *rests)]
+#     step()
+#     moved = [bool((weight.numpy() != old).any()) for weight, old in zip((*learns, *rests), before)]
+#     return moved == [True] * len(learns) + [False] * len(rests)
+# ```
+#
+# The package's own tests do this for both phases over several steps, and turn Keras' UserWarnings into errors. A plot of losses would
+# not have found it; the left panel above is the proof.
 #
 # </details>

@@ -1,140 +1,180 @@
 # %% [markdown]
 # # Is it real enough?
 #
+# **Question:** which measure notices that generated noise is not real, and which does not?
+#
+# - **After this lesson** you can choose measures of similarity, give each a floor, and explain why a detector finds a difference that no
+#   histogram shows.
+# - **You should know** the generator and the effective rank (notebook 09), and the PCA residual (notebook 13).
+# - **Running time:** the first cell prints it.
+# - **Terms:** *power spectrum*: the variance of noise by frequency;
+#   [real-vs-real baseline](../docs/glossary.md#real-vs-real-baseline), also *floor*: the value of a measure between two sets of *real*
+#   windows; [distance of distributions](../docs/glossary.md#distance-of-distributions).
+#
 # **What the paper says** (section 2.3): "After 1,000 iterations, the generated noise is sufficiently similar to the actual noise."
-# Similar by which measure, and sufficient for what? This notebook compares generated and real noise, measure by measure, from those
-# that are easy to please to the one that the paper's title is about: a detector.
+# Similar by which measure, and sufficient for what?
 
 # %%
-import sys
-
-sys.path.insert(0, "..")  # the clone that this notebook lies in
-
 import numpy as np
 
-from enhsim_tf.common.plot_style import COARSE, GENERATED, QUIET, REAL
+from enhsim_tf.common.plot_style import DASHED, GENERATED, QUIET, REAL
 from enhsim_tf.realism import measures
+from enhsim_tf.reproduce.lesson import check_answer, say
 from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment()
+experiment = open_experiment(lesson="21")
 claim("C6", "C8")
 
 # %% [markdown]
-# Three noises: the real one, taken from held-out telemetry; the GAN's; and the plainest rival there is, independent Gaussian numbers of
-# the standard deviation of the training noise.
+# Three noises: the real one, from held-out telemetry; the GAN's; and the plainest rival there is, independent Gaussian numbers of the
+# standard deviation of the training noise. Notebook 05 asks you to tell the first two apart by eye.
 
 # %%
-from enhsim_tf.noise.surrogates import GaussianNoise
-
 is_full = experiment.settings.budget == "full"  # a smoke run makes noise of the wrong size
 real = experiment.data.noise_windows("test", None)
-surrogate = GaussianNoise.fit(experiment.data.noise_windows("train", None))
-noises = {"real": real, "GAN": experiment.simulator.noise.generate(len(real), seed=1)}
-noises["Gaussian"] = surrogate.generate(len(real), seed=1)
-colors = {"real": REAL, "GAN": GENERATED, "Gaussian": COARSE}
+training_noise = experiment.data.noise_windows("train", None)
+gaussian = training_noise.std(dtype=float) * np.random.default_rng(1).standard_normal(real.shape)
+noises = {"real": real, "GAN": experiment.simulator.noise.generate(len(real), seed=1), "Gaussian": gaussian}
+looks = {"real": (REAL, "-"), "GAN": (GENERATED, DASHED), "Gaussian": (QUIET, ":")}
 _ = show(experiment, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# ## What is easy to match: values and spectrum
+# ## Easy to match: values and spectrum
+#
+# The power at frequency $k/N$ is the mean over the windows of $|\sum_t h_t x_t\,e^{-2\pi ikt/N}|^2/\sum_t h_t^2$. The taper $h$ fades each
+# window of $N=500$ samples in and out, so that its edges do not spread over all frequencies. White noise has its variance at each
+# frequency.
+
+
+# %%
+def power(windows):
+    taper = np.hanning(502)[1:-1]
+    transformed = np.fft.rfft(windows.astype(float) * taper, axis=1)[:, 1:]  # without the mean
+    return np.mean(np.abs(transformed) ** 2, axis=0) / np.sum(taper**2)
+
+
+frequency = np.arange(1, 251) / 500  # cycles a sample; a sample is 1 s, so this is in Hz
+spectrum = {name: power(windows) for name, windows in noises.items()}
+np.testing.assert_allclose(spectrum["real"], measures.power_spectrum(real), rtol=1e-9)
 
 # %%
 alt = "Histogram of the values and mean power spectrum of real, GAN and Gaussian noise"
-edges, frequency = np.linspace(-0.4, 0.4, 81), np.arange(1, 251) / 500
-with drawing(alt, 2, 2.3) as (left, right):
-    for name, rows in noises.items():
-        left.hist(rows.ravel(), edges, density=True, histtype="step", color=colors[name], label=name)
-        right.plot(frequency, measures.power_spectrum(rows), color=colors[name])
-    left.set(xlabel="value", ylabel="density")
-    right.set(xlabel="frequency (cycles a sample)", ylabel="power (value² a bin)", yscale="log")
+title = "Values agree, and spectra agree in level; only the real one has a spike on the left"
+edges = np.linspace(-0.4, 0.4, 81)
+with drawing(alt, 2, 2.5, title) as (left, right):
+    for name, windows in noises.items():
+        color, style = looks[name]
+        left.hist(
+            windows.ravel(), edges, density=True, histtype="step", color=color, linestyle=style, label=name
+        )
+        right.plot(frequency, spectrum[name], color=color, linestyle=style, linewidth=0.8)
+    left.set(xlabel="noise (dimensionless)", ylabel="density")
+    right.set(xlabel="frequency (Hz)", ylabel="power (value², dimensionless)", yscale="log")
     left.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the histograms lie on top of each other; the spectra share their level, though the GAN's is bumpy, and only the real
-# one has the spike on the far left: a trace of the satellite's 2-minute rotation, which the moving average let through (notebook 08).
+# *What to see:* the histograms lie on top of each other, and the spectra share their level. Only the real one has the spike on the far
+# left, a trace of the satellite's 2-minute rotation that the moving average let through (notebook 08).
 
 # %%
-spectrum = {name: measures.power_spectrum(rows) for name, rows in noises.items()}
 spike = np.argmin(np.abs(frequency - 1 / 120))
-height = {name: float(power[spike] / np.median(power)) for name, power in spectrum.items()}
-bumps = {name: float(np.std(np.log(power[10:]))) for name, power in spectrum.items()}
-print(
-    "power at one cycle in 120 samples, over the median:", {name: round(h, 2) for name, h in height.items()}
-)
-print("sd of the log spectrum beside it:", {name: round(bump, 2) for name, bump in bumps.items()})
+height = {name: values[spike] / np.median(values) for name, values in spectrum.items()}
+bumps = {name: np.std(np.log(values[10:])) for name, values in spectrum.items()}
+for name in noises:
+    print(
+        f"{name:8} power at one cycle in 120 s, over the median: {height[name]:.2f}; sd of ln(power) above it: {bumps[name]:.2f}"
+    )
 assert height["real"] > 1.5 > height["Gaussian"]
 assert not is_full or (height["GAN"] < 1.5 and bumps["GAN"] > 2 * bumps["real"])
 
+# %% [markdown]
+# Three common measures in numbers. Each needs a *floor*: the value between two sets of real windows, which is not zero either.
+
 # %%
-lag_one = {name: measures.autocorrelation(rows, 1)[1] for name, rows in noises.items()}
-for name in ("GAN", "Gaussian"):
-    size = measures.scale_difference(noises[name], real)
-    values = measures.marginal_distance(noises[name], real)
-    lag = abs(lag_one[name] - lag_one["real"])
-    print(f"{name:8} sd off by {np.expm1(size):.1%}, values by {values:.3f} sd, lag-1 by {lag:.3f}")
-    if is_full or name == "Gaussian":
-        assert size < 0.1 and values < 0.1 and lag < 0.05
+again = training_noise[: len(real)]
+for name, windows in {**noises, "real": again}.items():
+    size = np.expm1(measures.scale_difference(windows, real))
+    values = measures.marginal_distance(windows, real)
+    lag = abs(measures.autocorrelation(windows, 1)[1] - measures.autocorrelation(real, 1)[1])
+    kind = "floor" if name == "real" else name
+    print(
+        f"{kind:8} sd off by {size:.1%}; distributions {values:.3f} sd apart; lag-1 correlation off by {lag:.3f}"
+    )
+    assert (name == "GAN" and not is_full) or (size < 0.1 and values < 0.1 and lag < 0.05)
 
 # %% [markdown]
-# ## What an average over windows reveals
+# By these measures, both noises pass; the paper would stop here.
 #
-# Real noise has no memory of where a window was cut: average a thousand windows sample by sample, and nearly nothing is left. Do the
-# same with the GAN's.
+# ## What a mean over windows reveals
+#
+# Real noise does not know where a window was cut: average a thousand windows sample by sample, and nearly nothing is left.
 
 # %%
 alt = "Mean over all windows, sample by sample, of real and of GAN noise"
-with drawing(alt, height=1.8) as panel:
+fixed = {
+    name: np.mean(windows.mean(axis=0) ** 2) / np.mean(windows.astype(float) ** 2)
+    for name, windows in noises.items()
+}
+title = f"{fixed['GAN']:.0%} of the power of the GAN's noise is one pattern, the same in every window"
+with drawing(alt, height=1.9, title=title) as panel:
     for name in ("GAN", "real"):
-        panel.plot(noises[name].mean(axis=0), color=colors[name], linewidth=0.8, label=name)
-    panel.set(xlabel="sample", ylabel="mean over windows")
-    panel.margins(y=0.25)
+        panel.plot(noises[name].mean(axis=0), color=looks[name][0], linewidth=0.8, label=name)
+    panel.set(xlabel="time in the window (s)", ylabel="mean over windows")
+    panel.margins(y=0.3)
     panel.legend(frameon=False, ncols=2, loc="upper right")
 
 # %% [markdown]
-# *What to see:* the GAN has one fixed pattern under all of its windows. It is as rough as noise, so nobody sees it in a single window,
-# nor in a histogram; two windows laid over each other show it. The bumps of the spectrum above are its bumps.
+# *What to see:* one fixed pattern lies under all windows of the GAN. It is as rough as noise, so nobody sees it in a single window or in a
+# histogram. The bumps of the spectrum are its bumps.
 
 # %%
-fixed = {name: float(np.mean(rows.mean(axis=0) ** 2) / np.mean(rows**2)) for name, rows in noises.items()}
-for name, share in fixed.items():
-    print(f"{name:8} share of the power that is the same in every window: {share:.1%}")
-assert fixed["GAN"] > 5 * fixed["real"]
-pattern = measures.power_spectrum(noises["GAN"].mean(axis=0)[None])
-alike = np.corrcoef(pattern, spectrum["GAN"])[0, 1]
-print(f"correlation of the pattern's spectrum with that of the windows: {alike:.2f}")
-assert alike > 0.5
+alike = np.corrcoef(power(noises["GAN"].mean(axis=0)[None]), spectrum["GAN"])[0, 1]
+say(
+    "Share of the power that is the same in every window: "
+    + ", ".join(f"{name} **{share:.1%}**" for name, share in fixed.items())
+    + f". Correlation of the pattern's spectrum with that of the GAN's windows: **{alike:.2f}**."
+)
+assert fixed["GAN"] > 5 * fixed["real"] and alike > 0.5
 
 # %% [markdown]
-# ## What is hard: how the windows differ from each other
+# ## Hard to match: how the windows differ from each other
 #
-# Subtract that pattern, since it is the same for all windows, and consider windows as points in 500 dimensions: in how many of them do
-# they vary? The *effective rank* is the exponential of the entropy of the shares of the variance: 1 for points on a line, 500 for an
-# infinite sample of white noise.
+# Subtract that pattern, and consider windows as points in 500 dimensions. In how many of them do they vary? The singular values of the
+# windows say which share of the variance lies in the largest directions.
 
 # %%
-alt = "Variance gathered by the largest directions of real, GAN and Gaussian noise"
-with drawing(alt, height=2.2) as panel:
-    for name, rows in noises.items():
-        energy = np.linalg.svd(rows - rows.mean(axis=0), compute_uv=False) ** 2
-        panel.plot(np.cumsum(energy) / energy.sum(), color=colors[name], label=name)
-    panel.set(xlabel="number of directions", ylabel="share of the variance", ylim=(0, 1.02))
+gathered = {}
+for name, windows in noises.items():
+    energy = np.linalg.svd(windows - windows.mean(axis=0), compute_uv=False) ** 2
+    gathered[name] = np.cumsum(energy) / energy.sum()
+alt = "Share of the variance that the largest directions hold, of real, GAN and Gaussian noise"
+title = f"The 20 largest directions hold {gathered['GAN'][19]:.0%} of the GAN's variance, {gathered['real'][19]:.0%} of the real one"
+with drawing(alt, height=2.3, title=title) as panel:
+    for name, values in gathered.items():
+        color, style = looks[name]
+        panel.plot(np.arange(1, len(values) + 1), values, color=color, linestyle=style, label=name)
+    panel.axvline(20, color=QUIET, linewidth=0.5)
+    panel.set(
+        xlabel="number of directions, the largest first", ylabel="share of the variance", ylim=(0, 1.02)
+    )
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* a few directions hold all of the GAN's variance; the real noise needs hundreds. The GAN's windows lie in a subspace of
-# few dimensions, and each of them could be a window of real noise. That is why no single window looks wrong.
+# *What to see:* few directions hold the GAN's variance; real noise needs hundreds. The GAN's windows lie near a thin sheet in 500
+# dimensions, and each of them alone could be a window of real noise. That is why no single window looks wrong.
 
 # %%
-rank = {name: measures.effective_rank(rows) for name, rows in noises.items()}
-print("effective rank:", {name: round(value, 1) for name, value in rank.items()})
+rank = {name: measures.effective_rank(windows) for name, windows in noises.items()}
+say("Effective rank: " + ", ".join(f"{name} **{value:.0f}**" for name, value in rank.items()) + ".")
 assert rank["GAN"] < {True: 0.2, False: 0.6}[is_full] * rank["real"]  # few windows have little rank to lose
 assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 
 # %% [markdown]
-# ## What a detector sees that a glance does not
+# ## What a detector makes of it
 #
-# Train the simplest detector of directions, PCA, on enhanced windows with the GAN's noise. Its twenty components hold the waveform and
-# then the sheet, nearly all of it: what is left over is tiny, and the threshold with it. A real window has noise in hundreds of
-# directions that the components do not know.
+# Train the PCA residual of notebook 13 on enhanced windows with the GAN's noise. Its twenty components hold the waveform and most of the
+# sheet. What is left over is small, and so is the threshold. A real window has noise in hundreds of directions that the components
+# do not know.
 
 # %%
 from enhsim_tf.detection import metrics
@@ -144,35 +184,50 @@ chosen, simulator = experiment.settings.detectors, experiment.simulator
 healthy = experiment.data.windows("test", None)["target"]
 coarse = experiment.data.windows("train", 2 * chosen.num_windows, "notebook")["coarse"]
 clean = simulator.enhance(coarse)
-added = {"GAN": simulator.noise.generate(len(clean), seed=5)}
-added["Gaussian"] = surrogate.generate(len(clean), seed=5)
+added = {
+    "GAN": simulator.noise.generate(len(clean), seed=5),
+    "Gaussian": training_noise.std(dtype=float) * np.random.default_rng(5).standard_normal(clean.shape),
+}
 
-# %%
-scores, thresholds = {}, {}
-for name, noise in added.items():
+
+def scores_of(noise):
     training, held_back = np.split(clean + noise, 2)
     detector = PCAResidual(chosen.num_components).fit(training)
-    scores[name] = {f"enhanced + {name} noise": detector.score(held_back), "real": detector.score(healthy)}
-    thresholds[name] = metrics.threshold(detector.score(held_back), chosen.false_alarm_rate)
+    own = detector.score(held_back)
+    return own, detector.score(healthy), metrics.threshold(own, chosen.false_alarm_rate)
+
+
+results = {name: scores_of(noise) for name, noise in added.items()}
+alarms = {name: float(np.mean(of_real > limit)) for name, (_, of_real, limit) in results.items()}
 
 # %%
-alt = "What the principal components leave of windows like those trained on and of real ones, for both noises"
-with drawing(alt, 2, 2.3, sharex=True, sharey=True) as panels:
-    for panel, name in zip(panels, scores):
-        for (kind, score), color in zip(scores[name].items(), (colors[name], REAL)):
-            panel.hist(np.log10(score), 40, histtype="step", color=color, label=kind)
-        panel.axvline(np.log10(thresholds[name]), color=QUIET, linestyle=":", label="threshold")
-        panel.set(title=f"trained on enhanced + {name} noise", xlabel="score (log10)", ylabel="windows")
-        panel.margins(y=0.45)
+alt = "Scores of windows like those trained on and of real ones, for GAN noise and for Gaussian noise"
+title = f"With the GAN's noise, {alarms['GAN']:.0%} of real nominal windows raise an alarm; with Gaussian noise, {alarms['Gaussian']:.1%}"
+with drawing(alt, 2, 2.4, title, sharex=True, sharey=True) as panels:
+    for panel, (name, (own, of_real, limit)) in zip(panels, results.items()):
+        color = looks[name][0]
+        panel.hist(np.log10(own), 40, color=color, alpha=0.5, label=f"enhanced + {name} noise")
+        panel.hist(np.log10(of_real), 40, histtype="step", color=REAL, label="real nominal")
+        panel.axvline(
+            np.log10(limit) if np.isfinite(limit) else np.log10(own.max()),
+            color=REAL,
+            linestyle=DASHED,
+            label="threshold",
+        )
+        panel.set(title=f"trained on enhanced + {name} noise", xlabel="score, log10", ylabel="windows")
+        panel.margins(y=0.55)
         panel.legend(frameon=False, loc="upper left")
 
 # %% [markdown]
-# *What to see:* on the left the two kinds of window do not even overlap, and every real one lies beyond the threshold (dotted). On the
-# right, where the added noise is as round as the real one, they cover each other.
+# *What to see:* on the left, the two kinds of windows do not even overlap, and every real one lies beyond the threshold. On the right,
+# where the added noise varies in as many directions as the real one, they cover each other.
 
 # %%
-alarms = {name: np.mean(scores[name]["real"] > thresholds[name]) for name in scores}
-print("healthy real windows that raise an alarm:", {name: f"{rate:.1%}" for name, rate in alarms.items()})
+say(
+    "Nominal real windows that raise an alarm: "
+    + ", ".join(f"{name} **{rate:.1%}**" for name, rate in alarms.items())
+    + "."
+)
 assert not is_full or (alarms["GAN"] > 0.9 and alarms["Gaussian"] < 0.05)
 
 # %% [markdown]
@@ -190,43 +245,81 @@ records = verdict(experiment, "C6", "C8")
 assert records[0]["verdict"] != "reproduced"
 
 # %% [markdown]
-# The answer depends on who asks. A forest that looks at features of single windows is content with the GAN's noise. PCA, which looks at
-# directions, is not to be fooled; the autoencoder stands between them. And the plainest noise, which learned one number from the data,
-# serves better than the network in this example. It has an easy time here: white noise was put in. For noise with structure that a
-# Gaussian cannot have, the question is open again, and effective rank and a detector are the measures to ask it with.
-
-# %% [markdown]
+# The answer depends on who asks. A forest that looks at features of single windows accepts the GAN's noise. PCA, which looks at
+# directions, does not; the autoencoder stands between them. The plainest noise, which learned one number from the data, raises the fewest
+# false alarms in this example. It has an easy time: white noise was put in. For noise with structure that a Gaussian cannot have, the
+# question is open again, and effective rank and a detector are the measures to ask it with.
+#
 # ## Exercises
 #
-# 1. A number needs a floor. Compute the effective rank of 50, 100, 200, 400 and 800 windows of real noise. May one compare a rank from
-#    200 windows with one from 1,000?
-# 2. Raise the effective rank cheaply: mix the GAN's noise with Gaussian noise so that the total variance stays, and find the smallest
-#    share of Gaussian variance at which the PCA residual no longer raises false alarms.
-
-# %% [markdown] jp-MarkdownHeadingCollapsed=true
-# ## Solution
+# **1.** A rank depends on the number of windows. Somebody divides the rank of 200 generated windows by that of 1,000 real ones.
+# By which factor does the *real* noise's rank alone fall if it is computed from 200 instead of 1,000 windows?
 
 # %%
-many = experiment.data.noise_windows("train", 800, "exercise")
-for number in (50, 100, 200, 400, 800):
-    print(f"{number:4} windows: effective rank {measures.effective_rank(many[:number]):.0f}")
+many = experiment.data.noise_windows("train", 1_000, "exercise")
+factor = None  # your answer: rank from 200 windows, divided by rank from 1,000
 
 # %%
-for share in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
-    mixed = clean + np.sqrt(1 - share) * added["GAN"] + np.sqrt(share) * added["Gaussian"]
-    training, held_back = np.split(mixed, 2)
-    detector = PCAResidual(chosen.num_components).fit(training)
-    threshold = metrics.threshold(detector.score(held_back), chosen.false_alarm_rate)
-    alarm = np.mean(detector.score(healthy) > threshold)
-    print(f"Gaussian share {share:.0%}: alarms on {alarm:.1%} of healthy real windows")
+check_answer(
+    factor,
+    lambda answer: abs(answer - measures.effective_rank(many[:200]) / measures.effective_rank(many)) < 0.02,
+    "measures.effective_rank(many[:200])",
+)
 
 # %% [markdown]
-# <details><summary>What to say about it</summary>
+# **2.** Raise the effective rank cheaply: mix the GAN's noise with Gaussian noise such that the total variance stays. Complete the function
+# with the false-alarm rate of the PCA residual when a share of the variance is Gaussian. How large must the share be?
+
+
+# %%
+def alarms_at(gaussian_share):
+    # your code: mix added["GAN"] and added["Gaussian"], and use scores_of
+    return None
+
+
+# %%
+def expected(share):
+    own, of_real, limit = scores_of(np.sqrt(1 - share) * added["GAN"] + np.sqrt(share) * added["Gaussian"])
+    return np.mean(of_real > limit)
+
+
+answers = [alarms_at(share) for share in (0.5, 1.0)]
+check_answer(
+    None if answers[0] is None else answers,
+    lambda found: np.allclose(found, [expected(0.5), expected(1.0)], atol=0.02),
+    "Variances add, so amplitudes get square roots: √(1 − share) and √share.",
+)
+
+# %% [markdown]
+# ## Solution
 #
-# 1. No. The rank cannot exceed the number of windows and grows with it. Every rank in this project is compared with that of as many
-#    real windows.
-# 2. Nearly all of it has to be Gaussian: PCA asks how much is left in the directions that it does not know, and only the Gaussian part
-#    fills them. By then the network has become an ornament. The repair that deserves the name is a generator with a random number for
-#    every sample.
+# <details><summary>1. A rank needs its number of windows</summary>
+#
+# ```python
+# factor = measures.effective_rank(many[:200]) / measures.effective_rank(many)
+# for number in (50, 100, 200, 400, 800):
+#     print(f"{number:4} windows: effective rank {measures.effective_rank(many[:number]):.0f}")
+# ```
+#
+# The rank cannot exceed the number of windows and grows with it. Every rank in this project is compared with that of as many real windows.
+#
+# </details>
+
+# %% [markdown]
+# <details><summary>2. How much Gaussian noise is needed</summary>
+#
+# ```python
+# def alarms_at(gaussian_share):
+#     noise = np.sqrt(1 - gaussian_share) * added["GAN"] + np.sqrt(gaussian_share) * added["Gaussian"]
+#     own, of_real, limit = scores_of(noise)
+#     return np.mean(of_real > limit)
+#
+#
+# print({share: f"{alarms_at(share):.1%}" for share in (0.0, 0.3, 0.5, 0.7, 0.9, 1.0)})
+# ```
+#
+# Nearly all of it has to be Gaussian: PCA asks how much is left in the directions that it does not know, and only the Gaussian part fills
+# them. By then the network has become an ornament. The repair is a generator with a random number for every sample, and a judge that sees
+# more than pieces of 20 samples (`noise/convolutional_gan.py` in the package; notebook 22 compares both).
 #
 # </details>

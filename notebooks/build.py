@@ -5,7 +5,9 @@ Each notebook is stamped with the checksums of its source and of the findings th
 """
 
 import argparse
+import json
 import os
+import re
 import sys
 import time
 from pathlib import Path
@@ -16,6 +18,7 @@ import nbformat
 from jupyter_client.manager import KernelManager
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file, sha256
+from enhsim_tf.reproduce.lesson import STATIC, TIMES
 
 FOLDER = Path(__file__).parent
 STAMP = "enhsim_tf"  # the notebook's metadata that hold its stamp
@@ -24,6 +27,8 @@ FINDINGS = {
     "open_findings(": "robustness",
     "open_labelled(": "labelled",
 }  # what a source calls, and whose findings it shows
+SOLUTION = re.compile(r"```python\n(.*?)```", re.DOTALL)  # the code of a folded solution
+CHECK = "check_answer("  # what a cell calls that checks an answer
 TIMEOUT_S = 1_800  # for one cell: a fresh clone trains in it
 
 
@@ -44,8 +49,37 @@ def read(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
+def solve(notebook: nbformat.NotebookNode) -> None:
+    """Adds to each check of an answer the code of its folded solution, and the check once more.
+
+    The first solution with code belongs to the first check, and so on.
+
+    Raises:
+        ValueError: If there are not as many solutions as checks.
+    """
+    folded = [
+        cell.source for cell in notebook.cells if cell.cell_type == "markdown" and "<details>" in cell.source
+    ]
+    solutions = [code for source in folded for code in SOLUTION.findall(source)]
+    checks = [cell for cell in notebook.cells if cell.cell_type == "code" and CHECK in cell.source]
+    if len(solutions) != len(checks):
+        raise ValueError(
+            f"Expected a folded solution with code for each check. Received: {len(solutions)} for {len(checks)}."
+        )
+    for code, check in zip(solutions, checks, strict=True):
+        at = notebook.cells.index(check) + 1
+        added = [nbformat.v4.new_code_cell(text, metadata={"solved": True}) for text in (code, check.source)]
+        notebook.cells[at:at] = added
+    for number, cell in enumerate(notebook.cells):
+        cell.id = f"cell-{number:02}"
+
+
 def execute(
-    source: Path, budget: str, cache: Path | None = None, kernel: KernelManager | None = None
+    source: Path,
+    budget: str,
+    cache: Path | None = None,
+    kernel: KernelManager | None = None,
+    solved: bool = False,
 ) -> nbformat.NotebookNode:
     """Executes a source in a kernel, in the folder of the notebooks as Jupyter does, and stamps it.
 
@@ -55,14 +89,17 @@ def execute(
         cache: Where finished stages are kept; None keeps them where `reproduce` does.
         kernel: A kernel that goes on to live, with what it has imported; it was started, if at all, for this budget and
             cache. The notebook finds no name of an earlier one. None: a kernel of the notebook's own.
+        solved: Whether the exercises are solved, see `solve`.
 
     Raises:
         nbclient.exceptions.CellExecutionError: If a cell raises.
     """
     notebook = read(source)
-    environment = (
-        os.environ | {"ENHSIM_TF_BUDGET": budget} | ({} if cache is None else {"ENHSIM_TF_CACHE": str(cache)})
-    )
+    if solved:
+        solve(notebook)
+    found = os.pathsep.join(path for path in (str(FOLDER.parent), os.environ.get("PYTHONPATH")) if path)
+    environment = os.environ | {"ENHSIM_TF_BUDGET": budget, STATIC: "1", "PYTHONPATH": found}
+    environment |= {} if cache is None else {"ENHSIM_TF_CACHE": str(cache)}
     client = nbclient.NotebookClient(
         notebook,
         km=kernel,
@@ -139,8 +176,20 @@ def check() -> int:
     return int(any(wrong.values()))
 
 
-def build(budget: str, only: str | None) -> int:
-    """Executes the notebooks, all or the one that is named by its number; a smoke build goes to `smoke/`."""
+def keep_time(source: Path, budget: str, seconds: float) -> None:
+    """Keeps how long a notebook took, which its first cell tells when it is executed next."""
+    path = FOLDER / TIMES
+    took = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    took.setdefault(source.stem[:2], {})[budget] = round(seconds)
+    with replace_file(path) as temporary:
+        temporary.write_text(json.dumps(took, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def build(budget: str, only: str | None, solved: bool = False) -> int:
+    """Executes the notebooks, all or the one that is named by its number.
+
+    A smoke build goes to `smoke/`, and one with solved exercises to `solved/`.
+    """
     chosen = [source for source in sources() if only in (None, source.stem, source.stem[:2])]
     if not chosen:
         print(
@@ -151,10 +200,14 @@ def build(budget: str, only: str | None) -> int:
     from enhsim_tf.reproduce.notebook import open_experiment, prepare
 
     prepare(open_experiment(budget))  # so that no progress bar of a training stays in a notebook
-    folder = FOLDER if budget == "full" else make_folder(FOLDER.parent / "smoke")
+    folder = FOLDER
+    if solved or budget == "smoke":
+        folder = make_folder(FOLDER.parent / ("solved" if solved else "smoke"))
     for source in chosen:
         began = time.perf_counter()
-        notebook = execute(source, budget)
+        notebook = execute(source, budget, solved=solved)
+        if not solved:
+            keep_time(source, budget, time.perf_counter() - began)
         path = folder / source.with_suffix(".ipynb").name
         with replace_file(path) as temporary:
             nbformat.write(notebook, temporary)
@@ -178,8 +231,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--check", action="store_true", help="say which notebooks are stale, and execute nothing"
     )
+    parser.add_argument(
+        "--solved", action="store_true", help="with the exercises solved, for lecturers; writes into solved/"
+    )
     options = parser.parse_args(arguments)
-    return check() if options.check else build(options.budget, options.only)
+    return check() if options.check else build(options.budget, options.only, options.solved)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import io
 import json
 import os
 import tempfile
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import STYLE
 from enhsim_tf.reproduce import figure
 from enhsim_tf.reproduce.caption import figure_caption, in_seeds
+from enhsim_tf.reproduce.lesson import TIMES
 from enhsim_tf.reproduce.paper import claims
 from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.pipeline import Experiment
@@ -72,14 +74,15 @@ class _Lookup(Stages):
         return super().run(name, refuse, *others, **options)
 
 
-def open_experiment(budget: str | None = None) -> Experiment:
-    """Opens the paper's experiment and says which stages are still to be done and how long they take.
+def open_experiment(budget: str | None = None, lesson: str | None = None) -> Experiment:
+    """Opens the paper's experiment and says which stages are still to be done and how long they and the lesson take.
 
     A stage is done when a cell first asks for it, with a progress bar for each training, and kept for all notebooks and
     for `python -m enhsim_tf.reproduce`.
 
     Args:
         budget: `full` or `smoke`; None takes it from the environment variable `ENHSIM_TF_BUDGET`, or `full`.
+        lesson: Number of the notebook, whose running time is told as it was measured when it was built last.
     """
     budget = budget or os.environ.get("ENHSIM_TF_BUDGET", "full")
     if budget not in _TAKES:
@@ -91,10 +94,21 @@ def open_experiment(budget: str | None = None) -> Experiment:
     todo = [f"{stage} (about {known[stage]:.0f} s)" if stage in known else f"{stage} ({_TAKES[budget]})" for stage in missing]
     print(f"{budget.capitalize()} budget, seed {settings.seed}.", end=" ")
     print(f"Still to do, when first needed: {', '.join(todo)}." if todo else "Everything is ready.")
+    if lesson is not None:
+        _tell_time(lesson)
     importlib.import_module(
         "enhsim_tf.keras_tools.backend"
     )  # a notebook that imports Keras itself then computes with the package's settings
     return Experiment(settings, Stages(cache, tell=lambda line: None if line.endswith("(from the cache)") else print(line)), verbose=1)
+
+
+def _tell_time(lesson: str) -> None:
+    """Prints the running time of a notebook at both budgets, from the file that `python -m notebooks.build` writes."""
+    path = _ROOT / "notebooks" / TIMES
+    took = json.loads(path.read_text(encoding="utf-8")).get(lesson, {}) if path.is_file() else {}
+    told = [f"{took[budget]} s at {budget} budget" for budget in _TAKES if budget in took]
+    if told:
+        print(f"Apart from that, this lesson took {' and '.join(told)} when it was last executed for publication.")
 
 
 def prepare(experiment: Experiment) -> list[str]:
@@ -144,17 +158,21 @@ def show_finding(found: dict, name: str) -> None:
 
 
 @contextlib.contextmanager
-def drawing(alt: str, columns: int = 1, height: float = 2.4, **shared: bool) -> Iterator:
+def drawing(alt: str, columns: int = 1, height: float = 2.4, title: str = "", **shared: bool) -> Iterator:
     """A row of panels in the common style, displayed when the `with` block ends.
 
     Args:
         alt: Text alternative.
         columns: Number of panels.
         height: Height in inches.
+        title: What the picture says, above the panels.
         **shared: What `matplotlib.figure.Figure.subplots` takes, for example `sharey`.
     """
     with matplotlib.style.context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(7.2, height), layout="constrained")
+        if title:
+            lines = textwrap.fill(title, 96)
+            figure.suptitle(lines, x=0.012, ha="left", size=9, weight="bold")
         yield figure.subplots(1, columns, **shared)
         picture = io.BytesIO()
         figure.savefig(picture, format="png", metadata={"Software": None})

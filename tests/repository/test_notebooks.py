@@ -13,7 +13,7 @@ import pytest
 from jupyter_client.manager import KernelManager
 from PIL import Image
 
-from enhsim_tf.reproduce import figure
+from enhsim_tf.reproduce import figure, lesson
 from enhsim_tf.reproduce import notebook as teaching
 from enhsim_tf.reproduce.paper.claims import CLAIMS
 from enhsim_tf.reproduce.paper.figures import FIGURES
@@ -26,6 +26,8 @@ SOURCES = build.sources()
 NAMES = """00_tour 01_pipeline 02_source_target 03_enhancer 04_enhanced_simulation 05_real_or_generated 08_source_noise 09_generator
     10_discriminator 11_gan_training 12_accuracy_loss 13_combined 20_the_frozen_discriminator 21_is_it_real_enough
     22_false_alarms 23_degraded_modes 24_real_telemetry""".split()
+LESSONS = [source for source in SOURCES if source.stem[:2] not in ("22", "24")]
+each_lesson = pytest.mark.parametrize("source", LESSONS, ids=lambda source: source.stem)
 each_notebook = pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 
 
@@ -35,13 +37,6 @@ def code_of(source):
 
 def trees_of(source):
     return [ast.parse(code) for code in code_of(source)]
-
-
-def definitions(tree):
-    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef)]
-
-
-PACKAGE_NAMES = {node.name for path in (ROOT / "enhsim_tf").rglob("*.py") for node in definitions(ast.parse(path.read_text("utf-8")))}
 
 
 # -- executed ----------------------------------------------------------------------------------------------------------------
@@ -71,8 +66,14 @@ def kernel():
 
 
 @each_notebook
-def test_it_runs(source, kernel, cache):
-    notebook = build.execute(source, "smoke", cache, kernel)
+def test_it_runs_and_its_solutions_are_right(source, kernel, cache):
+    notebook = build.execute(source, "smoke", cache, kernel, solved=True)
+    starters, solved = ([] for _ in range(2))
+    for cell in notebook.cells:
+        if cell.cell_type == "code" and build.CHECK in cell.source:
+            (said,) = (output.text.strip() for output in cell.outputs)
+            (solved if cell.metadata.get("solved") else starters).append(said)
+    assert (set(starters), set(solved)) in (({lesson.NOT_ANSWERED}, {lesson.RIGHT}), (set(), set()))
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     printed = [output for output in outputs if output.output_type == "stream"]
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
@@ -94,19 +95,6 @@ def test_a_notebook_finds_no_name_of_an_earlier_one_in_a_shared_kernel(kernel, t
 
 
 # -- held to their form ------------------------------------------------------------------------------------------------------
-
-
-@each_notebook
-def test_cells_are_short(source):
-    too_long = [cell.source for cell in build.read(source).cells if len(cell.source.splitlines()) > 12]
-    assert too_long == []
-
-
-@each_notebook
-def test_it_defines_no_long_functions_and_repeats_none_of_the_package(source):
-    for node in (node for tree in trees_of(source) for node in definitions(tree)):
-        assert node.end_lineno - node.lineno < 5
-        assert node.name not in PACKAGE_NAMES
 
 
 @each_notebook
@@ -133,10 +121,57 @@ def test_each_what_to_see_note_is_followed_by_assertions(source):
 @each_notebook
 def test_exercises_come_with_a_folded_solution_at_the_end(source):
     cells = build.read(source).cells
-    titles = [cell.source.splitlines()[0] for cell in cells]
-    assert titles.index("## Exercises") < titles.index("## Solution")
-    assert cells[titles.index("## Solution")].metadata["jp-MarkdownHeadingCollapsed"] is True
-    assert any("<details>" in cell.source for cell in cells[titles.index("## Solution") :])
+    solution = next(number for number, cell in enumerate(cells) if cell.source.startswith("## Solution"))
+    assert any("## Exercises\n" in cell.source for cell in cells[:solution])
+    assert any("<details>" in cell.source for cell in cells[solution:])
+
+
+@each_lesson
+def test_a_lesson_checks_the_students_answers_and_folds_its_solutions_away(source):
+    cells = build.read(source).cells
+    checks = [number for number, cell in enumerate(cells) if cell.cell_type == "code" and build.CHECK in cell.source]
+    solution = next(number for number, cell in enumerate(cells) if cell.source.startswith("## Solution"))
+    assert len(checks) >= 2 and checks[-1] < solution
+    assert all(cell.cell_type == "markdown" for cell in cells[solution:])
+    build.solve(build.read(source))  # raises if a check has no solution
+
+
+@each_lesson
+def test_a_lesson_begins_with_its_question_and_what_it_needs(source):
+    first = build.read(source).cells[0].source
+    wanted = ("**Question:**", "**After this lesson**", "**You should know**", "**Running time:**", "**Terms:**")
+    assert [words for words in wanted if first.count(words) != 1] == []
+    assert f'lesson="{source.stem[:2]}"' in "".join(code_of(source))
+
+
+def test_a_check_without_a_solution_is_refused():
+    code = "check_answer(None, bool, '')"
+    cells = [nbformat.v4.new_code_cell(code), nbformat.v4.new_markdown_cell("<details>\n\n```text\nx\n```\n\n</details>")]
+    with pytest.raises(ValueError, match="0 for 1"):
+        build.solve(nbformat.v4.new_notebook(cells=cells))
+
+
+def test_a_solution_is_run_after_the_check_that_it_belongs_to():
+    texts = ["check_answer(a, bool, '')", "b = None", "check_answer(b, bool, '')"]
+    folded = nbformat.v4.new_markdown_cell("<details>\n\n```python\na = 1\n```\n\n```python\nb = 2\n```\n\n</details>")
+    notebook = nbformat.v4.new_notebook(cells=[*map(nbformat.v4.new_code_cell, texts), folded])
+    build.solve(notebook)
+    solved = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    assert solved == [texts[0], "a = 1\n", texts[0], "b = None", texts[2], "b = 2\n", texts[2]]
+
+
+@pytest.mark.parametrize("number", ["01", "02", "03", "04", "08", "09", "10", "11", "12", "13", "21", "23"])
+def test_the_mechanism_that_a_lesson_writes_out_is_compared_with_the_package(number):
+    (source,) = (source for source in SOURCES if source.stem.startswith(number))
+    assert "np.testing.assert_" in "".join(code_of(source))
+
+
+def test_pictures_that_the_prose_shows_are_there_and_small():
+    shown = [
+        name for source in SOURCES for cell in build.read(source).cells for name in re.findall(r"!\[[^]]{20,}\]\((.*?)\)", cell.source)
+    ]
+    assert shown == ["../figures/noise_forming.gif"]
+    assert 0 < (ROOT / "notebooks" / shown[0]).stat().st_size < build.MAX_BYTES
 
 
 @each_notebook
@@ -277,6 +312,19 @@ def test_the_expected_time_is_what_it_took_where_the_figures_were_made(tmp_path,
     assert "enhancer (about 65 s)" in (said := capsys.readouterr().out) and "noise GAN (minutes)" in said
     teaching.open_experiment("smoke")
     assert "enhancer (seconds)" in capsys.readouterr().out
+
+
+def test_the_time_of_a_lesson_is_what_it_took_when_it_was_built(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("ENHSIM_TF_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(teaching, "_ROOT", tmp_path)
+    monkeypatch.setattr(build, "FOLDER", tmp_path / "notebooks")
+    teaching.open_experiment("smoke", lesson="04")
+    assert "lesson" not in capsys.readouterr().out
+    (tmp_path / "notebooks").mkdir()
+    for budget, seconds in (("smoke", 4.4), ("full", 31.6)):
+        build.keep_time(tmp_path / "04_tiny.py", budget, seconds)
+    teaching.open_experiment("smoke", lesson="04")
+    assert "this lesson took 32 s at full budget and 4 s at smoke budget" in capsys.readouterr().out
 
 
 def test_the_budget_comes_from_the_environment(tmp_path, monkeypatch, refused):

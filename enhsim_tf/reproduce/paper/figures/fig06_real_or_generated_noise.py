@@ -25,8 +25,7 @@ def arrays(experiment: Experiment) -> Arrays:
 def draw(data: Arrays) -> matplotlib.figure.Figure:
     """Draws Figure 6."""
     generated, real, number = (float(data[f"rank_{key}"]) for key in ("generated", "real", "windows"))
-    ranks = f"{generated:.0f} for {number:,.0f} windows of generated noise, {real:.0f} for as many of real noise"
-    return guessing_figure(data, "windows of noise", f"Effective rank (number of dimensions in which windows vary): {ranks}. ")
+    return guessing_figure(data, "windows of noise", f"effective rank of {number:,.0f} windows: {generated:.0f} generated, {real:.0f} real")
 
 
 FIGURE = PaperFigure(
@@ -34,7 +33,7 @@ FIGURE = PaperFigure(
     title="Real or generated: windows of noise (counterpart of a borrowed picture)",
     alt=(
         "Real and generated windows of noise in random order, each with a letter, for the reader to tell apart; the answer is "
-        "printed upside down at the foot. The line under the title gives the effective rank of generated and of real noise."
+        "printed upside down at the foot, with the effective rank of generated and of real noise."
     ),
     drawn_by=draw,
     arrays=arrays,

@@ -26,7 +26,7 @@ def draw(data: Arrays) -> matplotlib.figure.Figure:
     return guessing_figure(
         data,
         "stretches of telemetry",
-        "A generated stretch is blended from overlapping windows; its noise repeats a pattern every half window. ",
+        "the noise of a generated stretch repeats a pattern every half window",
         columns=1,
     )
 

@@ -16,15 +16,15 @@ def shuffled(real: np.ndarray, generated: np.ndarray, rng: np.random.Generator) 
 
 
 def guessing_figure(data: Arrays, what: str, remark: str = "", columns: int = 4) -> matplotlib.figure.Figure:
-    """Real and generated rows in random order; the answer is printed upside down at the bottom."""
+    """Real and generated rows in random order; the answer, and a remark that would help to find it, are upside down at the bottom."""
     number, generated = len(data["rows"]), int(data["is_generated"].sum())
     rows = -(-number // columns)
     verb = "is" if generated == 1 else "are"
     figure, down = new_sheet(
         DOUBLE,
-        1.24 + 0.95 * rows + 0.16 * bool(remark) if columns > 1 else 1.3 + 0.72 * rows,
+        1.24 + 0.95 * rows if columns > 1 else 1.3 + 0.72 * rows,
         f"{in_words(generated).capitalize()} of these {in_words(number)} {what} {verb} generated. Which?",
-        f"{remark}Counterpart, not a reproduction, of a generated face that the paper shows here.",
+        "Counterpart, not a reproduction, of a generated face that the paper shows here.",
     )
     axes = panels(figure, down + 0.2, rows, columns, gap=(0.24, 0.14), sharex=True, sharey=True)
     letters = "abcdefghijklmnop"[:number]
@@ -34,7 +34,7 @@ def guessing_figure(data: Arrays, what: str, remark: str = "", columns: int = 4)
     name_axes(axes, data)
     answer = ", ".join(letter for letter, is_generated in zip(letters, data["is_generated"], strict=True) if is_generated)
     width, height = figure.get_size_inches()
-    figure.text(
-        1 - EDGE / width, (FOOT + 0.04) / height, f"generated: {answer}", size=7, color=QUIET, rotation=180, ha="right", gid="answer"
-    )
+    upside_down = {"size": 7, "color": QUIET, "rotation": 180, "ha": "right"}
+    figure.text(1 - EDGE / width, (FOOT + 0.04) / height, f"generated: {answer}", gid="answer", **upside_down)
+    figure.text(1 - EDGE / width, EDGE / height, remark, gid="remark", **upside_down)
     return figure
