@@ -108,18 +108,30 @@ def _noise(factorial: Findings | None) -> str:
 
 def _nothing(labelled: Findings | None) -> str:
     if labelled is None:
-        return "**Nothing here helps enough** where telemetry changes after training. This is not measured yet."
+        return "**No training data help enough** where telemetry changes after training. This is not measured yet."
     arms = labelled["arms"]
     controls = {name: about for name, about in labelled["controls"].items() if "found" in about}
     best = max(controls, key=lambda name: controls[name]["auc_pr"])
     rates = {name: mean_of(about["false_alarms"]) for name, about in (arms | controls).items()}
     quiet = min((name for name in arms if " + " in name), key=rates.__getitem__)
     return (
-        f"**Nothing here helps enough** where nominal telemetry itself changes after training. On {len(labelled['channels'])} channels of a spacecraft, detectors "
+        f"**No training data help enough** where nominal telemetry itself changes after training. On {len(labelled['channels'])} channels of a spacecraft, detectors "
         f"trained on the real past flag {per_cent(rates['real'])} of later nominal windows, and detectors trained on the generated telemetry with the fewest "
         f"false alarms (*{quiet}*) flag {per_cent(rates[quiet])}. A simple score of one line of code ({best}) flags {per_cent(rates[best])}. The area under the "
         f"precision-recall curve (AUC-PR) on the labelled samples is {controls[best]['auc_pr']:.2f} for this score, and "
-        f"{max(about['auc_pr'] for about in arms.values()):.2f} for the best kind of training data."
+        f"{max(about['auc_pr'] for about in arms.values()):.2f} for the best kind of training data.{_residual(labelled)}"
+    )
+
+
+def _residual(labelled: Findings) -> str:
+    """What the simulator is worth there as a model of the signal, if this was measured."""
+    row = labelled.get("residual", {}).get("residual")
+    if row is None:
+        return ""
+    return (
+        " What helps is to use the simulator as a model instead of a source of data: the residual of the simulator that is aligned with each window "
+        f"(`score --detector residual`) flags {row['median_false_alarms']:.1%} in the median channel ({row['mean_false_alarms']:.1%} on average), with an AUC-PR of "
+        f"{row['auc_pr']:.2f}."
     )
 
 

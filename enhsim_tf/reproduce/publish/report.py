@@ -28,6 +28,7 @@ from enhsim_tf.reproduce.publish.wording import (
     verdict_c8,
     words,
 )
+from enhsim_tf.reproduce.spacecraft.residual import TABLE, residual_table, summarise
 
 PATHS = {"report.md.jinja": Path("docs") / "REPORT.md", "report_tables.md.jinja": Path("docs") / "REPORT_TABLES.md"}
 """The files of the report by template: the text, and its tables."""
@@ -119,10 +120,16 @@ def findings_of(root: Path, name: str) -> Findings | None:
 
     Args:
         root: Folder of the project.
-        name: `robustness`, `factorial` or `labelled`.
+        name: `robustness`, `factorial` or `labelled`. With `labelled` come the rows of the residual detector, as `residual`.
     """
     path = root / "figures" / name / "findings.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    residual = path.parent / TABLE
+    if found is not None and name == "labelled" and residual.is_file():
+        import pandas as pd
+
+        found["residual"] = {row["detector"]: row for row in summarise(pd.read_csv(residual)).to_dict("records")}
+    return found
 
 
 def designs_of(path: Path) -> list[dict[str, str]]:
@@ -169,6 +176,7 @@ def report(found: Findings, root: Path) -> None:
     parts = {"practice": practice.bullets(found, factorial, labelled), "robustness": table(found)}
     if labelled is not None:
         parts["labelled"] = run.table(labelled)
+        parts["residual"] = residual_table(labelled.get("residual", {}))
     if factorial is not None:
         parts["factorial"] = factorial_text.page_part(factorial)
     fill_pages(root, parts)

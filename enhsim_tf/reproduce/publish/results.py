@@ -110,6 +110,7 @@ PAGES = {
     "robustness": "docs/what_holds.md",
     "factorial": "docs/what_holds.md",
     "labelled": "docs/spacecraft.md",
+    "residual": "docs/spacecraft.md",
     "channels": "docs/spacecraft.md",
     "deviations": "docs/decisions.md",
     "timings": "docs/speed.md",

@@ -8,7 +8,7 @@ precision-recall curve. The scores of the detectors are computed here; nothing i
 import argparse
 import dataclasses
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -131,6 +131,27 @@ def summarise(table: "pd.DataFrame") -> "pd.DataFrame":
             }
         )
     return pd.DataFrame(rows)
+
+
+def residual_table(rows: "Mapping[str, Mapping[str, Any]]") -> str:
+    """Returns the rows of `summarise` as a Markdown table.
+
+    Args:
+        rows: Rows by the name of the detector; empty if the detector has not been tried.
+    """
+    if not rows:
+        return "This has not been measured yet."
+    lines = [
+        "| detector | false alarms, median channel | mean | found at 1 % | at 5 % | at 10 % | AUC-PR |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, row in sorted(rows.items(), key=lambda item: -item[1]["auc_pr"]):
+        finds = " | ".join(f"{row[f'found_at_{rate}']:g}" for rate in (0.01, 0.05, 0.1))
+        lines.append(f"| {name} | {row['median_false_alarms']:.1%} | {row['mean_false_alarms']:.1%} | {finds} | {row['auc_pr']:.2f} |")
+    number = next(iter(rows.values()))["sequences"]
+    return "\n".join(
+        [*lines, "", f"Found are labelled sequences, of {number:g}, means over three training seeds. From `figures/labelled/{TABLE}`."]
+    )
 
 
 def saved_simulator(folder: Path, channel: str, seed: int) -> "Path | None":
