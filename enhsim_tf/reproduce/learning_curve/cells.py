@@ -1,5 +1,6 @@
 """One cell of the learning curve: an environment, a seed and a number of real windows, with all arms."""
 
+import dataclasses
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -112,7 +113,8 @@ class Cell:
         frames = []
         for group in (CHEAP_RUNGS, *((rung,) for rung in rungs if rung not in CHEAP_RUNGS)):
             chosen = self.world.settings
-            depends = (group, self.num_real, chosen.telemetry, chosen.curve, chosen.seed, self.rate)
+            curve = dataclasses.replace(chosen.curve, num_seeds=0, first_seed=0)  # the number of replicates does not affect a replicate
+            depends = (group, self.num_real, chosen.telemetry, curve, chosen.seed, self.rate)
             name = f"learning curve {self.num_real} {group[0] if len(group) == 1 else 'windows'}".replace(" ", "_")
 
             def make(folder: Path, group: tuple[str, ...] = group) -> None:

@@ -58,7 +58,7 @@ def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
     upper.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     lower.set_ylim(0, 100)
     lower.set_xscale("log")
-    shown = [number for number in numbers if number in (5, 20, 100, 1_000, 10_000)] or numbers
+    shown = [number for number in numbers if number in (10, 100, 1_000)] or numbers
     lower.set_xticks(shown, [f"{number:,}" for number in shown], fontsize=7)
     lower.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
 

@@ -106,7 +106,7 @@ def learning_curve(found: Findings) -> str:
             f"- **{name}**: a simulator pays with these numbers of real windows: {where}. Real windows alone suffice (excess at most half a point) {enough}. "
             f"With {bar['num_real']} windows, the excess is {100 * real['excess'][str(bar['num_real'])]:.1f} points for the real windows alone and "
             f"{100 * bar['excess']:.1f} for the best simulator ({bar['best'].removeprefix('simulator + ')}): "
-            f"{'at most half' if bar['is_kept'] else 'more than half'}."
+            f"{'no excess to halve' if bar['real_excess'] <= 0 else 'at most half' if bar['is_kept'] else 'more than half'}."
         )
     arms = list(dict.fromkeys(arm for about in found["environments"].values() for arm in about["arms"]))
     head = f"| environment | training | {' | '.join(f'{number:,}' for number in numbers)} |"

@@ -1,6 +1,8 @@
 """The experiment on the number of real windows: its arms have the properties that they are named for, and its rules are those of the text."""
 
 import dataclasses
+import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -166,3 +168,11 @@ def test_the_page_and_the_figure_say_where_the_simulator_pays():
     )
     assert "| white | real | 11.0 / 60 | 3.0 / 60 | 1.2 / 60 |" in text
     assert figures._message(found) == "A fitted simulator pays up to 5 real windows, and no longer from 20"
+
+
+def test_the_published_findings_and_the_page_come_from_the_published_table(near):
+    root = Path(__file__).parents[3]
+    kept = json.loads((root / "figures" / "learning_curve" / "findings.json").read_text(encoding="utf-8"))
+    again = findings.summarise(findings.KEPT.read(root / "figures" / "learning_curve"))
+    assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again}) and kept["budget"] == "full"
+    assert page.learning_curve(kept) in (root / "docs" / "noise.md").read_text(encoding="utf-8")
