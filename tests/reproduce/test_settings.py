@@ -64,6 +64,14 @@ COUNTS = {
     "labelled.num_folds",
     "labelled.num_seeds",
     "ladder.num_windows",
+    "curve.num_seeds",
+    "curve.num_real",
+    "curve.num_windows",
+    "curve.num_judged",
+    "curve.num_anomalous",
+    "curve.num_iterations",
+    "curve.gan_iterations",
+    "curve.num_steps",
     "ladder.num_iterations",
     "ladder.gan_iterations",
     "ladder.num_anomalous",
@@ -112,8 +120,11 @@ def test_smoke_changes_counts_only():
     assert full == {name: value for name, (value, _) in FIELDS.items()}
     assert {name for name in full if full[name] != smoke[name]} == COUNTS
     for name in COUNTS:
-        assert type(smoke[name]) is type(full[name]) is int
-        assert 0 < smoke[name] < full[name]
+        assert type(smoke[name]) is type(full[name])
+        if isinstance(full[name], tuple):  # a list of counts
+            assert set(map(type, full[name])) == {int} and 0 < max(smoke[name]) < max(full[name]) and len(smoke[name]) < len(full[name])
+        else:
+            assert type(full[name]) is int and 0 < smoke[name] < full[name]
 
 
 def test_changing_one_setting_changes_no_other():
