@@ -27,7 +27,9 @@ from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
 from enhsim_tf.reproduce.lesson import check_answer, say
 from enhsim_tf.reproduce.notebook import drawing, open_experiment
 
-experiment = open_experiment(lesson="27")  # nothing of the paper's example is used here; it tells the running time
+experiment = open_experiment(
+    lesson="27"
+)  # nothing of the paper's example is used here; it tells the running time
 folder = Path("..") / "examples" / "battery"
 cleaned = clean(read_source(folder / "telemetry.csv")["volts"])
 telemetry, simulator = cleaned.longest, read_recording(folder / "simulator.csv")

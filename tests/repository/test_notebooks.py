@@ -103,7 +103,11 @@ def test_it_shows_figures_says_what_to_see_and_asserts_it(source):
     trees, cells = trees_of(source), build.read(source).cells
     calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
     shown, found = ([node.args[1].value for node in calls if called(node) == name] for name in ("show", "show_finding"))
-    assert (shown + found or source.stem[:2] in OWN_PICTURES) and set(shown) <= set(FIGURES) and set(found) <= {*robustness_figures.FIGURES, *labelled_figures.FIGURES}
+    assert (
+        (shown + found or source.stem[:2] in OWN_PICTURES)
+        and set(shown) <= set(FIGURES)
+        and set(found) <= {*robustness_figures.FIGURES, *labelled_figures.FIGURES}
+    )
     number = source.stem[:2]
     assert number[0] == "2" or number == "00" or any(name.startswith(f"fig{number}_") for name in shown)
     asserts = [any(isinstance(node, ast.Assert) for node in ast.walk(tree)) for tree in trees]
