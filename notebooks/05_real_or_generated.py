@@ -46,7 +46,7 @@ else:
 
 # %% [markdown]
 # *What to see:* no window that stands out at a glance. If three or four of your four letters are right, was it skill? By pure guessing,
-# the number of right letters has a hypergeometric distribution: $P(k)=\binom4k\binom4{4-k}/\binom84$.
+# the number of right letters has a hypergeometric distribution: $P(k)=\binom{4}{k}\binom{4}{4-k}/\binom{8}{4}$.
 
 # %%
 from math import comb
@@ -220,7 +220,7 @@ check_answer(
 # print(needed)
 # ```
 #
-# About $n/2+0.8\sqrt n$. For eight windows in groups of four, all must be right. The eye's failure on eight windows says little about it,
+# About $n/2+0.8\sqrt{n}$. For eight windows in groups of four, all must be right. The eye's failure on eight windows says little about it,
 # and its success would too.
 #
 # </details>

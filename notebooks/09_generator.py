@@ -112,7 +112,7 @@ say(
 #
 # The last Dense layer writes every window as a sum of 64 fixed shapes, the rows of its kernel $K$, and tanh then bends it a little:
 #
-# $$G(z)=\tanh\Big(b+\sum_{i=1}^{64}h_i(z)\,K_i\Big)$$
+# $$G(z)=\tanh\left(b+\sum_{i=1}^{64}h_i(z)\,K_i\right)$$
 #
 # Before the tanh, a thousand windows therefore vary in at most 64 of the 500 dimensions. Real noise varies in all of them. To see it,
 # sort the dimensions by their share of the variance, which are the squared singular values of the windows:
@@ -157,7 +157,7 @@ with drawing(alt, height=2.3, title=title) as panel:
 # *What to see:* the shares of real noise decrease slowly. Those of generated noise fall steeply, and before the tanh they end at 64. One
 # number says it: the *effective rank*, the exponential of the entropy of the shares $p_i$,
 #
-# $$\mathrm{rank}=\exp\Big(-\sum_i p_i\ln p_i\Big).$$
+# $$\mathrm{rank}=\exp\left(-\sum_i p_i\ln p_i\right).$$
 
 # %%
 from enhsim_tf.realism.measures import effective_rank
