@@ -58,7 +58,7 @@ assert table["parameters"].tolist() == by_hand and discriminator.count_params() 
 #
 # With the kernel $K_f$ and the bias $b_f$ of filter $f$, the two layers compute the number
 #
-# $$m_f=\max_{p}\;\mathrm{relu}\left(b_f+\sum_{k=0}^{19}K_{f,k}\,x_{4p+k}\right),\qquad p=0,\dots,120.$$
+# $$m_f=\max_{p}\;\mathrm{relu}\left(b_f+\sum_{k=0}^{19}K_{f,k}\,x_{4p+k}\right),\qquad p=0,\ldots,120.$$
 
 # %%
 real = experiment.data.noise_windows("train", 400, "notebook")
