@@ -19,12 +19,12 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import add_changed, complete_batch, complete_labelled_batch
 from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of, is_finite
+from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
 from enhsim_tf.enhanced_simulator.saving import noise_file, read_noise, read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
 from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.noise import ladder
 from enhsim_tf.noise.gan import num_overlapping
 from enhsim_tf.noise.states import state_of
 from enhsim_tf.telemetry.parquet_store import write_windows
@@ -43,7 +43,7 @@ PAPER: Mapping[str, Any] = MappingProxyType(
 )
 
 
-class EnhancedSimulator:
+class EnhancedSimulator(NoisyOutput):
     """Generates realistic telemetry from a coarse simulator, an enhancing network and generated noise.
 
     Args:
@@ -95,24 +95,9 @@ class EnhancedSimulator:
         clean = self.generate_clean(_NUM_NOISE) if getattr(self.noise, "follows_signal", False) else np.empty((_NUM_NOISE, 0))
         return float(np.std(self.draw_noise(clean, 0), dtype=np.float64))
 
-    def draw_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
-        """Generates noise for windows or for one series. Noise that follows the signal receives it in units of the enhancer.
-
-        Args:
-            clean: Enhanced windows of shape `(windows, samples)`, or an enhanced series of shape `(samples,)`.
-            seed: Seed, or a random number generator, whose state advances.
-
-        Returns:
-            float32 array of the shape of `clean`, in the telemetry's unit.
-        """
-        draw = ladder.generate if np.ndim(clean) == 2 else ladder.generate_series
-        signal = (clean - self.offset) / self.scale if getattr(self.noise, "follows_signal", False) else None
-        return draw(self.noise, len(clean), seed, signal)
-
-    def add_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
-        """Adds noise to enhanced windows or to an enhanced series, and rounds to the levels of a quantised channel."""
-        noisy = clean + self.draw_noise(clean, seed)
-        return noisy if self.quantisation is None else self.quantisation.round(noisy)
+    def in_unit(self, clean: np.ndarray) -> np.ndarray:
+        """Converts enhanced values to the units of the enhancer."""
+        return (clean - self.offset) / self.scale
 
     @classmethod
     def fit(

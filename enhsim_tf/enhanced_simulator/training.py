@@ -164,12 +164,9 @@ def train(
 
 
 def _noise_training(simulator: "EnhancedSimulator", settings: TrainingSettings, verbose: int | str, progress: Progress) -> NoiseTraining:
-    def to_unit(clean: np.ndarray) -> np.ndarray:
-        return (clean - simulator.offset) / simulator.scale
-
     unit = None if settings.normalise else 1.0
     return NoiseTraining(
-        settings.num_iterations, settings.seed, to_unit, simulator.quantisation, unit=unit, verbose=verbose, progress=progress
+        settings.num_iterations, settings.seed, simulator.in_unit, simulator.quantisation, unit=unit, verbose=verbose, progress=progress
     )
 
 

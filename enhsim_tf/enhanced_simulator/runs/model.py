@@ -12,11 +12,11 @@ from enhsim_tf.coarse_simulator.pairing import Pair, pair_with_recording
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_counts
+from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
 from enhsim_tf.enhanced_simulator.runs import saving
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhancer.ladder import Rung
 from enhsim_tf.enhancer.overlapping import cut_run, enhance_run
-from enhsim_tf.noise import ladder
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -24,7 +24,7 @@ _CHUNK = 2_048  # windows generated at a time
 _SAME_RATE = 1e-3
 
 
-class RunModel:
+class RunModel(NoisyOutput):
     """Generates realistic telemetry from runs of a coarse simulator.
 
     Args:
@@ -136,24 +136,9 @@ class RunModel:
             rng = np.random.default_rng([seed, 1, number])
             yield [self.add_noise(enhanced, rng) for enhanced in clean]
 
-    def draw_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
-        """Generates noise for windows or for one series. Noise that follows the signal receives it in units of the enhancer.
-
-        Args:
-            clean: Enhanced windows of shape `(windows, samples)`, or an enhanced series of shape `(samples,)`.
-            seed: Seed, or a random number generator, whose state advances.
-
-        Returns:
-            float32 array of the shape of `clean`, in the telemetry's unit.
-        """
-        draw = ladder.generate if np.ndim(clean) == 2 else ladder.generate_series
-        signal = self.rung.scaling.scale_target(clean) if getattr(self.noise, "follows_signal", False) else None
-        return draw(self.noise, len(clean), seed, signal)
-
-    def add_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
-        """Adds noise to enhanced windows or to an enhanced series, and rounds to the levels of a quantised channel."""
-        noisy = clean + self.draw_noise(clean, seed)
-        return noisy if self.quantisation is None else self.quantisation.round(noisy)
+    def in_unit(self, clean: np.ndarray) -> np.ndarray:
+        """Converts enhanced values to the units of the enhancer."""
+        return self.rung.scaling.scale_target(clean)
 
     def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
         """Runs the coarse simulator of the model.
