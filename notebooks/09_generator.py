@@ -269,7 +269,7 @@ check_answer(
 # ```
 #
 # Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it. Only
-# both together come near the rank of real noise, and training still decides how much of the room is used. A generator that gets a
+# both together come near the rank of real noise, and training still decides how much of that rank is reached. A generator that gets a
 # random number for *every sample* and works along time does not have the problem at all.
 #
 # </details>
