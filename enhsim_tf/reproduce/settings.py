@@ -237,6 +237,11 @@ class CurveSettings:
     num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
     gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
     num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
+    num_classifier_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: the first seeds; classifiers take most of the time", smoke=1)
+    num_network_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; noise networks take minutes each", smoke=1)
+    num_real_networks: tuple[int, ...] = setting(
+        (20, 300), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn", smoke=(20,)
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -276,7 +281,7 @@ class BatterySettings:
     test_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days on which everything is judged", smoke=4)
     coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
     fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
-    paper_epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: as in the ladder of enhancers, with a falling rate", "40", smoke=1)
+    paper_epochs: int = setting(40, "epochs", "paper, section 2.2", "40", smoke=1)
     num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "about 1,000", smoke=4)
     num_network_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: autoencoders and the noise GAN take most of the time", smoke=1)
 

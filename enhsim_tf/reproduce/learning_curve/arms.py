@@ -11,7 +11,10 @@ windows, and all arms cut the same overlapping windows from it, evenly spaced ov
 - `real and simulator`: trained on both, with the threshold of `real`.
 - `CORAL`: windows of the simulator with Gaussian noise, whose mean and covariance are aligned with those of the record
   (Sun, Feng and Saenko 2016).
-- `classifier`, `domain-adversarial`: see `domain_adversarial`; they are also trained on injected anomalies. The record sets the threshold.
+- `classifier`, `domain-adversarial`: see `domain_adversarial`; they also learn from anomalies injected into windows of the simulator. The
+  record sets the threshold.
+- `classifier without simulator`: the same network, which learns from windows of the record and from anomalies injected into them. Scores
+  of two networks, each trained on the other half of the time, set the threshold of a third that is trained on all of it.
 - `moving deviation`: a score of one line that learns nothing. The record sets the threshold.
 """
 
@@ -30,6 +33,7 @@ from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
 
 REAL, BOTH, THRESHOLD_ON_REAL = "real", "real and simulator", "simulator, threshold on real"
 CORAL, CLASSIFIER, ADVERSARIAL, ONE_LINE = "CORAL", "classifier", "domain-adversarial", "moving deviation"
+CLASSIFIER_ON_REAL = "classifier without simulator"
 SIMULATOR = "simulator + "
 """Beginning of the names of arms with noise of a rung; the name of the rung follows."""
 CHEAP_RUNGS = ("none", "Gaussian", "autoregression", "residual windows")

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from enhsim_tf.reproduce.learning_curve.arms import (
     BOTH,
     CHEAP_RUNGS,
     CLASSIFIER,
+    CLASSIFIER_ON_REAL,
     CORAL,
     NUM_BLOCKS,
     ONE_LINE,
@@ -107,21 +108,34 @@ class Cell:
         self.number, self.seed = world.settings.curve.num_windows, world.settings.seed
 
     def rows(self, rungs: Sequence[str], stages: Stages) -> "pd.DataFrame":
-        """The rows of all arms. Arms without noise networks are one stage; each network is another."""
+        """The rows of all arms that are computed for this seed and number of windows.
+
+        Arms without networks are one stage, the classifiers another, and so is each noise network. Networks take most of the time, so
+        the settings give them fewer seeds, and noise networks fewer numbers of windows.
+
+        Args:
+            rungs: Rungs of the noise ladder; those without networks are always computed.
+            stages: Runs stages and caches their results.
+        """
         import pandas as pd
 
-        frames = []
-        for group in (CHEAP_RUNGS, *((rung,) for rung in rungs if rung not in CHEAP_RUNGS)):
-            chosen = self.world.settings
-            curve = dataclasses.replace(chosen.curve, num_seeds=0, first_seed=0)  # the number of replicates does not affect a replicate
-            depends = (group, self.num_real, chosen.telemetry, curve, chosen.seed, self.rate)
-            name = f"learning curve {self.num_real} {group[0] if len(group) == 1 else 'windows'}".replace(" ", "_")
+        chosen, curve, frames = self.world.settings, self.world.settings.curve, []
+        number = chosen.seed - curve.first_seed
+        groups: dict[str, Callable[[], list[dict]]] = {"windows": self._without_networks}
+        if number < curve.num_classifier_seeds:
+            groups["classifiers"] = self._classifiers
+        if number < curve.num_network_seeds and self.num_real in curve.num_real_networks:
+            groups |= {rung: functools.partial(self._simulated, (rung,)) for rung in rungs if rung not in CHEAP_RUNGS}
+        # which seeds and numbers are computed does not affect a cell
+        same = dataclasses.replace(curve, num_seeds=0, first_seed=0, num_classifier_seeds=0, num_network_seeds=0, num_real_networks=())
+        for name, compute in groups.items():
+            depends = (name, self.num_real, chosen.telemetry, same, chosen.seed, self.rate)
 
-            def make(folder: Path, group: tuple[str, ...] = group) -> None:
-                found = self._cheap() if group is CHEAP_RUNGS else self._simulated(group)
-                pd.DataFrame(found).to_parquet(folder / "rows.parquet")
+            def make(folder: Path, compute: Callable[[], list[dict]] = compute) -> None:
+                pd.DataFrame(compute()).to_parquet(folder / "rows.parquet")
 
-            folder = stages.run(name, make, ("reproduce.learning_curve.cells",), depends)
+            stage = f"learning curve {self.num_real} {name}".replace(" ", "_")
+            folder = stages.run(stage, make, ("reproduce.learning_curve.cells",), depends)
             frames.append(pd.read_parquet(folder / "rows.parquet"))
         return pd.concat(frames, ignore_index=True).assign(num_real=self.num_real, seed=self.seed, environment=chosen.telemetry.noise)
 
@@ -138,7 +152,7 @@ class Cell:
         for name in QUICK:
             yield name, DETECTORS[name](self.seed).fit(windows)
 
-    def _cheap(self) -> list[dict]:
+    def _without_networks(self) -> list[dict]:
         real, starts, window = self.record.windows, self.record.starts, self.world.window
         generated = self.record.generate(WHOLE_WINDOWS, self.number, _FRESH)
         found = self._simulated(CHEAP_RUNGS)
@@ -153,7 +167,7 @@ class Cell:
             found.append(self._judge(THRESHOLD_ON_REAL, name, detector, detector.score(real)))
         one_line = CONTROLS[ONE_LINE](self.seed).fit(real)
         found.append(self._judge(ONE_LINE, ONE_LINE, one_line, one_line.score(real)))
-        return found + self._coral(real) + self._classifiers(real, generated)
+        return found + self._coral(real)
 
     def _coral(self, real: np.ndarray) -> list[dict]:
         plain, further = (self.record.generate("Gaussian", self.number, purpose) for purpose in (_CORAL, _CORAL + 100))
@@ -161,23 +175,33 @@ class Cell:
         held_out = alignment.apply(further)
         return [self._judge(CORAL, name, each, each.score(held_out)) for name, each in self._fitted(alignment.apply(plain))]
 
-    def _classifiers(self, real: np.ndarray, generated: np.ndarray) -> list[dict]:
+    def _classifiers(self) -> list[dict]:
         from enhsim_tf.reproduce.learning_curve.domain_adversarial import AnomalyClassifier
 
+        real, steps, found = self.record.windows, self.world.settings.curve.num_steps, []
+        generated = self.record.generate(WHOLE_WINDOWS, self.number, _FRESH)
+
+        def trained(nominal: np.ndarray, adaptation: float = 0.0) -> Detector:
+            return AnomalyClassifier(self.world.window, adaptation, self.seed).fit(nominal, self._with_anomalies(nominal), real, steps)
+
+        for arm, adaptation in ((CLASSIFIER, 0.0), (ADVERSARIAL, _ADAPTATION)):
+            network = trained(generated, adaptation)
+            found.append(self._judge(arm, CLASSIFIER, network, network.score(real)))
+        halves = time_blocks(self.record.starts, 2, self.world.window)
+        scores = [trained(real[training]).score(real[held_out]) for training, held_out in halves]
+        return [*found, self._judge(CLASSIFIER_ON_REAL, CLASSIFIER, trained(real), np.concatenate(scores))]
+
+    def _with_anomalies(self, nominal: np.ndarray) -> np.ndarray:
+        """The windows, each with one injected anomaly; kinds, durations and severities take turns."""
         rng, noise_sd = np.random.default_rng([self.seed, _ANOMALIES]), float(np.std(self.record.residuals[0]))
         parts = []
         for number, kind in enumerate(INJECTIONS):
-            pieces = generated[number :: len(INJECTIONS)]
+            pieces = nominal[number :: len(INJECTIONS)]
             for offset, duration in enumerate(DURATIONS):
                 severity = float(np.exp(rng.uniform(*np.log(_TRAINING_SEVERITIES))))
                 changed = pieces[offset :: len(DURATIONS)]
                 parts.append(inject(changed, kind, severity, min(duration, changed.shape[1]), noise_sd, rng)[0])
-        anomalous, found = np.concatenate(parts), []
-        for arm, adaptation in ((CLASSIFIER, 0.0), (ADVERSARIAL, _ADAPTATION)):
-            network = AnomalyClassifier(self.world.window, adaptation, self.seed)
-            network.fit(generated, anomalous, real, self.world.settings.curve.num_steps)
-            found.append(self._judge(arm, CLASSIFIER, network, network.score(real)))
-        return found
+        return np.concatenate(parts)
 
     def _judge(self, arm: str, name: str, detector: Detector, threshold_scores: np.ndarray) -> dict:
         threshold, set_for = metrics.finite_threshold(threshold_scores, self.rate)

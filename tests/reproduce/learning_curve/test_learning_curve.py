@@ -16,6 +16,7 @@ from enhsim_tf.reproduce.learning_curve.arms import (
     BOTH,
     CHEAP_RUNGS,
     CLASSIFIER,
+    CLASSIFIER_ON_REAL,
     CORAL,
     NETWORK_RUNGS,
     ONE_LINE,
@@ -93,7 +94,16 @@ def test_a_classifier_finds_what_it_was_taught(adaptation):
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory):
     """The rows of one tiny cell, and of the same cell from the cache."""
-    counts = {"num_real": (6,), "num_windows": 30, "num_judged": 20, "num_anomalous": 6, "num_steps": 3, "num_iterations": 2}
+    counts = {
+        "num_real": (6,),
+        "num_real_networks": (6,),
+        "first_seed": 3,
+        "num_windows": 30,
+        "num_judged": 20,
+        "num_anomalous": 6,
+        "num_steps": 3,
+        "num_iterations": 2,
+    }
     changed = {f"curve__{name}": value for name, value in counts.items()}
     settings = make_settings("smoke", 3, telemetry__window=48, telemetry__noise="shot", **changed)
     cache, told = tmp_path_factory.mktemp("cache"), []
@@ -104,7 +114,7 @@ def test_a_cell_has_all_arms_and_is_read_from_the_cache(rows):
     first, again = rows
     pd.testing.assert_frame_equal(first, again)
     simulated = [SIMULATOR + rung for rung in (*CHEAP_RUNGS, "autoregressive network")]
-    assert set(first["arm"]) == {REAL, BOTH, THRESHOLD_ON_REAL, CORAL, CLASSIFIER, ADVERSARIAL, ONE_LINE, *simulated}
+    assert set(first["arm"]) == {REAL, BOTH, THRESHOLD_ON_REAL, CORAL, CLASSIFIER, ADVERSARIAL, CLASSIFIER_ON_REAL, ONE_LINE, *simulated}
     for arm in (REAL, BOTH, THRESHOLD_ON_REAL, CORAL, *simulated):
         assert tuple(first[first["arm"] == arm]["detector"]) == QUICK
     assert (first["windows"] == 20).all() and (first["num_real"] == 6).all() and (first["environment"] == "shot").all()
