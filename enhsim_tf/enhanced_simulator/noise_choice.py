@@ -20,6 +20,7 @@ MAX_AUC_EXCESS = 0.05  # by which the AUC of a rung may exceed that of real wind
 MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows
 TOLD_APART = 0.8  # AUC above which generated noise must not be used without a warning
 _CHEAP = ("PCA residual", "isolation forest")
+_LEAST_WINDOWS = 20
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,49 +52,67 @@ class RungJudgement:
         return max(self.auc - max(self.real_auc, 0.5), 0) + max(self.alarms - self.real_alarms, 0)
 
 
-def judge(
-    rung: str,
-    generated: np.ndarray,
-    learnt: np.ndarray,
-    held_out: np.ndarray,
-    signals: Sequence[np.ndarray],
-    rate: float = 0.01,
-    seed: int = 0,
-    compared: Sequence[np.ndarray] | None = None,
-) -> RungJudgement:
-    """Judges the noise of a rung on held-out noise.
+class NoiseJudge:
+    """Judges the noise of rungs on held-out noise. What concerns real noise alone is computed once, for all rungs.
 
     Args:
-        rung: Name of the rung.
-        generated: Generated noise windows, shape `(windows, samples)`; half train the detectors, and half set their thresholds.
-        learnt: Real noise windows from which the rung was fitted, at least as many.
-        held_out: Real noise windows that it was not fitted to.
+        learnt: Real noise windows from which the rungs were fitted, shape `(windows, samples)`.
+        held_out: Real noise windows that they were not fitted to, as many.
         signals: Three arrays of clean signal windows, to which generated, learnt and held-out noise are added.
         rate: False-alarm rate for which thresholds are set.
         seed: Seed of the classifier and the detectors.
-        compared: Generated, learnt and held-out noise for the classifier, if it differs from those above: if windows overlap, the
-            classifier recognises single windows of real noise, whatever the noise is like.
+        compared: Learnt and held-out noise for the classifier, if it differs from those above: if windows overlap, the classifier
+            recognises single windows of real noise, whatever the noise is like.
+
+    Raises:
+        InputError: If there are fewer than 20 windows of a kind.
     """
-    number = min(len(generated), len(learnt), len(held_out))
-    half = number // 2
-    if half < 10:
-        raise InputError(f"Expected at least 20 windows of each kind. Received: {number}. Use more telemetry or shorter windows.")
-    windows, reference, judged = (
-        (signal[: len(noise)] + noise) for signal, noise in zip(signals, (generated, learnt, held_out), strict=True)
-    )
-    alarms = {"generated": [], "real": []}
-    for name in _CHEAP:
-        for kind, training in (("generated", windows), ("real", reference)):
-            detector = DETECTORS[name](seed).fit(training[:half])
-            alarms[kind].append(metrics.false_alarm_rate(detector.score(judged), metrics.threshold(detector.score(training[half:]), rate)))
-    tried = [each[:number] for each in (generated, learnt, held_out)] if compared is None else compared
-    return RungJudgement(
-        rung,
-        two_sample_auc(tried[0], tried[2], seed),
-        two_sample_auc(tried[1], tried[2], seed),
-        float(np.mean(alarms["generated"])),
-        float(np.mean(alarms["real"])),
-    )
+
+    def __init__(
+        self,
+        learnt: np.ndarray,
+        held_out: np.ndarray,
+        signals: Sequence[np.ndarray],
+        rate: float = 0.01,
+        seed: int = 0,
+        compared: Sequence[np.ndarray] | None = None,
+    ):
+        number = min(len(learnt), len(held_out))
+        _check_number(number)
+        self.rate, self.seed, self._signals = rate, seed, signals
+        self._judged = signals[2][: len(held_out)] + held_out
+        learnt_noise, self._held_out_noise = (learnt[:number], held_out[:number]) if compared is None else compared
+        self.real_auc = two_sample_auc(learnt_noise, self._held_out_noise, seed)
+        self.real_alarms = self._alarms(signals[1][: len(learnt)] + learnt)
+
+    def _alarms(self, training: np.ndarray) -> float:
+        """False-alarm rate on held-out real windows, mean over the cheap detectors; half of the windows set the thresholds."""
+        half, rates = len(training) // 2, []
+        for name in _CHEAP:
+            detector = DETECTORS[name](self.seed).fit(training[:half])
+            threshold = metrics.threshold(detector.score(training[half:]), self.rate)
+            rates.append(metrics.false_alarm_rate(detector.score(self._judged), threshold))
+        return float(np.mean(rates))
+
+    def judge(self, rung: str, generated: np.ndarray, compared: np.ndarray | None = None) -> RungJudgement:
+        """Judges the noise of a rung.
+
+        Args:
+            rung: Name of the rung.
+            generated: Generated noise windows, as many as real ones; half train the detectors, and half set their thresholds.
+            compared: Generated noise for the classifier, if real noise is given for it.
+        """
+        _check_number(len(generated))
+        tried = generated[: len(self._held_out_noise)] if compared is None else compared
+        auc, alarms = two_sample_auc(tried, self._held_out_noise, self.seed), self._alarms(self._signals[0][: len(generated)] + generated)
+        return RungJudgement(rung, auc, self.real_auc, alarms, self.real_alarms)
+
+
+def _check_number(number: int) -> None:
+    if number < _LEAST_WINDOWS:
+        raise InputError(
+            f"Expected at least {_LEAST_WINDOWS} windows of each kind. Received: {number}. Use more telemetry or shorter windows."
+        )
 
 
 def choose(judgements: Sequence[RungJudgement]) -> str:

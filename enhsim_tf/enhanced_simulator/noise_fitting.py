@@ -126,11 +126,11 @@ def choose_noise(
     if min(len(judged), len(learnt)) < _LEAST_JUDGED or len(compare(learnt.noise, learnt, judged)[0]) < _LEAST_JUDGED:
         notes.append("there is too little telemetry to judge noise models; whole residual windows are drawn")
         return fit_noise("residual windows", everything, training, notes), []
-    models, judgements = {}, []
+    models, judgements, judge = {}, [], HeldOutJudge(learnt, judged, training)
     for option in BY_OPTION:
         try:
             model = fit_noise(option, learnt, training, notes)
-            judgements.append(judge_noise(option, model, learnt, judged, training))
+            judgements.append(judge.judge(option, model))
             models[option] = model
         except InputError as error:
             notes.append(f"noise model {option} left out: {error}")
@@ -139,26 +139,36 @@ def choose_noise(
     return model, rows_of(judgements, chosen)
 
 
-def judge_noise(option: str, model: Any, learnt: NoiseWindows, judged: NoiseWindows, training: NoiseTraining) -> noise_choice.RungJudgement:
-    """Judges a fitted noise model on held-out telemetry.
+class HeldOutJudge:
+    """Judges noise models on held-out telemetry.
 
     Args:
-        option: Name of its rung.
-        model: The noise model.
-        learnt: Windows from which it was fitted.
-        judged: Windows that it has not seen.
-        training: How it was fitted.
+        learnt: Windows from which they are fitted.
+        judged: Windows that they have not seen.
+        training: How they are fitted.
     """
-    number = min(len(judged), len(learnt), MOST_JUDGED)
-    rows = np.linspace(0, len(learnt) - 1, number).astype(int)
-    clean = learnt.clean[rows]
-    rng = np.random.default_rng([training.seed, _DRAW, list(BY_OPTION).index(option)])
-    noise = ladder.generate(model, number, rng, training.to_unit(clean))
-    if training.quantisation is not None:
-        noise = training.quantisation.round(clean + noise) - clean
-    signals = [each if training.with_signal else np.zeros_like(each) for each in (clean, clean, judged.clean[:number])]
-    compared = compare(noise, learnt, judged)
-    return noise_choice.judge(option, noise, learnt.noise[rows], judged.noise[:number], signals, seed=training.seed, compared=compared)
+
+    def __init__(self, learnt: NoiseWindows, judged: NoiseWindows, training: NoiseTraining):
+        number = min(len(judged), len(learnt), MOST_JUDGED)
+        rows = np.linspace(0, len(learnt) - 1, number).astype(int)
+        self._learnt, self._held_out, self._training, self._clean = learnt, judged, training, learnt.clean[rows]
+        signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[:number])]
+        _, *compared = compare(learnt.noise[rows], learnt, judged)
+        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[:number], signals, seed=training.seed, compared=compared)
+
+    def judge(self, option: str, model: Any) -> noise_choice.RungJudgement:
+        """Judges a fitted noise model.
+
+        Args:
+            option: Name of its rung.
+            model: The noise model.
+        """
+        training, clean = self._training, self._clean
+        rng = np.random.default_rng([training.seed, _DRAW, list(BY_OPTION).index(option)])
+        noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
+        if training.quantisation is not None:
+            noise = training.quantisation.round(clean + noise) - clean
+        return self._judge.judge(option, noise, compare(noise, self._learnt, self._held_out)[0])
 
 
 def compare(generated: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows) -> list[np.ndarray]:

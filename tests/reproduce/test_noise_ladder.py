@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.enhanced_simulator.noise_choice import RungJudgement, choose, judge
+from enhsim_tf.enhanced_simulator.noise_choice import NoiseJudge, RungJudgement, choose
 from enhsim_tf.noise.ladder import RUNGS
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.noise_gallery import GALLERY
@@ -47,8 +47,9 @@ def test_noise_of_the_right_scale_passes_and_noise_of_half_the_scale_does_not():
     rng = np.random.default_rng(5)
     learnt, held_out, generated, quiet = (rng.normal(0, scale, (600, 60)) for scale in (1, 1, 1, 0.5))
     signals = [np.zeros((600, 60))] * 3
-    assert judge("right", generated, learnt, held_out, signals).passes
-    wrong = judge("wrong", quiet, learnt, held_out, signals)
+    judge = NoiseJudge(learnt, held_out, signals)
+    assert judge.judge("right", generated).passes
+    wrong = judge.judge("wrong", quiet)
     assert wrong.auc > 0.95 and wrong.alarms > 0.5 and not wrong.passes
 
 

@@ -95,7 +95,8 @@ class Cell:
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
             generated = ladder.generate(model, len(held_out), draws, more)
-            choice = [dataclasses.asdict(self._judge(rung, model, draws))]
+            judge, below = self._judge
+            choice = [dataclasses.asdict(judge.judge(rung, ladder.generate(model, len(below), draws, below)))]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
         rates = evaluation.false_alarm_rates(judged["alarms"])
         detectors = [
@@ -114,14 +115,14 @@ class Cell:
             table.to_parquet(folder / f"{name}.parquet")
         self.stages.tell(f"  {rung:24} false alarms {np.mean(list(rates.values())):.2%}")
 
-    def _judge(self, rung: str, model: object, draws: np.random.Generator) -> noise_choice.RungJudgement:
-        """Judges a rung as `fit` would: on held-out windows of the same telemetry, by the cheap detectors and a classifier."""
+    @functools.cached_property
+    def _judge(self) -> tuple[noise_choice.NoiseJudge, np.ndarray]:
+        """Judges rungs as `fit` would: on held-out windows of the same telemetry; and the clean windows below generated noise."""
         judged = self._with_noise("calibration", min(JUDGED, self.settings.ladder.num_windows), "ladder, judged")
         learnt = {name: values[: len(judged["noise"])] for name, values in self.learnt.items()}
         clean = self.data.windows("train", len(judged["noise"]), "ladder, judged, waves")["truth"]
-        generated = ladder.generate(model, len(clean), draws, clean)
         signals = (clean, learnt["truth"], judged["truth"])
-        return noise_choice.judge(rung, generated, learnt["noise"], judged["noise"], signals, seed=self.settings.seed)
+        return noise_choice.NoiseJudge(learnt["noise"], judged["noise"], signals, seed=self.settings.seed), clean
 
     @functools.cached_property
     def trial(self) -> evaluation.Trial:
