@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, FOOT, GENERATED, QUIET, REAL, new_sheet, panels
 from enhsim_tf.reproduce.figure import Figure
-from enhsim_tf.reproduce.learning_curve.arms import ADVERSARIAL, CORAL, SIMULATOR, THRESHOLD_ON_REAL
+from enhsim_tf.reproduce.learning_curve.arms import ADVERSARIAL, CLASSIFIER_ON_REAL, CORAL, SIMULATOR, THRESHOLD_ON_REAL
 from enhsim_tf.reproduce.learning_curve.arms import REAL as REAL_ARM
 
 _CURVES = {
@@ -20,7 +20,8 @@ _CURVES = {
     SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
     THRESHOLD_ON_REAL: ("the same, threshold on the real windows", "d", ":", ENHANCED),
     CORAL: ("CORAL", "s", ":", COARSE),
-    ADVERSARIAL: ("domain-adversarial classifier", "x", ":", QUIET),
+    ADVERSARIAL: ("domain-adversarial classifier, simulator", "x", ":", QUIET),
+    CLASSIFIER_ON_REAL: ("classifier, no simulator", "+", "-", QUIET),
 }
 """Label, marker, line style and colour of each arm that is drawn."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.reproduce.learning_curve.arms import REAL, SIMULATOR
+from enhsim_tf.reproduce.learning_curve.arms import CLASSIFIER, CLASSIFIER_ON_REAL, REAL, SIMULATOR
 from enhsim_tf.reproduce.tables import KeptTables
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
 
     Returns:
         For each environment and arm its curves over the number of real windows; and for each environment the numbers of real
-        windows at which each simulator arm pays, and the smallest number from which the real windows suffice.
+        windows at which each simulator arm pays, and the smallest number from which the real windows suffice. With classifiers, also
+        by how much a classifier of injected anomalies finds more if it learns from the simulator instead of the real windows.
     """
     rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
     numbers = sorted({int(number) for number in rows["num_real"]})
@@ -63,6 +64,8 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
                 "is_kept": bool(max(arms[best]["excess"][at], 0) <= PAYS_SHARE * real["excess"][at]),
             },
         }
+        if {CLASSIFIER, CLASSIFIER_ON_REAL} <= set(arms):
+            environments[environment]["classifiers"] = _gain(own, numbers)
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
 
@@ -80,6 +83,18 @@ def _curves(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, Any]:
         for name in ("recall", "recall_at_real_rate"):
             found[name][str(number)] = float(by_seed[name].mean())
         found["seeds"][str(number)] = len(by_seed)
+    return found
+
+
+def _gain(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, dict[str, Any]]:
+    """Recall at the matched rate of the classifier with the simulator minus that without: mean and range over the same seeds."""
+    recall = rows.pivot_table("recall_at_real_rate", ["num_real", "seed"], "arm")
+    gain = (recall[CLASSIFIER] - recall[CLASSIFIER_ON_REAL]).dropna()
+    found = {}
+    for number in numbers:
+        if number in gain.index.get_level_values("num_real"):
+            here = gain.loc[number]
+            found[str(number)] = {"mean": float(here.mean()), "low": float(here.min()), "high": float(here.max()), "seeds": len(here)}
     return found
 
 
