@@ -3,11 +3,15 @@
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.console import Parser, run_command, tell
 from enhsim_tf.noise.rung_names import BY_OPTION
+
+if TYPE_CHECKING:
+    from enhsim_tf.reproduce.settings import Settings
 
 EXAMPLES = """\
 examples:
@@ -197,84 +201,79 @@ def run_robustness(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on robustness in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.publish.report import report, verdict_lines
     from enhsim_tf.reproduce.robustness.run import FOLDER, run
-    from enhsim_tf.reproduce.settings import make_settings
-    from enhsim_tf.reproduce.stages import default_cache
 
-    turned = {} if options.seeds is None else {"robustness__num_seeds": options.seeds}
-    settings = make_settings(options.budget, **turned)
-    environments = NOISES if options.environment is None else (options.environment,)
-    out = folder / FOLDER
-    found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
-    tell("\n" + "\n".join(verdict_lines(found)))
-    if is_published(options, out, FOLDER):
-        report(found, Path())
-    tell(f"tables, findings.json and figures in {out}/")
-    return 0
+    found = run(*seeded(options, "robustness"), folder / FOLDER, environments_of(options), options.fresh, tell)
+    return conclude(options, folder / FOLDER, ["", *verdict_lines(found)], lambda: report(found, Path()))
 
 
 def run_noise(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on noise in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.noise_gallery import GALLERY
     from enhsim_tf.reproduce.noise_ladder.page import PAGE, fill_page
-    from enhsim_tf.reproduce.noise_ladder.run import FOLDER, run
-    from enhsim_tf.reproduce.settings import make_settings
-    from enhsim_tf.reproduce.stages import default_cache
+    from enhsim_tf.reproduce.noise_ladder.run import FOLDER, lines, run
 
-    turned = {} if options.seeds is None else {"ladder__num_seeds": options.seeds}
-    families = tuple(GALLERY) if options.environment is None else (options.environment,)
-    out = folder / FOLDER
     rungs = tuple(RUNG_NAMES) if options.rungs is None else chosen_rungs(options.rungs)
-    found = run(make_settings(options.budget, **turned), options.cache or default_cache(), out, families, rungs, options.fresh, tell)
-    for name, about in found["families"].items():
-        rates = ", ".join(f"{rung} {values['alarms']:.1%}" for rung, values in about["rungs"].items())
-        tell(f"{name:18} ({about['half']}) chosen: {', '.join(about['chosen'])}; false alarms: {rates}")
-    if is_published(options, out, FOLDER):
-        fill_page(PAGE, noise=found)
-    tell(f"tables, findings.json and figures in {out}/")
-    return 0
+    found = run(*seeded(options, "ladder"), folder / FOLDER, environments_of(options, tuple(GALLERY)), rungs, options.fresh, tell)
+    return conclude(options, folder / FOLDER, lines(found), lambda: fill_page(PAGE, noise=found))
 
 
 def run_learning_curve(options: argparse.Namespace, folder: Path) -> int:
     """Runs the experiment on the number of real windows in a subfolder of the figures' folder, and returns the exit code."""
-    from enhsim_tf.reproduce.learning_curve.run import FOLDER, run
+    from enhsim_tf.reproduce.learning_curve.run import FOLDER, lines, run
     from enhsim_tf.reproduce.noise_ladder.page import PAGE, fill_page
-    from enhsim_tf.reproduce.settings import make_settings
-    from enhsim_tf.reproduce.stages import default_cache
 
-    turned = {} if options.seeds is None else {"curve__num_seeds": options.seeds}
-    environments = NOISES if options.environment is None else (options.environment,)
     rungs = () if options.rungs is None else chosen_rungs(options.rungs)
-    out, settings = folder / FOLDER, make_settings(options.budget, **turned)
-    found = run(settings, options.cache or default_cache(), out, environments, rungs, options.fresh, tell)
-    for name, about in found["environments"].items():
-        bar = about["bar"]
-        tell(
-            f"{name:18} {bar['num_real']} real windows: excess {bar['real_excess']:.1%} without a simulator, {bar['excess']:.1%} with {bar['best']}"
-        )
-    if is_published(options, out, FOLDER):
-        fill_page(PAGE, curve=found)
-    tell(f"tables, findings.json and figures in {out}/")
-    return 0
+    found = run(*seeded(options, "curve"), folder / FOLDER, environments_of(options), rungs, options.fresh, tell)
+    return conclude(options, folder / FOLDER, lines(found), lambda: fill_page(PAGE, curve=found))
 
 
 def run_factorial(options: argparse.Namespace, folder: Path) -> int:
     """Runs the factorial experiment in a subfolder of the figures' folder, and returns the exit code."""
     from enhsim_tf.reproduce.factorial.run import FOLDER, run
     from enhsim_tf.reproduce.publish.factorial_text import lines
-    from enhsim_tf.reproduce.publish.report import findings_of, report
+
+    found = run(*seeded(options, "factorial"), folder / FOLDER, environments_of(options), options.fresh, tell)
+    return conclude(options, folder / FOLDER, ["", *lines(found)], write_report)
+
+
+def seeded(options: argparse.Namespace, group: str) -> "tuple[Settings, Path]":
+    """The settings, with the number of seeds of a group that `--seeds` asks for, and the cache."""
     from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.stages import default_cache
 
-    turned = {} if options.seeds is None else {"factorial__num_seeds": options.seeds}
-    environments = NOISES if options.environment is None else (options.environment,)
-    out, settings = folder / FOLDER, make_settings(options.budget, **turned)
-    found = run(settings, options.cache or default_cache(), out, environments, options.fresh, tell)
-    tell("\n" + "\n".join(lines(found)))
-    kept = findings_of(Path(), "robustness")
-    if is_published(options, out, FOLDER) and kept is not None:
-        report(kept, Path())
+    turned = {} if options.seeds is None else {f"{group}__num_seeds": options.seeds}
+    return make_settings(options.budget, **turned), options.cache or default_cache()
+
+
+def environments_of(options: argparse.Namespace, every: tuple[str, ...] = NOISES) -> tuple[str, ...]:
+    """The kinds of noise that `--environment` asks for."""
+    return every if options.environment is None else (options.environment,)
+
+
+def conclude(options: argparse.Namespace, out: Path, lines: Sequence[str], publish: Callable[[], Any], is_whole: bool | None = None) -> int:
+    """Prints what an experiment found, and updates the documents if it is the published one; returns the exit code.
+
+    Args:
+        options: The options.
+        out: The output folder of the experiment.
+        lines: What it found.
+        publish: Updates the documents.
+        is_whole: Whether all parts of the published experiment were run; None looks at the options.
+    """
+    tell("\n".join(lines))
+    if is_published(options, out, not is_other(options) if is_whole is None else is_whole):
+        publish()
     tell(f"tables, findings.json and figures in {out}/")
     return 0
+
+
+def write_report() -> None:
+    """Writes the report again, if there are findings of the experiment on robustness."""
+    from enhsim_tf.reproduce.publish.report import findings_of, report
+
+    kept = findings_of(Path(), "robustness")
+    if kept is not None:
+        report(kept, Path())
 
 
 def chosen_rungs(given: str) -> tuple[str, ...]:
@@ -290,24 +289,13 @@ def chosen_rungs(given: str) -> tuple[str, ...]:
 
 def run_labelled(options: argparse.Namespace, folder: Path) -> int:
     """Runs the study of real telemetry in a subfolder of the figures' folder, and returns the exit code."""
-    from enhsim_tf.reproduce.publish.report import findings_of, report
-    from enhsim_tf.reproduce.settings import make_settings
     from enhsim_tf.reproduce.spacecraft.run import FOLDER, lines, run
-    from enhsim_tf.reproduce.stages import default_cache
 
-    out = folder / FOLDER
     chosen = None if options.channels is None else [name.strip() for name in options.channels.split(",")]
-    cache, is_shown = (
-        options.cache or default_cache(),
-        not is_other(options),
-    )  # checked before the run overwrites the published results
-    found = run(make_settings(options.budget), cache, options.data, out, chosen, options.fresh, tell)
-    tell("\n" + "\n".join(lines(found)))
-    kept = findings_of(Path(), "robustness")
-    if options.budget == "full" and out == Path("figures") / FOLDER and kept is not None and is_shown:
-        report(kept, Path())
-    tell(f"tables, findings.json and figures in {out}/")
-    return 0
+    is_whole = not is_other(options)  # looked up before the run overwrites the published results
+    settings, cache = seeded(options, "labelled")
+    found = run(settings, cache, options.data, folder / FOLDER, chosen, options.fresh, tell)
+    return conclude(options, folder / FOLDER, ["", *lines(found)], write_report, is_whole)
 
 
 def run_battery(options: argparse.Namespace, folder: Path) -> int:
@@ -318,17 +306,9 @@ def run_battery(options: argparse.Namespace, folder: Path) -> int:
     from enhsim_tf.reproduce.battery.findings import lines
     from enhsim_tf.reproduce.battery.page import fill_page
     from enhsim_tf.reproduce.battery.run import FOLDER, run
-    from enhsim_tf.reproduce.settings import make_settings
-    from enhsim_tf.reproduce.stages import default_cache
 
-    turned = {} if options.seeds is None else {"battery__num_seeds": options.seeds}
-    out = folder / FOLDER
-    found = run(make_settings(options.budget, **turned), options.cache or default_cache(), out, options.fresh, tell)
-    tell("\n" + "\n".join(lines(found)))
-    if options.budget == "full" and out == Path("figures") / FOLDER and not is_other(options):
-        fill_page(Path("docs/battery.md"), found)
-    tell(f"tables, findings.json and figures in {out}/")
-    return 0
+    found = run(*seeded(options, "battery"), folder / FOLDER, options.fresh, tell)
+    return conclude(options, folder / FOLDER, ["", *lines(found)], lambda: fill_page(Path("docs/battery.md"), found))
 
 
 def check(options: argparse.Namespace) -> None:
@@ -428,9 +408,9 @@ def is_other(options: argparse.Namespace) -> bool:
     return bool(options.channels) or (shown is not None and set(read_labels(options.data)) != {*shown["channels"], *shown["skipped"]})
 
 
-def is_published(options: argparse.Namespace, out: Path, name: str) -> bool:
-    """Whether a run is the published one of its experiment, at full budget and with all of its parts, in the folder of the figures."""
-    return options.budget == "full" and out == Path("figures") / name and options.rungs is None and not is_other(options)
+def is_published(options: argparse.Namespace, out: Path, is_whole: bool) -> bool:
+    """Whether a run is the published one of its experiment: full budget, all of its parts, in a subfolder of `figures`."""
+    return options.budget == "full" and out.parent == Path("figures") and options.rungs is None and is_whole
 
 
 def make_folders(options: argparse.Namespace) -> Path:

@@ -1,17 +1,18 @@
 """`python -m enhsim_tf.reproduce --experiment battery`: runs all replicates and writes tables, findings, figures and the page."""
 
+import functools
 import importlib.metadata
-import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder, write_json
+from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.reproduce.battery import record
 from enhsim_tf.reproduce.battery.orbits import REGIMES
 from enhsim_tf.reproduce.battery.simulate import check_installed
+from enhsim_tf.reproduce.replicates import collect, write_results
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
+from enhsim_tf.reproduce.stages import Stages
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,41 +38,18 @@ def run(settings: Settings, cache: Path, out: Path, fresh: bool, tell: Callable[
     """
     from enhsim_tf.reproduce.battery.figures import FIGURES
     from enhsim_tf.reproduce.battery.findings import KEPT, summarise
-    from enhsim_tf.reproduce.figure import save_all
-
-    folder = make_folder(out)
-    tables = collect(settings, cache, fresh, tell)
-    KEPT.write(tables, folder)
-    found = summarise(KEPT.read(folder))
-    found |= {"budget": settings.budget, "versions": VERSIONS | {"pybamm": importlib.metadata.version("pybamm")}}
-    write_json(folder / "findings.json", found)
-    save_all(FIGURES, found, folder, KEPT.command)
-    return found
-
-
-def collect(settings: Settings, cache: Path, fresh: bool, tell: Callable[[str], None]) -> "dict[str, pd.DataFrame]":
-    """The tables of all replicates. They run seed by seed, so an interrupted run has both regimes of the first seeds.
-
-    Args:
-        settings: All settings.
-        cache: Folder of cached stages.
-        fresh: Whether to run every stage again instead of using the cache.
-        tell: Called with a line about each stage.
-    """
-    import pandas as pd
 
     check_installed()
-    parts: dict[str, list[pd.DataFrame]] = {}
+    make_folder(out)
     first, number = settings.battery.first_seed, settings.battery.num_seeds
-    turns, is_terminal = Turns("replicate", number * len(REGIMES), tell), sys.stdout.isatty()
-    for seed in range(first, first + number):
-        for regime in REGIMES:
-            turns.begin(f"{regime}, seed {seed}")
-            stages = Stages(cache, fresh, tell, speaks=not is_terminal)
-            for name, table in replicate(settings, stages, regime, seed).items():
-                parts.setdefault(name, []).append(table)
-            turns.end(stages)
-    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}
+    replicates = [
+        (f"{regime}, seed {seed}", functools.partial(replicate, settings, regime=regime, seed=seed))
+        for seed in range(first, first + number)  # seed by seed, so that an interrupted run has both regimes of the first seeds
+        for regime in REGIMES
+    ]
+    tables = collect("replicate", replicates, cache, fresh, tell)
+    about = {"budget": settings.budget, "versions": {"pybamm": importlib.metadata.version("pybamm")}}
+    return write_results(tables, KEPT, summarise, FIGURES, out, about)
 
 
 def replicate(settings: Settings, stages: Stages, regime: str, seed: int) -> "dict[str, pd.DataFrame]":

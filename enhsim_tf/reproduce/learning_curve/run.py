@@ -1,14 +1,18 @@
 """`python -m enhsim_tf.reproduce --experiment learning-curve`: how few real windows suffice, and from how few a simulator pays."""
 
 import dataclasses
-import sys
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder, write_json
+from enhsim_tf.common.atomic_files import make_folder
+from enhsim_tf.reproduce.replicates import collect, write_results
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
+from enhsim_tf.reproduce.stages import Stages
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FOLDER = "learning_curve"  # below the folder of the figures
 
@@ -32,28 +36,27 @@ def run(
     """
     import pandas as pd
 
-    from enhsim_tf.reproduce.figure import save_all
     from enhsim_tf.reproduce.learning_curve.cells import Cell, World
     from enhsim_tf.reproduce.learning_curve.figures import FIGURES
     from enhsim_tf.reproduce.learning_curve.findings import KEPT, summarise
 
-    folder, frames = make_folder(out), []
-    turns = Turns("learning curve", settings.curve.num_seeds * len(environments), tell)
-    for number in range(settings.curve.num_seeds):
-        for environment in environments:
-            seed = settings.curve.first_seed + number
-            turns.begin(f"{environment}, seed {seed}")
-            stages = Stages(cache, fresh, tell, speaks=not sys.stdout.isatty())
-            telemetry = dataclasses.replace(settings.telemetry, noise=environment)
-            world = World(dataclasses.replace(settings, telemetry=telemetry, seed=seed))
-            frames += [Cell(world, num_real).rows(rungs, stages) for num_real in settings.curve.num_real]
-            turns.end(stages)
-            from enhsim_tf.keras_tools.backend import keras
+    def replicate(environment: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
+        telemetry = dataclasses.replace(settings.telemetry, noise=environment)
+        world = World(dataclasses.replace(settings, telemetry=telemetry, seed=seed))
+        return {"rows": pd.concat([Cell(world, num_real).rows(rungs, stages) for num_real in settings.curve.num_real])}
 
-            keras.backend.clear_session()  # frees the memory of the networks
-    KEPT.write({"rows": pd.concat(frames, ignore_index=True)}, folder)
-    found = summarise(KEPT.read(folder))
-    found |= {"budget": settings.budget, "first_seed": settings.curve.first_seed, "versions": VERSIONS}
-    write_json(folder / "findings.json", found)
-    save_all(FIGURES, found, folder, KEPT.command)
-    return found
+    make_folder(out)
+    first = settings.curve.first_seed
+    seeds = range(first, first + settings.curve.num_seeds)
+    replicates = [(f"{each}, seed {seed}", functools.partial(replicate, each, seed)) for seed in seeds for each in environments]
+    tables = collect("learning curve", replicates, cache, fresh, tell)
+    return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """A line for each environment: the excess of false alarms at the number of windows that the target names."""
+    return [
+        f"{name:18} {about['bar']['num_real']} real windows: excess {about['bar']['real_excess']:.1%} without a simulator, "
+        f"{about['bar']['excess']:.1%} with {about['bar']['best']}"
+        for name, about in found["environments"].items()
+    ]

@@ -1,14 +1,18 @@
 """`python -m enhsim_tf.reproduce --experiment noise`: every rung of the noise ladder on every family of the gallery."""
 
 import dataclasses
-import sys
-from collections.abc import Callable, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder, write_json
+from enhsim_tf.common.atomic_files import make_folder
+from enhsim_tf.reproduce.replicates import collect, write_results
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
+from enhsim_tf.reproduce.stages import Stages
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FOLDER = "noise"  # below the folder of the figures
 
@@ -30,32 +34,29 @@ def run(
     Returns:
         The findings.
     """
-    import pandas as pd
-
-    from enhsim_tf.reproduce.figure import save_all
     from enhsim_tf.reproduce.noise_ladder.cells import Cell
     from enhsim_tf.reproduce.noise_ladder.figures import FIGURES
     from enhsim_tf.reproduce.noise_ladder.findings import KEPT, summarise
 
-    folder = make_folder(out)
-    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in KEPT.names}
-    turns = Turns("noise", settings.ladder.num_seeds * len(families), tell)
-    for number in range(settings.ladder.num_seeds):
-        for family in families:
-            seed = settings.ladder.first_seed + number
-            turns.begin(f"{family}, seed {seed}")
-            stages = Stages(cache, fresh, tell, speaks=not sys.stdout.isatty())
-            telemetry = dataclasses.replace(settings.telemetry, noise=family)
-            cell = Cell(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages)
-            for name, found in cell.tables(rungs).items():
-                parts[name].append(found)
-            turns.end(stages)
-            from enhsim_tf.keras_tools.backend import keras
+    def replicate(family: str, seed: int, stages: Stages) -> "Mapping[str, pd.DataFrame]":
+        telemetry = dataclasses.replace(settings.telemetry, noise=family)
+        return Cell(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages).tables(rungs)
 
-            keras.backend.clear_session()  # frees the memory of the networks
-    KEPT.write({name: pd.concat(found, ignore_index=True) for name, found in parts.items()}, folder)
-    found = summarise(KEPT.read(folder))
-    found |= {"budget": settings.budget, "first_seed": settings.ladder.first_seed, "versions": VERSIONS}
-    write_json(folder / "findings.json", found)
-    save_all(FIGURES, found, folder, KEPT.command)
-    return found
+    make_folder(out)
+    first = settings.ladder.first_seed
+    seeds = range(first, first + settings.ladder.num_seeds)
+    replicates = [(f"{each}, seed {seed}", functools.partial(replicate, each, seed)) for seed in seeds for each in families]
+    tables = collect("noise", replicates, cache, fresh, tell)
+    return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """A line for each family: the noise model that is chosen, and the false alarms of each."""
+    rates = {
+        name: ", ".join(f"{rung} {values['alarms']:.1%}" for rung, values in about["rungs"].items())
+        for name, about in found["families"].items()
+    }
+    return [
+        f"{name:18} ({about['half']}) chosen: {', '.join(about['chosen'])}; false alarms: {rates[name]}"
+        for name, about in found["families"].items()
+    ]

@@ -1,14 +1,16 @@
 """`python -m enhsim_tf.reproduce --experiment robustness`: runs all replicates and writes tables, findings, figures and the report."""
 
+import functools
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder, write_json
+from enhsim_tf.common.atomic_files import make_folder
+from enhsim_tf.reproduce.replicates import collect, write_results
 from enhsim_tf.reproduce.robustness.negative_controls import judge_controls
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
+from enhsim_tf.reproduce.stages import Stages
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,61 +27,31 @@ def run(
         settings: All settings; `robustness.num_seeds` says how many seeds.
         cache: Folder of cached stages.
         out: Output folder for tables, findings and figures.
-        environments: Names of the environments.
+        environments: Names of the environments; degraded modes are tested in the first.
         fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
 
     Returns:
         The findings.
     """
-    from enhsim_tf.reproduce.figure import save_all
+    from enhsim_tf.reproduce.robustness.degraded_modes import DegradedModes
     from enhsim_tf.reproduce.robustness.figures import FIGURES
     from enhsim_tf.reproduce.robustness.findings import KEPT, summarise
-
-    folder = make_folder(out)
-    tables = collect(settings, cache, environments, fresh, tell)
-    KEPT.write(tables, folder)
-    found = summarise(KEPT.read(folder))
-    found |= {"budget": settings.budget, "first_seed": settings.robustness.first_seed, "versions": VERSIONS}
-    write_json(folder / "findings.json", found)
-    save_all(FIGURES, found, folder, KEPT.command)
-    return found
-
-
-def collect(
-    settings: Settings, cache: Path, environments: Sequence[str], fresh: bool, tell: Callable[[str], None]
-) -> "dict[str, pd.DataFrame]":
-    """The tables of all replicates. Replicates run seed by seed, so an interrupted run has all environments of the first seeds.
-
-    Args:
-        settings: All settings.
-        cache: Folder of cached stages.
-        environments: Names of the environments; degraded modes are tested in the first.
-        fresh: Whether to run every stage again instead of using the cache.
-        tell: Called with a line about each stage.
-    """
-    import pandas as pd
-
-    from enhsim_tf.reproduce.robustness.degraded_modes import DegradedModes
     from enhsim_tf.reproduce.robustness.replicate import replicate
 
-    parts: dict[str, list[pd.DataFrame]] = {}
-    is_terminal, turns = sys.stdout.isatty(), Turns("replicate", settings.robustness.num_seeds * len(environments), tell)
-    for number in range(settings.robustness.num_seeds):
-        for environment in environments:
-            turns.begin(f"{environment}, seed {settings.robustness.first_seed + number}")
-            stages = Stages(cache, fresh, tell, speaks=not is_terminal)
-            one = replicate(settings, stages, environment, number, int(is_terminal))
-            tables = one.tables | (DegradedModes(one).tables if environment == environments[0] else {})
-            for name, table in tables.items():
-                parts.setdefault(name, []).append(table)
-            turns.end(stages)
-            from enhsim_tf.keras_tools.backend import keras
+    def tables_of(environment: str, number: int, stages: Stages) -> "dict[str, pd.DataFrame]":
+        one = replicate(settings, stages, environment, number, int(sys.stdout.isatty()))
+        return one.tables | (DegradedModes(one).tables if environment == environments[0] else {})
 
-            keras.backend.clear_session()  # frees the memory of the replicate's networks
-    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()} | {
-        "controls": _controls(settings, cache, fresh, tell)
-    }
+    make_folder(out)
+    chosen, first = settings.robustness, settings.robustness.first_seed
+    replicates = [
+        (f"{environment}, seed {first + number}", functools.partial(tables_of, environment, number))
+        for number in range(chosen.num_seeds)  # seed by seed, so that an interrupted run has all environments of the first seeds
+        for environment in environments
+    ]
+    tables = collect("replicate", replicates, cache, fresh, tell) | {"controls": _controls(settings, cache, fresh, tell)}
+    return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
 
 
 def _controls(settings: Settings, cache: Path, fresh: bool, tell: Callable[[str], None]) -> "pd.DataFrame":

@@ -1,17 +1,19 @@
 """`python -m enhsim_tf.reproduce --experiment labelled --data FOLDER`: runs all channels and writes tables, findings, figures and the report."""
 
 import dataclasses
+import functools
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder, write_json
+from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.number_words import in_words
 from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.reproduce.replicates import collect, write_results
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
+from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.telemetry.telemanom import load_channel, read_labels
 
 if TYPE_CHECKING:
@@ -40,66 +42,32 @@ def run(
     Raises:
         InputError: If the folder does not have this layout, a channel is missing, or no channel can be used.
     """
-    from enhsim_tf.reproduce.figure import save_all
-    from enhsim_tf.reproduce.spacecraft.figures import FIGURES
-    from enhsim_tf.reproduce.spacecraft.findings import KEPT, summarise
-
-    folder = make_folder(out)
-    tables, skipped = collect(settings, cache, data, channels, fresh, tell)
-    KEPT.write(tables, folder)
-    found = summarise(KEPT.read(folder))
-    found |= {"budget": settings.budget, "skipped": skipped, "versions": VERSIONS}
-    write_json(folder / "findings.json", found)
-    save_all(FIGURES, found, folder, KEPT.command)
-    return found
-
-
-def collect(
-    settings: Settings, cache: Path, data: Path, channels: Sequence[str] | None, fresh: bool, tell: Callable[[str], None]
-) -> "tuple[dict[str, pd.DataFrame], dict[str, str]]":
-    """The tables of all channels with all seeds, and the reason for each channel that could not be used.
-
-    Args:
-        settings: All settings.
-        cache: Folder of cached stages.
-        data: Folder of the data set.
-        channels: Names of the channels; None for all.
-        fresh: Whether to run every stage again instead of using the cache.
-        tell: Called with a line about each stage.
-    """
-    import pandas as pd
-
-    from enhsim_tf.reproduce.spacecraft.study import ChannelStudy
-
     labels = read_labels(data)
     unknown = [name for name in channels or () if name not in labels]
     if unknown:
         raise InputError(f"Expected --channels of {', '.join(list(labels)[:8])}. Received: {unknown[0]!r}. Name labelled ones.")
-    parts: dict[str, list[pd.DataFrame]] = {}
-    skipped: dict[str, str] = {}
-    chosen, is_terminal = list(channels or labels), sys.stdout.isatty()
-    turns = Turns("channel", len(chosen) * settings.labelled.num_seeds, tell)
-    for seed in range(settings.seed, settings.seed + settings.labelled.num_seeds):
-        for name in chosen:
-            turns.begin(f"{name}, seed {seed}")
-            stages = Stages(cache, fresh, tell, speaks=not is_terminal)
-            try:
-                study = ChannelStudy(load_channel(data, name), dataclasses.replace(settings, seed=seed), stages, int(is_terminal))
-                tables = study.tables
-            except InputError as error:
-                skipped[name] = str(error)
-                tell(f"left out: {error}")
-                turns.end(stages)
-                continue
-            for each, table in tables.items():
-                parts.setdefault(each, []).append(table)
-            turns.end(stages)
-            from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.reproduce.spacecraft.figures import FIGURES
+    from enhsim_tf.reproduce.spacecraft.findings import KEPT, summarise
+    from enhsim_tf.reproduce.spacecraft.study import ChannelStudy
 
-            keras.backend.clear_session()  # frees the memory of the channel's networks
-    if not parts:
+    make_folder(out)
+    skipped: dict[str, str] = {}
+
+    def tables_of(name: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
+        try:
+            return ChannelStudy(load_channel(data, name), dataclasses.replace(settings, seed=seed), stages, int(sys.stdout.isatty())).tables
+        except InputError as error:  # a channel that cannot be used
+            skipped[name] = str(error)
+            tell(f"left out: {error}")
+            return {}
+
+    chosen = list(channels or labels)
+    seeds = range(settings.seed, settings.seed + settings.labelled.num_seeds)
+    replicates = [(f"{name}, seed {seed}", functools.partial(tables_of, name, seed)) for seed in seeds for name in chosen]
+    tables = collect("channel", replicates, cache, fresh, tell)
+    if not tables:
         raise InputError(f"Expected a channel that can be used. Received: none of {len(chosen)} in {data}. The first: {skipped[chosen[0]]}")
-    return {name: pd.concat(each, ignore_index=True) for name, each in parts.items()}, skipped
+    return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "skipped": skipped})
 
 
 def table(found: dict[str, Any]) -> str:
