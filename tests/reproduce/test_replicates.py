@@ -28,7 +28,7 @@ def test_findings_are_computed_from_the_written_tables_and_name_the_versions(tmp
     tables = {"rows": pd.DataFrame({"value": [0.123]})}
 
     def summarise(read):
-        return {"value": float(read["rows"]["value"].iloc[0])}
+        return {"seeds": [1], "value": float(read["rows"]["value"].iloc[0])}
 
     found = write_results(tables, kept, summarise, {}, tmp_path / "out", {"budget": "smoke", "versions": {"other": "1"}})
     assert found["value"] == pytest.approx(0.1)  # rounded as it is stored
