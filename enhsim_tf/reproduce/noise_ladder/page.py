@@ -85,13 +85,17 @@ def unrealistic(found: Findings) -> str:
         beyond = {name: ratio for name, ratio in about["rungs"][rung]["beyond"].items() if ratio is not None}
         worst = sorted(beyond, key=beyond.get, reverse=True)[:_NAMED]
         if worst:
-            named = ", ".join(f"{name} ({beyond[name]:.1f} times its floor)" for name in worst)
+            named = ", ".join(f"{name} ({_times(beyond[name])} its floor)" for name in worst)
             lines.append(
                 f"- {family.replace('_', ' ')}: {len(beyond)} measure{'s' * (len(beyond) != 1)} beyond three times the floor: {named}."
             )
         else:
             lines.append(f"- {family.replace('_', ' ')}: no measure beyond three times its floor.")
     return "\n".join([f"Noise of the {rung}, by family:", "", *lines])
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.1f} times" if ratio < 1_000 else "more than 1,000 times"
 
 
 def learning_curve(found: Findings) -> str:
