@@ -108,7 +108,7 @@ def _tell_time(lesson: str) -> None:
     took = json.loads(path.read_text(encoding="utf-8")).get(lesson, {}) if path.is_file() else {}
     told = [f"{took[budget]} s at {budget} budget" for budget in _TAKES if budget in took]
     if told:
-        print(f"Apart from that, this lesson took {' and '.join(told)} when it was last executed for publication.")
+        print(f"Apart from that, this lesson took {' and '.join(told)}\nwhen it was last executed for publication.")
 
 
 def prepare(experiment: Experiment) -> list[str]:
