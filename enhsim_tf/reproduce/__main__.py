@@ -308,7 +308,7 @@ def run_battery(options: argparse.Namespace, folder: Path) -> int:
     from enhsim_tf.reproduce.battery.run import FOLDER, run
 
     found = run(*seeded(options, "battery"), folder / FOLDER, options.fresh, tell)
-    return conclude(options, folder / FOLDER, ["", *lines(found)], lambda: fill_page(Path("docs/battery.md"), found))
+    return conclude(options, folder / FOLDER, ["", *lines(found)], lambda: fill_page(Path(), found))
 
 
 def check(options: argparse.Namespace) -> None:

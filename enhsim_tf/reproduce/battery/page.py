@@ -9,26 +9,49 @@ from enhsim_tf.reproduce.battery.detectors import ARMS, COARSE, REAL_15, REAL_60
 from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
 from enhsim_tf.reproduce.battery.findings import C9_RATIO, LARGEST_GAP, LARGEST_SHARE, LEAST_DETECTORS, LEAST_SPEED, TRUSTED
 from enhsim_tf.reproduce.battery.labelled import DIFFERENCE
-from enhsim_tf.reproduce.publish.results import fill_parts
+from enhsim_tf.reproduce.publish.results import fill_pages, fill_parts
 
 Findings = Mapping[str, Any]
 
 
-def fill_page(path: Path, found: Findings) -> None:
-    """Writes the generated parts of the page between their markers.
+PAGE = "docs/battery.md"
+
+
+def fill_page(root: Path, found: Findings) -> None:
+    """Writes the generated parts of the study's page between their markers, and what it says about claim C9 on the page of the claims.
 
     Args:
-        path: The page; nothing is done where it does not exist.
+        root: Folder of the project; pages that do not exist are left out.
         found: The findings.
 
     Raises:
         InputError: If the markers of a part are not there once.
     """
-    if not path.is_file():
-        return
-    text = fill_parts(path.read_text(encoding="utf-8"), parts_of(found), path.name)
-    with replace_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    path = root / PAGE
+    if path.is_file():
+        text = fill_parts(path.read_text(encoding="utf-8"), parts_of(found), path.name)
+        with replace_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    fill_pages(root, {"battery": degraded_configurations(found)})
+
+
+def degraded_configurations(found: Findings) -> str:
+    """What the study says about claim C9."""
+    told = []
+    for regime, about in found["regimes"].items():
+        bar = about["bars"]["C9"]
+        worse, of = len(about["bars"]["faults"]["worse_than_coarse"]), sum(len(each["chosen"]) for each in about["faults"].values())
+        told.append(
+            f"in the {regime} regime, its error on faults is at most {bar['largest_ratio']:.1f} times its nominal error, and below the coarse "
+            f"simulator's error in {of - worse} of {of} cases"
+        )
+    holds = all(about["bars"]["C9"]["is_reached"] for about in found["regimes"].values())
+    return (
+        "Claim C9 is also tested with a real pair of simulators, a coarse and a fine one of a satellite's battery, in which the same faults "
+        f"are simulated ([the study](battery.md), {len(found['seeds'])} seeds). With the enhancer that held-out telemetry chooses, "
+        f"{'; '.join(told)}. By the criterion of the table (at most {C9_RATIO:g} times the nominal error in every case, and below the coarse "
+        f"simulator's error), C9 {'holds there' if holds else 'does not hold there either'}."
+    )
 
 
 def parts_of(found: Findings) -> dict[str, str]:

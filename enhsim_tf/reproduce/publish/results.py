@@ -109,6 +109,7 @@ PAGES = {
     "claims": "docs/what_holds.md",
     "robustness": "docs/what_holds.md",
     "factorial": "docs/what_holds.md",
+    "battery": "docs/what_holds.md",
     "labelled": "docs/spacecraft.md",
     "residual": "docs/spacecraft.md",
     "channels": "docs/spacecraft.md",

@@ -15,7 +15,7 @@ from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
 from enhsim_tf.reproduce.battery.faults import ALL, SEVERITIES, SIZES
 from enhsim_tf.reproduce.battery.figures import FIGURES
 from enhsim_tf.reproduce.battery.findings import KEPT, lines, summarise
-from enhsim_tf.reproduce.battery.page import fill_page, parts_of
+from enhsim_tf.reproduce.battery.page import degraded_configurations, fill_page, parts_of
 from enhsim_tf.reproduce.figure import save_all
 
 near = functools.partial(pytest.approx, rel=1e-4)  # tables hold float32
@@ -160,3 +160,14 @@ def test_the_committed_page_belongs_to_the_committed_tables():
     page = Path("docs/battery.md").read_text()
     for name, part in parts_of(found).items():
         assert part in page, name
+    assert degraded_configurations(found) in Path("docs/what_holds.md").read_text()
+
+
+def test_the_sentence_on_claim_c9_counts_cases_and_gives_the_verdict():
+    about = {
+        "bars": {"C9": {"largest_ratio": 3.04, "is_reached": False}, "faults": {"worse_than_coarse": [{}]}},
+        "faults": {"a": {"chosen": [0.1, 0.2]}, "b": {"chosen": [0.3]}},
+    }
+    text = degraded_configurations({"seeds": [1, 2], "regimes": {"gentle": about}})
+    assert "2 seeds" in text and "at most 3.0 times its nominal error, and below the coarse simulator's error in 2 of 3 cases" in text
+    assert text.endswith("C9 does not hold there either.")
