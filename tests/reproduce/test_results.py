@@ -141,7 +141,17 @@ def test_the_readme_has_a_short_row_for_each_claim(filled):
     rows = [line for line in _between(filled(), "claims in short").splitlines() if line.startswith("| C")]
     for row, record, value in zip(rows, RECORDS, ("0.123", "1,234,568", "–"), strict=True):
         cells = [cell.strip() for cell in row.strip("|").split("|")]
-        assert cells == [record["id"], record["sentence"], f"**{record['verdict']}**", f"{record['statistic']}: {value}"]
+        needed = results.NEEDED[record["id"]]
+        assert cells == [record["id"], record["sentence"], f"**{record['verdict']}**", f"{record['statistic']}: {value}", needed]
+
+
+def test_what_is_needed_in_short_has_the_numbers_of_the_tolerances():
+    from enhsim_tf.reproduce.paper.claims import CLAIMS
+
+    assert list(results.NEEDED) == [claim.id for claim in CLAIMS]
+    for claim in CLAIMS:
+        numbers = set(re.findall(r"\d[\d.,]*\d|\d", results.NEEDED[claim.id]))
+        assert numbers and numbers <= set(re.findall(r"\d[\d.,]*\d|\d", claim.tolerance)), claim.id
 
 
 def test_the_readme_holds_the_claims(filled):

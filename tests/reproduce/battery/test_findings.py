@@ -114,12 +114,13 @@ def test_the_page_and_the_lines_hold_the_numbers(found, tmp_path):
         in parts["targets"]
     )
     assert "3 were recorded with a reduced current" in parts["scope"] and "0.0310 ± 0.0010" in parts["errors"]
-    page = tmp_path / "battery.md"
+    page = tmp_path / "docs" / "battery.md"
+    page.parent.mkdir()
     page.write_text("".join(f"<!-- {name}: generated -->\nold\n<!-- end of {name} -->\n" for name in parts))
-    fill_page(page, found)
+    fill_page(tmp_path, found)
     assert "old" not in page.read_text() and parts["speed"] in page.read_text()
-    fill_page(tmp_path / "missing.md", found)
-    assert not (tmp_path / "missing.md").exists()
+    fill_page(tmp_path / "elsewhere", found)
+    assert not (tmp_path / "elsewhere").exists()
     assert "chosen 0.031" in lines(found)[0] and "targets reached: error, ridge, faults" in lines(found)[0]
 
 
