@@ -9,8 +9,8 @@
 # - **Terms:** *telemetry*: the measurements that a vehicle sends. *Nominal*: without a fault. A *detector* learns from nominal data, gives
 #   each new window a score, and raises an alarm above a threshold. All terms: [glossary](../docs/glossary.md).
 #
-# A detector that guards a satellite should know what failure looks like. Nobody breaks satellites to record it, so failures are
-# *simulated*. But simulations are too clean: a detector trained on them takes the ordinary noise of the real thing for an anomaly.
+# A detector needs nominal data to learn from, and faults to be tested on. Nobody breaks satellites to record faults, so both are
+# *simulated*. But simulations are too clean: a detector trained on them takes the ordinary noise of real telemetry for an anomaly.
 # Feldman ([arXiv 2008.12082](https://arxiv.org/abs/2008.12082)) proposes a repair: keep the simulator crude and fast, and let two
 # neural networks make its output realistic.
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED, QUIET, REAL
 from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import drawing, open_experiment, show, verdict
+from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment(lesson="00")
 
@@ -47,13 +47,17 @@ added = {}
 for name, scenario in {"healthy": None, "stuck": Degraded("stuck")}.items():
     waveform = simulator.generate_clean(num_windows=3, scenario=scenario, seed=7)
     added[name] = simulator.generate(num_windows=3, scenario=scenario, seed=7) - waveform
-assert np.allclose(added["healthy"], added["stuck"], atol=1e-5)
+difference = np.abs(added["healthy"] - added["stuck"]).max()
+say(f"Largest difference between the noise of the healthy and of the stuck satellite: **{difference:.0e}**.")
+assert difference < 1e-5
 
 # %% [markdown]
 # ## Steps 1, 2 and 4: a crude simulator beside the real thing
 #
-# The example is a satellite that turns once in two minutes on an orbit of eight. Its telemetry is the sum of two sines with noise. The
-# simulator knows the two periods and draws square waves ([02](02_source_target.ipynb)).
+# The example is a satellite that turns once in two minutes on an orbit of eight, with one sample a second. This satellite is synthetic:
+# its telemetry is the sum of two sines with white Gaussian noise, so that the truth is known. *Real* means this telemetry here, and
+# *generated* means made by a network ([24](24_real_telemetry.ipynb) has a real spacecraft). The simulator knows the two periods and draws
+# square waves ([02](02_source_target.ipynb)).
 
 # %%
 pairs = show(experiment, "fig02_source_target")
@@ -72,15 +76,15 @@ assert len(levels) == 4
 # ## Steps 3 and 5: the enhancer
 #
 # Network one maps a window of 500 coarse samples to a window of 500 smooth ones: four Dense layers, trained by mean squared error on
-# pairs like those above. The target is noisy; least squares averages the noise away, because noise cannot be predicted from a square
-# wave ([03](03_enhancer.ipynb)).
+# pairs like those above. The target is noisy. With enough data, least squares averages the noise away, because noise cannot be predicted
+# from a square wave ([03](03_enhancer.ipynb)).
 
 # %%
 enhanced = show(experiment, "fig04_enhanced_simulation")
 
 # %% [markdown]
 # *What to see:* the error against the true signal falls to a fraction of the simulator's own, on telemetry never trained on. The
-# enhanced signal is still slightly rough where the truth is smooth.
+# enhanced signal is still slightly rough where the truth is smooth: part of the noise of the training data was memorised.
 
 # %%
 before, after = float(enhanced["identity_nrmse"]), float(enhanced["nrmse"])
@@ -105,7 +109,7 @@ source = show(experiment, "fig08_source_noise")
 
 # %% [markdown]
 # *What to see:* the noise looks the same everywhere, and its standard deviation is close to the true one, which is known here
-# because the telemetry is generated.
+# because the telemetry is synthetic.
 
 # %%
 measured, true = float(source["standard_deviation"]), experiment.settings.telemetry.noise_sd
@@ -123,8 +127,9 @@ assert abs(measured / true - 1) < 0.03
 history = show(experiment, "fig12_accuracy_loss")
 
 # %% [markdown]
-# *What to see:* the discriminator wins at first; then its accuracies fall and its losses rise towards chance level, one half and
-# ln 2. The networks are in balance, and the paper stops here: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
+# *What to see:* the discriminator soon recognises nearly every window. Then the generator deceives it, and the accuracies for real and for
+# generated windows swing in opposite directions; their mean stays near one half, and both losses near ln 2, which is what guessing gives.
+# The networks are in balance, and the paper stops here: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
 
 # %%
 late = np.mean([history[f"accuracy_{kind}"][-3:] for kind in ("real", "generated")])
@@ -142,8 +147,9 @@ if experiment.settings.budget == "full":
 guess = show(experiment, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* nothing at a glance. The answer is printed upside down. Two generated windows resemble each other, which no two real
-# ones do, and a thousand of them vary in few dimensions (*effective rank*; [05](05_real_or_generated.ipynb)):
+# *What to see:* little, until one compares windows: the answer is printed upside down, and the generated ones share a pattern, which no two
+# real ones do. A thousand of them vary in few dimensions. The *effective rank* counts these dimensions and is at most 500 here
+# ([05](05_real_or_generated.ipynb)):
 
 # %%
 rows, is_generated = guess["rows"], guess["is_generated"]
@@ -181,10 +187,16 @@ if experiment.settings.budget == "full":  # twenty iterations give noise of the 
 # %% [markdown]
 # ## Does it serve its purpose?
 #
-# The paper's title promises robust detectors, and its text never trains one. This project did: three detectors, each trained on five
-# kinds of data, each with its threshold set to raise a false alarm on 1 % of *its own* kind. Then all of them watch real telemetry:
-# nominal windows, on which an alarm is false, and windows with faults, on which it is right. ([13](13_combined.ipynb) builds one of these
-# detectors in ten lines.)
+# The paper's title promises robust detectors, and its text never trains one. This project did. A detector gives a window a score, which is
+# high for an unusual window:
+#
+# - *PCA residual*: the part of the window that lies outside the main directions (principal components) of the training windows.
+# - *Dense autoencoder*: the error with which a network reproduces the window from a few numbers.
+# - *Isolation forest*: how few random cuts separate the window's features (mean, deviation and others) from those of the training windows.
+#
+# Each is trained on five kinds of data, with its threshold set to raise a false alarm on 1 % of *its own* kind. Then all of them watch real
+# telemetry: nominal windows, on which an alarm is false, and the same waves and noise with one of six faults, on which it is right.
+# ([13](13_combined.ipynb) builds one of these detectors in ten lines.)
 
 # %%
 found = experiment.false_alarms
@@ -217,7 +229,8 @@ with drawing(alt, 2, 2.6, title, sharey=True) as panels:
 # *What to see:* trained on the clean signal, every detector raises a false alarm on every window. With the GAN's noise the result
 # depends on the detector. Plain Gaussian noise of the right size gives few false alarms with all three, because the real noise of this
 # example is white. Trained on raw square waves, a detector raises few alarms for a bad reason: it cannot follow their edges, so its
-# threshold is high, and it finds fewer faults. Recall counts only beside few false alarms: who always alarms finds everything.
+# threshold is high, and it finds fewer faults than after training on real telemetry. The dotted line marks the 1 % that was asked for.
+# Recall counts only beside few false alarms: who always alarms finds everything.
 
 # %%
 rates, recall = (dict(zip(arms, found[key])) for key in ("false_alarm_rate", "recall"))
@@ -239,15 +252,17 @@ if experiment.settings.budget == "full":  # noise of the wrong size would teach 
 # |---|---|---|
 # | coarse simulator | square waves of known period: fast, right rhythm | wrong shape; four values |
 # | enhancer | maps coarse windows to smooth ones | one matrix does better (C1); faults it never saw come out wrong (C9) |
-# | moving average | splits telemetry into waveform and noise | a little of the waveform stays in the noise |
+# | moving average | splits telemetry into waveform and noise | a little of the waveform stays in the noise, and a little noise is lost |
 # | noise GAN | sixteen random numbers to a window of noise | varies in few dimensions; the discriminator does not detect it (C6) |
 # | sum | adds the two | the noise does not depend on the signal; the PCA residual separates the sum from telemetry (C8) |
 
 # %% [markdown]
 # The verdicts below are those of the one seed that this book shows. The table of all claims decides over ten seeds where a claim depends
-# on the seed.
+# on the seed. (*AUC*: the area under the curve of a classifier that tries to tell generated from real: 0.5 if it cannot, 1 if it always
+# can.)
 
 # %%
+claim("C6", "C8", "C9")
 records = verdict(experiment, "C6", "C8", "C9")
 assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 
@@ -257,8 +272,9 @@ assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 #
 # ## Exercises
 #
-# **1.** Which degraded mode does the enhancer hide best? For each mode, compare enhanced windows of a fault of severity 0.8 with enhanced
-# nominal windows of the same times, and name the mode with the smallest root-mean-square difference.
+# **1.** Which degraded mode (fault of the simulator; [all six](../docs/glossary.md#degraded-mode-severity-onset)) does the enhancer hide
+# best? For each mode, compare enhanced windows of a fault of severity 0.8 with enhanced nominal windows of the same times (both from
+# `generate_clean`), and name the mode with the smallest root-mean-square difference.
 
 # %%
 from enhsim_tf.coarse_simulator.degraded import MODES
@@ -320,8 +336,9 @@ check_answer(
 # print(chosen_arm, f"finds {recall[chosen_arm].mean():.0%} of the faults, detectors trained on real data {recall['real'].mean():.0%}")
 # ```
 #
-# The fewest false alarms can be the wrong answer: compare the recall that is printed. If the square waves win, they win because they
-# raise no alarms at all. Among the others, *enhanced + Gaussian noise* has few false alarms with every detector. First check whether the
-# real noise is white at all. Here it was made so; for noise with structure the Gaussian has no right to win.
+# The fewest false alarms can be the wrong answer: compare the recall that is printed. If the square waves win, they win because their
+# threshold is too high: few alarms on nominal windows, and few on faulty ones. Among the others, *enhanced + Gaussian noise* has few
+# false alarms with every detector. First check whether the real noise is white at all. Here it was made so; for noise with structure the
+# Gaussian has no right to win.
 #
 # </details>
