@@ -32,12 +32,12 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     name, main = next(iter(shares.items()))
     closed = main["gap_closed"]
     ranked = sorted(LEVELS, key=lambda factor: -closed["factors"][factor]["share"]["mean"])
-    said = in_list([f"the {factor} {100 * closed['factors'][factor]['share']['mean']:.0f} points" for factor in ranked])
+    said = in_list([f"the {factor} for {round(100 * closed['factors'][factor]['share']['mean'])}" for factor in ranked])
     figure, down = new_sheet(
         DOUBLE,
         3.6,
-        f"From the paper's pipeline, which closes {100 * closed['paper']['mean']:.0f} % of the gap in false alarms, to ridge regression, residuals and "
-        f"{name}, which close {100 * closed['switched']['mean']:.0f} %: {said}",
+        f"The paper's pipeline closes {100 * closed['paper']['mean']:.0f} % of the gap in false alarms, and ridge regression with {name} of its residuals "
+        f"{100 * closed['switched']['mean']:.0f} %. Of this difference in points, {said.replace('for', 'accounts for', 1)}",
         "Change that switching a factor makes, as the mean over all orders of switching the four factors (Shapley value). Bars: 95 % intervals over "
         f"environments and seeds; faint marks: single environments; crosses: change if the factor is switched first or last. {_runs(shares)}",
     )

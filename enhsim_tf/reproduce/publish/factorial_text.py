@@ -110,10 +110,12 @@ def ranking(found: Findings) -> str:
     generator, about = next(iter(found["shares"].items()))
     closed = about["gap_closed"]
     ranked = sorted(closed["factors"].items(), key=lambda each: -each[1]["share"]["mean"])
-    said = in_list([f"the {factor} {points(each['share'])}" for factor, each in ranked])
-    ends = [f"the {factor} {points(each['first']['mean'], 0)} first and {points(each['last']['mean'], 0)} last" for factor, each in ranked]
+    said = in_list(
+        [f"the {factor} {'accounts ' * (not number)}for {points(each['share'])}" for number, (factor, each) in enumerate(ranked)]
+    )
+    ends = [f"the {factor} {points(each['first']['mean'], 0)} or {points(each['last']['mean'], 0)}" for factor, each in ranked]
     return (
         f"With {generator} in place of the paper's GAN ({in_seeds(about['seeds'])}), the share of the gap that is closed rises from "
-        f"{per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of the difference, {said} points. The factors interact: switched "
-        f"first or last, {in_list(ends)}."
+        f"{per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of this difference in points, {said}. The factors interact: the "
+        f"change in points if a factor is switched first or last is, for {in_list(ends)}."
     )
