@@ -493,7 +493,8 @@ num_found = None  # your answer
 # %%
 def expected_finds():
     parts = [
-        scores[name] / np.quantile(scores[name][nominal], 0.995) for name in ("residual", "largest step")
+        scores[name] / np.quantile(scores[name][nominal], 1 - 0.01 / 2)
+        for name in ("residual", "largest step")
     ]
     return sum(finds(np.maximum(*parts)).values())
 
@@ -501,7 +502,7 @@ def expected_finds():
 check_answer(
     num_found,
     lambda answer: answer == expected_finds(),
-    "np.maximum of scores[name] / np.quantile(scores[name][nominal], 0.995), then sum(finds(...).values()).",
+    "np.maximum of scores[name] / np.quantile(scores[name][nominal], 1 - 0.01 / 2), then sum(finds(...).values()).",
 )
 
 # %% [markdown]
@@ -535,7 +536,7 @@ check_answer(
 # <details><summary>1. Two scores together</summary>
 #
 # ```python
-# parts = [scores[name] / np.quantile(scores[name][nominal], 0.995) for name in ("residual", "largest step")]
+# parts = [scores[name] / np.quantile(scores[name][nominal], 1 - 0.01 / 2) for name in ("residual", "largest step")]
 # together = finds(np.maximum(*parts))
 # print(together, {name: sum(table[name].values()) for name in ("residual", "largest step")})
 # num_found = sum(together.values())
