@@ -26,7 +26,8 @@ MAX_BYTES = 1_000_000
 FINDINGS = {
     "open_findings(": "robustness",
     "open_labelled(": "labelled",
-}  # what a source calls, and whose findings it shows
+    "open_residual(": "labelled/residual.csv",
+}  # what a source calls, and whose findings it shows: those of an experiment, or one of its tables
 SOLUTION = re.compile(r"```python\n(.*?)```", re.DOTALL)  # the code of a folded solution
 CHECK = "check_answer("  # what a cell calls that checks an answer
 TIMEOUT_S = 1_800  # for one cell: a fresh clone trains in it
@@ -141,7 +142,10 @@ def _forget(kernel: KernelManager) -> None:
 def findings(source: Path, figures: Path = FOLDER.parent / "figures") -> dict[str, str]:
     """Checksums of the findings of experiments that a source shows, by the experiment's name."""
     text = source.read_text(encoding="utf-8")
-    return {name: sha256(figures / name / "findings.json") for call, name in FINDINGS.items() if call in text}
+    shown = [name for call, name in FINDINGS.items() if call in text]
+    return {
+        name: sha256(figures / (name if Path(name).suffix else f"{name}/findings.json")) for name in shown
+    }
 
 
 def faults(source: Path) -> list[str]:

@@ -36,6 +36,7 @@ from enhsim_tf.reproduce.robustness import run as robustness_run
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.spacecraft import figures as labelled_figures
 from enhsim_tf.reproduce.spacecraft import findings as labelled_findings
+from enhsim_tf.reproduce.spacecraft import residual as labelled_residual
 from enhsim_tf.reproduce.spacecraft import run as labelled_run
 from enhsim_tf.reproduce.stages import Stages, default_cache
 
@@ -146,6 +147,13 @@ def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
     found = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
     print(f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in figures/.")
     return found, labelled_findings.KEPT.read(folder)
+
+
+def open_residual() -> "pd.DataFrame":
+    """The published results of the residual detector on real telemetry: the rows of `spacecraft.residual.summarise`."""
+    import pandas as pd
+
+    return labelled_residual.summarise(pd.read_csv(_ROOT / "figures" / labelled_run.FOLDER / labelled_residual.TABLE))
 
 
 def show_finding(found: dict, name: str) -> None:
