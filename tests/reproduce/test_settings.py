@@ -72,7 +72,7 @@ COUNTS = {
     "curve.num_iterations",
     "curve.gan_iterations",
     "curve.num_steps",
-    "curve.num_classifier_seeds",
+    "curve.num_real_classifiers",
     "curve.num_real_networks",
     "ladder.num_iterations",
     "ladder.gan_iterations",
