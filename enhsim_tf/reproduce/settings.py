@@ -237,11 +237,10 @@ class CurveSettings:
     num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
     gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
     num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
-    num_classifier_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; classifiers take a minute each", smoke=1)
+    num_network_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; classifiers and noise networks take minutes", smoke=1)
     num_real_classifiers: tuple[int, ...] = setting(
-        (5, 20, 100, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
+        (20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
     )
-    num_network_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; noise networks take minutes each", smoke=1)
     num_real_networks: tuple[int, ...] = setting(
         (20, 300), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn", smoke=(20,)
     )

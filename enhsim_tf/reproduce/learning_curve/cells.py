@@ -122,14 +122,12 @@ class Cell:
         chosen, curve, frames = self.world.settings, self.world.settings.curve, []
         number = chosen.seed - curve.first_seed
         groups: dict[str, Callable[[], list[dict]]] = {"windows": self._without_networks}
-        if number < curve.num_classifier_seeds and self.num_real in curve.num_real_classifiers:
+        if number < curve.num_network_seeds and self.num_real in curve.num_real_classifiers:
             groups["classifiers"] = self._classifiers
         if number < curve.num_network_seeds and self.num_real in curve.num_real_networks:
             groups |= {rung: functools.partial(self._simulated, (rung,)) for rung in rungs if rung not in CHEAP_RUNGS}
         # which seeds and numbers are computed does not affect a cell
-        same = dataclasses.replace(
-            curve, num_seeds=0, first_seed=0, num_classifier_seeds=0, num_network_seeds=0, num_real_classifiers=(), num_real_networks=()
-        )
+        same = dataclasses.replace(curve, num_seeds=0, first_seed=0, num_network_seeds=0, num_real_classifiers=(), num_real_networks=())
         for name, compute in groups.items():
             depends = (name, self.num_real, chosen.telemetry, same, chosen.seed, self.rate)
 

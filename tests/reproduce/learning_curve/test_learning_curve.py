@@ -97,6 +97,7 @@ def rows(tmp_path_factory):
     counts = {
         "num_real": (6,),
         "num_real_networks": (6,),
+        "num_real_classifiers": (6,),
         "first_seed": 3,
         "num_windows": 30,
         "num_judged": 20,
