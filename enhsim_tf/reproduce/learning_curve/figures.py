@@ -1,6 +1,6 @@
 """The figure of the learning curve, drawn from its findings."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.figure
@@ -12,6 +12,7 @@ from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, FOOT,
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.learning_curve.arms import ADVERSARIAL, CLASSIFIER_ON_REAL, CORAL, SIMULATOR, THRESHOLD_ON_REAL
 from enhsim_tf.reproduce.learning_curve.arms import REAL as REAL_ARM
+from enhsim_tf.reproduce.publish.wording import in_list
 
 _CURVES = {
     REAL_ARM: ("the real windows alone", "|", "-", REAL),
@@ -20,7 +21,7 @@ _CURVES = {
     SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
     THRESHOLD_ON_REAL: ("the same, threshold on the real windows", "d", ":", ENHANCED),
     CORAL: ("CORAL", "s", ":", COARSE),
-    ADVERSARIAL: ("domain-adversarial classifier, simulator", "x", ":", QUIET),
+    ADVERSARIAL: ("classifier and simulator", "x", ":", QUIET),
     CLASSIFIER_ON_REAL: ("classifier, no simulator", "+", "-", QUIET),
 }
 """Label, marker, line style and colour of each arm that is drawn."""
@@ -59,24 +60,29 @@ def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
     upper.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     lower.set_ylim(0, 100)
     lower.set_xscale("log")
+    lower.set_xlim(numbers[0] / 1.25, numbers[-1] * 1.25)
     shown = [number for number in numbers if number in (10, 100, 1_000)] or numbers
     lower.set_xticks(shown, [f"{number:,}" for number in shown], fontsize=7)
     lower.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
 
 
 def _message(found: Mapping[str, Any]) -> str:
-    """The answer in the title: where the simulator with autoregression or residual windows pays in most environments."""
-    environments, numbers = found["environments"].values(), found["numbers"]
-    paying = [
-        number
-        for number in numbers
-        if sum(any(number in places for places in about["pays"].values()) for about in environments) > len(environments) / 2
-    ]
-    if not paying:
-        return "Nowhere on this curve does a fitted simulator pay in most environments"
-    if paying == numbers[: len(paying)] and len(paying) < len(numbers):
-        return f"A fitted simulator pays up to {paying[-1]:,} real windows, and no longer from {numbers[len(paying)]:,}"
-    return f"A fitted simulator pays in most environments with {', '.join(f'{number:,}' for number in paying)} real windows"
+    """The answer in the title: with how many real windows a simulator pays on each kind of noise."""
+    numbers, by_places = found["numbers"], {}
+    for name, about in found["environments"].items():
+        places = tuple(number for number in numbers if any(number in arm for arm in about["pays"].values()))
+        by_places.setdefault(places, []).append(name)
+    said = [f"{_places(places, numbers)} on {in_list(names)} noise" for places, names in by_places.items() if places]
+    nowhere = by_places.get((), [])
+    if not said:
+        return "A fitted simulator pays nowhere on this curve"
+    return f"A fitted simulator pays {', '.join(said)}" + (f", and nowhere on {in_list(nowhere)} noise" if nowhere else "")
+
+
+def _places(places: Sequence[int], numbers: Sequence[int]) -> str:
+    if list(places) == list(numbers[: len(places)]) and len(places) > 1:
+        return f"with up to {places[-1]:,} real windows"
+    return f"with {in_list([f'{number:,}' for number in places])} real windows"
 
 
 def _subtitle(found: Mapping[str, Any]) -> str:
@@ -84,8 +90,17 @@ def _subtitle(found: Mapping[str, Any]) -> str:
     return (
         f"Detectors trained on k real windows, or on a simulator fitted to the same k windows; mean over four detectors and "
         f"{in_words(seeds)} seed{'s' * (seeds > 1)}. Thresholds are set for 1 % (horizontal line; linear below it). A simulator pays where its "
-        "excess of false alarms is at most half that of the real windows and its recall at most 3 points lower."
+        "excess of false alarms is at most half that of the real windows and its recall at most 3 points lower." + _classifiers(found)
     )
+
+
+def _classifiers(found: Mapping[str, Any]) -> str:
+    """What the classifiers are, and how many seeds they have, if they are drawn."""
+    arms = next(iter(found["environments"].values()))["arms"]
+    seeds = max(arms[CLASSIFIER_ON_REAL]["seeds"].values(), default=0) if CLASSIFIER_ON_REAL in arms else 0
+    if not seeds:
+        return ""
+    return f" The classifiers learn injected anomalies ({in_words(seeds)} seed{'s' * (seeds > 1)}); the one with the simulator is domain-adversarial."
 
 
 FIGURES = {

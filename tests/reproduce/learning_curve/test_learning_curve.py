@@ -178,7 +178,11 @@ def test_the_page_and_the_figure_say_where_the_simulator_pays():
         in text
     )
     assert "| white | real | 11.0 / 60 | 3.0 / 60 | 1.2 / 60 |" in text
-    assert figures._message(found) == "A fitted simulator pays up to 5 real windows, and no longer from 20"
+    assert figures._message(found) == "A fitted simulator pays with 5 real windows on white noise"
+    found["environments"] |= {"shot": {"pays": {"a": []}}, "other": {"pays": {"a": [5], "b": [20]}}}
+    assert figures._message(found) == (
+        "A fitted simulator pays with 5 real windows on white noise, with up to 20 real windows on other noise, and nowhere on shot noise"
+    )
 
 
 def test_the_published_findings_and_the_page_come_from_the_published_table(near):
