@@ -83,8 +83,8 @@ assert len(levels) == 4
 enhanced = show(experiment, "fig04_enhanced_simulation")
 
 # %% [markdown]
-# *What to see:* the error against the true signal falls to a fraction of the simulator's own, on telemetry never trained on. The
-# enhanced signal is still slightly rough where the truth is smooth: part of the noise of the training data was memorised.
+# *What to see:* the error against the true signal falls to a fraction of the simulator's own, on telemetry never trained on. The enhanced
+# signal is rougher than the smooth truth: part of the noise of the training data was memorised.
 
 # %%
 before, after = float(enhanced["identity_nrmse"]), float(enhanced["nrmse"])
@@ -98,7 +98,7 @@ assert after < bound[experiment.settings.budget]
 assert experiment.enhancement["roughness"] > 2 * experiment.enhancement["truth_roughness"]
 
 # %% [markdown]
-# The result is nearly right and nearly smooth, and useless for training a detector: real telemetry is never that clean.
+# The result is nearly right, much smoother than telemetry, and useless for training a detector: real telemetry is never that clean.
 #
 # ## Step 6: the noise, taken from real telemetry
 #
@@ -133,7 +133,7 @@ history = show(experiment, "fig12_accuracy_loss")
 
 # %%
 late = np.mean([history[f"accuracy_{kind}"][-3:] for kind in ("real", "generated")])
-say(f"Classified correctly at the end: **{late:.0%}** of both kinds together.")
+say(f"Classified correctly over the last three records: **{late:.0%}** of both kinds together.")
 assert 0.35 < late < 0.65
 if experiment.settings.budget == "full":
     losses = np.array([history["loss_real"], history["loss_generated"]])
@@ -176,7 +176,7 @@ final = show(experiment, "fig13_combined")
 # %%
 roughness = {key: float(np.std(np.diff(final[key]))) for key in ("enhanced", "combined", "telemetry")}
 say(
-    "Standard deviation of the steps: "
+    "Standard deviation of the steps in this window: "
     + ", ".join(f"{key} **{value:.3f}**" for key, value in roughness.items())
     + "."
 )
@@ -226,11 +226,11 @@ with drawing(alt, 2, 2.6, title, sharey=True) as panels:
     panels[0].legend(frameon=False, loc="upper center", fontsize=6.5)
 
 # %% [markdown]
-# *What to see:* trained on the clean signal, every detector raises a false alarm on every window. With the GAN's noise the result
-# depends on the detector. Plain Gaussian noise of the right size gives few false alarms with all three, because the real noise of this
-# example is white. Trained on raw square waves, a detector raises few alarms for a bad reason: it cannot follow their edges, so its
-# threshold is high, and it finds fewer faults than after training on real telemetry. The dotted line marks the 1 % that was asked for.
-# Recall counts only beside few false alarms: who always alarms finds everything.
+# *What to see:* trained on the clean signal, every detector raises a false alarm on every window. With the GAN's noise the result depends
+# on the detector. Plain Gaussian noise of the right size gives few false alarms with all three, because the real noise of this example is
+# white; its price is that the autoencoder finds fewer faults. Trained on raw square waves, a detector raises few alarms for a bad reason:
+# it cannot follow their edges, so its threshold is high, and it finds fewer faults than after training on real telemetry. The dotted line
+# marks the 1 % that was asked for. Recall counts only beside few false alarms: who always alarms finds everything.
 
 # %%
 rates, recall = (dict(zip(arms, found[key])) for key in ("false_alarm_rate", "recall"))
@@ -251,7 +251,7 @@ if experiment.settings.budget == "full":  # noise of the wrong size would teach 
 # | stage | what it does | where it fails |
 # |---|---|---|
 # | coarse simulator | square waves of known period: fast, right rhythm | wrong shape; four values |
-# | enhancer | maps coarse windows to smooth ones | one matrix does better (C1); faults it never saw come out wrong (C9) |
+# | enhancer | maps coarse windows to smooth ones | one matrix does better (C1); five of six faults that it never saw come out wrong (C9) |
 # | moving average | splits telemetry into waveform and noise | a little of the waveform stays in the noise, and a little noise is lost |
 # | noise GAN | sixteen random numbers to a window of noise | varies in few dimensions; the discriminator does not detect it (C6) |
 # | sum | adds the two | the noise does not depend on the signal; the PCA residual separates the sum from telemetry (C8) |
@@ -323,8 +323,8 @@ check_answer(
 # hidden_best = min(changes, key=changes.get)
 # ```
 #
-# Every generated fault looks like telemetry, and that is the danger. The enhancer was trained on healthy windows alone and bends
-# whatever it is given towards those. Against the truth (C9 above) most modes are far off; notebook 04 looks closer.
+# Nothing in a generated fault says that it is a guess, and that is the danger. The enhancer was trained on healthy windows alone and
+# bends whatever it is given towards those. Against the truth (C9 above) most modes are far off; notebook 04 looks closer.
 #
 # </details>
 
@@ -337,8 +337,8 @@ check_answer(
 # ```
 #
 # The fewest false alarms can be the wrong answer: compare the recall that is printed. If the square waves win, they win because their
-# threshold is too high: few alarms on nominal windows, and few on faulty ones. Among the others, *enhanced + Gaussian noise* has few
-# false alarms with every detector. First check whether the real noise is white at all. Here it was made so; for noise with structure the
-# Gaussian has no right to win.
+# threshold is too high: few alarms on nominal windows, and fewer on faulty ones than after training on real telemetry. Among the others,
+# *enhanced + Gaussian noise* has few false alarms with every detector. First check whether the real noise is white at all. Here it was
+# made so; for noise with structure the Gaussian has no right to win.
 #
 # </details>

@@ -29,7 +29,7 @@ claim("C2", "C7")
 arrays = show(experiment, "fig01_pipeline")
 
 # %% [markdown]
-# Every curve in the boxes is real: one window of held-out time on its way through the networks, and real telemetry of the same times
+# Every curve in the boxes was computed: one window of held-out time on its way through the networks, and real telemetry of the same times
 # beside the result. Solid arrows run whenever telemetry is made, dashed ones only in training.
 #
 # ## Step by step

@@ -155,9 +155,9 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.invert_yaxis()
 
 # %% [markdown]
-# *What to see:* all three estimates are far better than the simulator, and the simplest comes closest to the truth. In this example,
-# the map from square waves to sines of the same phase is close to linear on the few windows that occur. So few that nearly all
-# held-out inputs occurred in training:
+# *What to see:* all three estimates are far better than the simulator, and the one matrix comes closest to the truth. In this example,
+# the map from square waves to sines of the same phase is close to linear on the few windows that occur. So few that nearly all held-out
+# inputs occurred in training:
 
 # %%
 seen = {window.tobytes() for window in train["coarse"]}

@@ -45,8 +45,9 @@ else:
     print(f"{len(set(my_guess) & truly_generated)} of {len(truly_generated)} right.")
 
 # %% [markdown]
-# *What to see:* no window that stands out at a glance. If three or four of your four letters are right, was it skill? By pure guessing,
-# the number of right letters has a hypergeometric distribution: $P(k)=\binom{4}{k}\binom{4}{4-k}/\binom{8}{4}$.
+# *What to see:* little at a glance, except that one window begins smoother than the others. If three or four of your four letters are
+# right, was it skill? By pure guessing, the number of right letters has a hypergeometric distribution:
+# $P(k)=\binom{4}{k}\binom{4}{4-k}/\binom{8}{4}$.
 
 # %%
 from math import comb
@@ -70,15 +71,19 @@ assert record["value"] > 0.8
 noise = show(experiment, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* again nothing at a glance. But what is shared is invisible in a single window. Here the four real ones and the four
-# generated ones are drawn over each other, each as the mean of four:
+# *What to see:* little at a glance, except that some windows begin more quietly. But what is shared is invisible in a single window. Here
+# are the mean of the four real windows and the mean of the four generated ones:
 
 # %%
 rows, is_generated = noise["rows"], noise["is_generated"]
 groups = {"real": (rows[~is_generated], REAL, "-"), "generated": (rows[is_generated], GENERATED, DASHED)}
 means = {name: group.mean(axis=0) for name, (group, _, _) in groups.items()}
+ratio = {name: means[name].std() / group.std() for name, (group, _, _) in groups.items()}
 alt = "Mean of four real and of four generated windows of noise"
-title = "The mean of four generated windows is as large as one window: they share a pattern"
+title = (
+    f"The mean of four generated windows is {ratio['generated']:.2f} times as large as a window, that of real ones "
+    f"{ratio['real']:.2f} times: generated windows share a pattern"
+)
 with drawing(alt, 2, 1.8, title, sharey=True) as panels:
     for panel, (name, (_, color, _)) in zip(panels, groups.items()):
         panel.plot(means[name], color=color, linewidth=0.6)
@@ -86,7 +91,6 @@ with drawing(alt, 2, 1.8, title, sharey=True) as panels:
     panels[0].set_ylabel("noise (dimensionless)")
 
 # %%
-ratio = {name: means[name].std() / group.std() for name, (group, _, _) in groups.items()}
 correlation = {name: (np.corrcoef(group).sum() - 4) / 12 for name, (group, _, _) in groups.items()}
 say(
     f"Standard deviation of the mean, in units of that of a window: **{ratio['real']:.2f}** real (independent windows: 0.50), "

@@ -183,8 +183,8 @@ with drawing(alt, height=2.1, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* negative correlations up to lag 12, a step there, and the measured points on the line. The noise networks of the next
-# lessons learn from this noise, and have to learn this mark too.
+# *What to see:* negative correlations up to lag 12, a step there, and the measured points close to the line. The noise networks of the
+# next lessons learn from this noise, and have to learn this mark too.
 
 # %%
 say(f"Lag 1: **{measured[0]:.3f}** measured, **{closed_form[0]:.3f}** computed.")
@@ -254,7 +254,7 @@ check_answer(
 # print(f"{surviving_share(slow, 25):.0%} of the slow noise is left")
 # ```
 #
-# Almost nothing. The average follows slow noise as it follows the signal, so that the noise ends up in the *waveform*, for which the
+# About a tenth. The average follows slow noise as it follows the signal, so that the noise ends up in the *waveform*, for which the
 # enhancer has no input. What the paper calls noise is its fast part.
 #
 # </details>

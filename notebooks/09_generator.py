@@ -154,8 +154,8 @@ with drawing(alt, height=2.3, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the shares of real noise decrease slowly. Those of generated noise fall steeply, and before the tanh they end at 64. One
-# number says it: the *effective rank*, the exponential of the entropy of the shares $p_i$,
+# *What to see:* the shares of real noise decrease slowly up to the last twenty. Those of generated noise fall steeply, and before the
+# tanh they end at 64. One number says it: the *effective rank*, the exponential of the entropy of the shares $p_i$,
 #
 # $$\mathrm{rank}=\exp\left(-\sum_i p_i\ln p_i\right).$$
 
@@ -181,8 +181,8 @@ assert beyond["generated, before the tanh"] < 1e-9 and beyond["real noise"] > 0.
 assert rank(generated) < rank(real) / 2
 
 # %% [markdown]
-# For a detector this difference matters more than any other, as notebook 13 shows: the residual outside the main dimensions is exactly
-# what many detectors look at.
+# For a detector that looks at the residual outside the main dimensions, this difference decides, as notebook 13 shows: the residual
+# outside the main dimensions is exactly what many detectors look at.
 #
 # ## Exercises
 #
@@ -269,7 +269,7 @@ check_answer(
 # ```
 #
 # Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it. Only
-# both together come near the rank of real noise, and training still decides how much of that rank is reached. A generator that gets a
-# random number for *every sample* and works along time does not have the problem at all.
+# both together reach more than half of the rank of real noise, and training still decides how much of that rank is reached. A generator
+# that gets a random number for *every sample* and works along time does not have the problem at all.
 #
 # </details>

@@ -178,10 +178,11 @@ with drawing(alt, height=1.9, title=title) as panel:
     panel.invert_yaxis()
 
 # %% [markdown]
-# *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a
-# plot shows no difference to telemetry. Noise of one line, Gaussian and of the same standard deviation, is good enough here, because
-# the real noise of this example is white. (The low rate of *coarse* has a bad reason: square waves have sharp edges that 20
-# directions do not follow, so that its threshold is far too high.)
+# *What to see:* the detector that was trained on the paper's sum is as useless as the one that was trained without noise, although a plot
+# shows hardly any difference to telemetry. Noise of one line, Gaussian and of the same standard deviation, is good enough here (other
+# notebooks draw other windows and other noise, and their rates differ a little), because the real noise of this example is white. (The
+# low rate of *coarse* has a bad reason: square waves have sharp edges that 20 directions do not follow, so that its threshold is far too
+# high.)
 
 # %%
 say(", ".join(f"{kind}: **{rate:.1%}**" for kind, rate in rates.items()) + ".")
@@ -191,7 +192,7 @@ if experiment.settings.budget == "full":
 
 # %% [markdown]
 # The reason is the rank. Generated noise varies in few dimensions (notebook 09). Twenty directions hold most of it, and the detector
-# learns that nothing lies outside. Real noise lies everywhere outside:
+# learns that little lies outside. Real noise lies everywhere outside:
 
 # %%
 outside = {}
@@ -231,12 +232,12 @@ def draw(scale):
     title = (
         f"{scale} times the real noise: {np.mean(of_real > limit):.1%} of real nominal windows raise an alarm"
     )
-    bins = np.geomspace(min(own.min(), of_real.min()), max(own.max(), of_real.max()), 80)
+    bins = np.linspace(min(own.min(), of_real.min()), max(own.max(), of_real.max()), 80)
     with drawing(f"Scores with noise of {scale} times the real scale", height=1.6, title=title) as panel:
         panel.hist(own, bins, color=ENHANCED, alpha=0.5, label="same kind")
         panel.hist(of_real, bins, histtype="step", color=REAL, label="real nominal")
         panel.axvline(limit, color=REAL, linestyle=DASHED, linewidth=0.8, label="threshold")
-        panel.set(xscale="log", xlabel="score (dimensionless)", ylabel="windows")
+        panel.set(xlabel="score (dimensionless)", ylabel="windows")
         panel.legend(frameon=False)
 
 

@@ -172,7 +172,7 @@ losses = {
     "named weights: it learns": np.array(named_losses),
 }
 alt = "Loss of the discriminator on real and generated noise: the classic pattern, and named weights"
-title = "Both ways draw curves that look like training"
+title = "In both ways the loss on generated noise moves, but only on the right the discriminator learns"
 with drawing(alt, 2, 2.4, title, sharey=True) as panels:
     for panel, (name, curves) in zip(panels, losses.items()):
         panel.plot(curves[:, 0], color=REAL, label="real noise")
@@ -181,8 +181,9 @@ with drawing(alt, 2, 2.4, title, sharey=True) as panels:
         panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* both losses change, so both look like training. On the left only the generator learns, against a discriminator
-# that does not. On the right the discriminator learns to recognise generated noise within a few steps.
+# *What to see:* in both panels the loss on generated noise moves, which looks like training. On the left it rises, and the loss on real
+# noise stands still: only the generator learns. On the right the discriminator learns to recognise generated noise within some twenty
+# steps.
 
 # %%
 (classic_first, classic_last), (named_first, named_last) = (
@@ -294,7 +295,7 @@ check_answer(
 #     return moved == [True] * len(learns) + [False] * len(rests)
 # ```
 #
-# The package's own tests do this for both phases over several steps, and turn Keras' UserWarnings into errors. A plot of losses would
-# not have found it; the left panel above is the proof.
+# The package's own tests do this for both phases over several steps, and turn Keras' UserWarnings into errors. A plot of losses raises no
+# alarm: only who looks for it notices that one curve in the left panel stands still.
 #
 # </details>

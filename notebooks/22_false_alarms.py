@@ -151,7 +151,7 @@ title = (
     f"False alarms on real nominal windows: {alarms['truth']:.0%} with a perfect simulator without noise, "
     f"{alarms['enhanced + GAN']:.0%} with the paper's noise, {alarms['ridge + residual windows']:.1%} with residual windows"
 )
-least = 1e-5  # the scores of noiseless windows are nearly 0
+least = 1e-5  # the scores of noiseless windows are nearly 0; a square marks an arm whose scores are all below
 with drawing(alt, height=2.6, title=title) as panel:
     for place, name in enumerate(arms):
         rows = (
@@ -168,6 +168,8 @@ with drawing(alt, height=2.6, title=title) as panel:
                 solid_capstyle="butt",
                 label=None if place else label,
             )
+            if ends.max() <= least:
+                panel.plot(least, place + offset, "s", color=color, markersize=3.5)
         panel.plot(
             [max(threshold[name], least)] * 2,
             [place - 0.4, place + 0.4],
@@ -190,7 +192,8 @@ with drawing(alt, height=2.6, title=title) as panel:
 # %% [markdown]
 # *What to see:* the black bars are at nearly the same place in all rows: they are the real noise, of which 20 directions describe hardly
 # anything. What differs is the dotted threshold, which the *training* noise sets. A simulator without noise, however perfect, sets it at
-# nothing. The GAN's noise has the right size but few directions (notebook 09); the detector learns those and sets the threshold too low.
+# nothing. (Notebooks 00, 13 and 21 draw other windows and other noise, and their rates differ a little.) The GAN's noise has the right
+# size but few directions (notebook 09); the detector learns those and sets the threshold too low.
 
 # %%
 say("False alarms: " + ", ".join(f"{name} **{rate:.1%}**" for name, rate in alarms.items()) + ".")
@@ -265,9 +268,9 @@ with drawing(alt, height=2.3, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the bars show what was learned. The truth without noise teaches this detector as much as real windows do. The coarse
-# windows teach it less, and the GAN's noise costs recall, too, because 20 directions cannot hold both the waves and that noise. The
-# diamonds show what one gets without real windows: three arms find everything because they *flag* everything, and the coarse arm is
-# quiet and blind. A threshold that is only slightly too high also costs recall:
+# windows teach it less. Added noise costs recall: some of the 20 directions are spent on it, and most so with the GAN's noise, which has
+# large directions of its own. The diamonds show what one gets without real windows: three arms find everything because they *flag*
+# everything, and the coarse arm is quiet and blind. A threshold that is only slightly too high also costs recall:
 
 # %%
 say(
@@ -362,7 +365,8 @@ def draw(scale):
         panel.set(
             xlabel="false alarms (share of real nominal windows)",
             ylabel="recall",
-            xlim=(0, 1),
+            xscale="log",
+            xlim=(1e-3, 1.1),
             ylim=(0, 1.02),
         )
         panel.legend(frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
@@ -376,8 +380,8 @@ slider(
 )
 
 # %% [markdown]
-# The two curves nearly coincide: the scale of the noise hardly changes what the detector knows. It moves the threshold along the curve,
-# from alarms on everything to silence. The area under the curve (AUC: 0.5 is chance, 1 is perfect) says the same:
+# The two curves nearly coincide: the scale of the noise changes little of what the detector knows. It moves the threshold along the
+# curve, from alarms on everything to silence. The area under the curve (AUC: 0.5 is chance, 1 is perfect) says the same:
 
 # %%
 area = {
@@ -455,9 +459,9 @@ for name in ("residual + bootstrap", "residual + convolutional GAN"):
 
 # %% [markdown]
 # *What to see:* the dots of *truth* are far on the right in all four panels: the best signal does not help without noise. The dots of
-# *residual + convolutional GAN* and *residual + bootstrap* are near those of *real*: noise that keeps the distribution of the residuals
-# does help, with a network or without one. All arms with their recall, and what the scale of the noise does to other detectors, are in
-# [docs/what_holds.md](../docs/what_holds.md) and in the [report](../docs/REPORT.md).
+# *residual + convolutional GAN* and *residual + bootstrap* are near those of *real*, within about a factor of two: noise that keeps the
+# distribution of the residuals does help, with a network or without one. All arms with their recall, and what the scale of the noise does
+# to other detectors, are in [docs/what_holds.md](../docs/what_holds.md) and in the [report](../docs/REPORT.md).
 
 # %%
 assert min(by_noise) > 0.5
@@ -478,7 +482,8 @@ assert record["id"] == "C8" and len(by_experiment) == 5
 assert not is_full or by_experiment[2] > 0.9  # enhanced + GAN noise, as here
 
 # %% [markdown]
-# Training on a simulation can make a detector robust. The signal decides what it can find, and the noise decides when it raises an alarm.
+# Training on a simulation can make a detector robust. The noise decides when a detector raises an alarm. What it can find depends on the
+# signal, but on the training noise, too.
 #
 # ## Exercises
 #

@@ -97,7 +97,7 @@ nominal = ~touches.any(axis=0)
 
 # %%
 alt = "The range of values of each hundred samples with the three parts of the channel, and three cycles at its beginning and at its end"
-rise = channel[-1_000:].mean() - channel[:1_000].mean()
+rise = level[-1_000:].mean() - level[:1_000].mean()
 title = f"From beginning to end, the level moves by {rise:.2f} and the amplitude grows by {gain[-1] / gain[0] - 1:.0%}"
 with drawing(alt, 2, 2.2, title) as (left, right):
     blocks = channel.reshape(-1, 100)  # about a cycle
@@ -369,9 +369,9 @@ with drawing(alt, 5, 1.9, title, sharey=True) as panels:
     panels[0].set_ylabel("value (dimensionless)")
 
 # %% [markdown]
-# *What to see:* black is telemetry, dashed blue the aligned simulator, and grey the anomaly. Wrong shapes and clocks leave a large rest. A
-# spike is one sample of 194, whose square nearly vanishes in the mean over the window, but not in the largest step. A swell is seen at
-# its edges only: between them, the gain takes it up, which is what the gain is for, and the moving deviation sees it. No score sees
+# *What to see:* black is telemetry, dashed blue the aligned simulator, and grey the anomaly. Wrong shapes and clocks leave a large rest.
+# A spike is one sample of 194, whose square nearly vanishes in the mean over the window, but not in the largest step. A swell is seen
+# mostly at its edges: between them, the gain takes it up, which is what the gain is for, and the moving deviation sees it. No score sees
 # everything, and where a score of one line wins, it costs nothing. With a long past, the PCA residual is as good as the aligned
 # simulator: what the simulator brings here is that ten windows are enough.
 
@@ -452,9 +452,9 @@ say("\n".join(lines))
 
 # %% [markdown]
 # *What to see:* whatever windows the seven detectors were trained on, they alarm on a third of the nominal time or more, because the
-# channels have moved on, and their AUC-PR hardly depends on the kind of noise. Two scores of one line have a better one than every trained
-# arm. What helps is to use the simulator as a model of the signal instead of a source of training data. Beware of the column *found*: a
-# window that touches a long anomaly counts, so that even random scores find some.
+# channels have moved on, and their AUC-PR hardly depends on the kind of noise. Two scores of one line have a better one than every
+# trained arm. What helps is to use the simulator as a model of the signal instead of a source of training data. Beware of the column
+# *found*: a window that touches a long anomaly counts, so that even random scores find many.
 
 # %%
 area_of = {name: area for name, (_, _, area) in summary.items()}
