@@ -231,9 +231,8 @@ if is_full:
 # %% [markdown]
 # This is one seed, one detector and one kind of noise. The slider shows the scores behind it.
 
+
 # %%
-
-
 def draw(k):
     alt = f"Scores of later nominal windows and the thresholds of both arms for {k} real windows"
     shares = [alarms[name][NUM_REAL.index(k)] for name in arms]
