@@ -27,6 +27,10 @@ FINDINGS = {
     "open_findings(": "robustness",
     "open_labelled(": "labelled",
     "open_residual(": "labelled/residual.csv",
+    "open_curve(": "learning_curve",
+    "open_battery(": "battery",
+    "open_factorial(": "factorial",
+    "open_noise(": "noise",
 }  # what a source calls, and whose findings it shows: those of an experiment, or one of its tables
 SOLUTION = re.compile(r"```python\n(.*?)```", re.DOTALL)  # the code of a folded solution
 CHECK = "check_answer("  # what a cell calls that checks an answer

@@ -26,6 +26,9 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import STYLE
 from enhsim_tf.reproduce import figure
 from enhsim_tf.reproduce.caption import figure_caption, in_seeds
+from enhsim_tf.reproduce.learning_curve import figures as curve_figures
+from enhsim_tf.reproduce.learning_curve import findings as curve_findings
+from enhsim_tf.reproduce.learning_curve import run as curve_run
 from enhsim_tf.reproduce.lesson import TIMES
 from enhsim_tf.reproduce.paper import claims
 from enhsim_tf.reproduce.paper.figures import FIGURES
@@ -156,10 +159,44 @@ def open_residual() -> "pd.DataFrame":
     return labelled_residual.summarise(pd.read_csv(_ROOT / "figures" / labelled_run.FOLDER / labelled_residual.TABLE))
 
 
+def open_curve() -> "tuple[dict, pd.DataFrame]":
+    """The published results on how few real windows suffice: the findings, computed from the table of rows, and the table."""
+    folder = _ROOT / "figures" / curve_run.FOLDER
+    tables = curve_findings.KEPT.read(folder)
+    kept = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
+    found = kept | curve_findings.summarise(tables)
+    print(f"{in_seeds(found['seeds']).capitalize()} in {len(found['environments'])} environments, kept in figures/.")
+    return found, tables["rows"]
+
+
+def open_battery() -> dict:
+    """The published findings of the study of a satellite's battery."""
+    return _published("battery", "regimes")
+
+
+def open_factorial() -> dict:
+    """The published findings of the factorial experiment, in which each part of the pipeline is replaced by a simpler one."""
+    return _published("factorial", "environments")
+
+
+def open_noise() -> dict:
+    """The published findings of the experiment on noise models and families of noise."""
+    return _published("noise", "families")
+
+
+def _published(folder: str, cases: str) -> dict:
+    found = json.loads((_ROOT / "figures" / folder / "findings.json").read_text(encoding="utf-8"))
+    print(f"{in_seeds(found['seeds']).capitalize()} in {len(found[cases])} {cases}, kept in figures/.")
+    return found
+
+
 def show_finding(found: dict, name: str) -> None:
-    """Shows a figure of an experiment from its findings: one of `robustness_figures.FIGURES` or `labelled_figures.FIGURES`."""
-    of_labelled = name in labelled_figures.FIGURES
-    drawn, kept = (labelled_figures, labelled_findings.KEPT) if of_labelled else (robustness_figures, findings.KEPT)
+    """Shows a figure of an experiment from its findings: of robustness, of labelled telemetry, or of the learning curve."""
+    drawn, kept = next(
+        (module, of.KEPT)
+        for module, of in ((labelled_figures, labelled_findings), (robustness_figures, findings), (curve_figures, curve_findings))
+        if name in module.FIGURES
+    )
     with tempfile.TemporaryDirectory() as folder:
         path = next(path for path in figure.save_all(drawn.FIGURES, found, folder, kept.command, (name,)) if path.suffix == ".png")
         _show_picture(path.read_bytes(), drawn.FIGURES[name].alt)

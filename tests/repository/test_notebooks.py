@@ -15,6 +15,7 @@ from PIL import Image
 
 from enhsim_tf.reproduce import figure, lesson
 from enhsim_tf.reproduce import notebook as teaching
+from enhsim_tf.reproduce.learning_curve import figures as curve_figures
 from enhsim_tf.reproduce.paper.claims import CLAIMS
 from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.robustness import figures as robustness_figures
@@ -25,8 +26,9 @@ ROOT = Path(__file__).parents[2]
 SOURCES = build.sources()
 NAMES = """00_tour 01_pipeline 02_source_target 03_enhancer 04_enhanced_simulation 05_real_or_generated 08_source_noise 09_generator
     10_discriminator 11_gan_training 12_accuracy_loss 13_combined 20_the_frozen_discriminator 21_is_it_real_enough
-    22_false_alarms 23_degraded_modes 24_real_telemetry 27_own_simulator""".split()
-OWN_PICTURES = ("27",)  # lessons that show pictures of their own only
+    22_false_alarms 23_degraded_modes 24_real_telemetry 25_second_generator 26_strong_baselines 27_own_simulator
+    28_how_little_telemetry""".split()
+OWN_PICTURES = ("25", "26", "27")  # lessons that show pictures of their own only
 each_notebook = pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 
 
@@ -104,7 +106,7 @@ def test_it_shows_figures_says_what_to_see_and_asserts_it(source):
     assert (
         (shown + found or source.stem[:2] in OWN_PICTURES)
         and set(shown) <= set(FIGURES)
-        and set(found) <= {*robustness_figures.FIGURES, *labelled_figures.FIGURES}
+        and set(found) <= {*robustness_figures.FIGURES, *labelled_figures.FIGURES, *curve_figures.FIGURES}
     )
     number = source.stem[:2]
     assert number[0] == "2" or number == "00" or any(name.startswith(f"fig{number}_") for name in shown)
@@ -163,7 +165,7 @@ def test_a_solution_is_run_after_the_check_that_it_belongs_to():
     assert solved == [texts[0], "a = 1\n", texts[0], "b = None", texts[2], "b = 2\n", texts[2]]
 
 
-@pytest.mark.parametrize("number", ["01", "02", "03", "04", "08", "09", "10", "11", "12", "13", "21", "22", "23", "24"])
+@pytest.mark.parametrize("number", ["01", "02", "03", "04", "08", "09", "10", "11", "12", "13", "21", "22", "23", "24", "25", "26", "28"])
 def test_the_mechanism_that_a_lesson_writes_out_is_compared_with_the_package(number):
     (source,) = (source for source in SOURCES if source.stem.startswith(number))
     assert "np.testing.assert_" in "".join(code_of(source))
