@@ -462,8 +462,8 @@ check_answer(
 #     return smallest
 #
 #
-# for environment in found["environments"]:
-#     print(environment, {limit: suffices_from(environment, limit) for limit in (0.002, 0.005, 0.01, 0.03)})
+# for environment, limit in cases:
+#     print(f"{environment}, excess at most {limit:.1%}: from {suffices_from(environment, limit)}")
 # ```
 #
 # Where the answer jumps with a small change of the tolerance, the curve is flat there or noisy, and more seeds are worth more than a finer
