@@ -146,17 +146,19 @@ def _classifiers(found: Findings) -> list[str]:
     lines = []
     for name, about in found["environments"].items():
         if gains := about.get("classifiers"):
-            told = ", ".join(
-                f"{int(number):,}: {100 * gain['mean']:+.1f} ({100 * gain['low']:+.1f} to {100 * gain['high']:+.1f})"
-                for number, gain in gains.items()
-            )
+            told = ", ".join(f"{int(number):,} real windows {_gain(gain)}" for number, gain in gains.items())
             lines.append(f"- {name}: {told}.")
     head = (
         "A classifier that learns from anomalies injected into windows of the simulator finds so many points more of the anomalies, at 1 % "
-        "false alarms, than one that learns from anomalies injected into the real windows (number of real windows: mean, and range over "
-        "seeds):"
+        "false alarms, than one that learns from anomalies injected into the real windows (in brackets the range over seeds, if there are "
+        "several):"
     )
     return ["", head, "", *lines] if lines else []
+
+
+def _gain(gain: Mapping[str, Any]) -> str:
+    mean, low, high = (f"{100 * gain[key]:+.1f}" for key in ("mean", "low", "high"))
+    return f"{mean} ({low} to {high})" if gain["seeds"] > 1 else mean
 
 
 def _numbers(places: list[int]) -> str:
