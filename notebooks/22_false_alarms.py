@@ -353,7 +353,7 @@ def draw(scale):
         panel.plot(*curve(detectors["real"]), color=REAL, linestyle=DASHED, label="trained on real windows")
         panel.plot(*curve(detector), color=ENHANCED, label="trained on enhanced + Gaussian")
         panel.plot(
-            rate,
+            max(rate, 1e-3),  # the axis has no zero
             recall,
             "D",
             color="white",
@@ -363,7 +363,7 @@ def draw(scale):
             label="its own threshold",
         )
         panel.set(
-            xlabel="false alarms (share of real nominal windows)",
+            xlabel="false alarms (share of real nominal windows; below 0.001 drawn there)",
             ylabel="recall",
             xscale="log",
             xlim=(1e-3, 1.1),
