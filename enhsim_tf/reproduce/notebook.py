@@ -160,13 +160,9 @@ def open_residual() -> "pd.DataFrame":
 
 
 def open_curve() -> "tuple[dict, pd.DataFrame]":
-    """The published results on how few real windows suffice: the findings, computed from the table of rows, and the table."""
-    folder = _ROOT / "figures" / curve_run.FOLDER
-    tables = curve_findings.KEPT.read(folder)
-    kept = json.loads((folder / "findings.json").read_text(encoding="utf-8"))
-    found = kept | curve_findings.summarise(tables)
-    print(f"{in_seeds(found['seeds']).capitalize()} in {len(found['environments'])} environments, kept in figures/.")
-    return found, tables["rows"]
+    """The published results on how few real windows suffice: the findings, and the table of rows that they are computed from."""
+    found = _published(curve_run.FOLDER, "environments")
+    return found, curve_findings.KEPT.read(_ROOT / "figures" / curve_run.FOLDER)["rows"]
 
 
 def open_battery() -> dict:

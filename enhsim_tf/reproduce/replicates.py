@@ -1,11 +1,12 @@
 """The frame that experiments share: replicates in turn, tables of all of them, and the files that are written from the tables."""
 
+import functools
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder, write_json
+from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.reproduce.stages import VERSIONS, Stages, Turns
 from enhsim_tf.reproduce.tables import KeptTables
 
@@ -14,6 +15,20 @@ if TYPE_CHECKING:
 
 Replicate = Callable[[Stages], "Mapping[str, pd.DataFrame]"]
 """Computes the tables of one replicate. It returns no table if the replicate is left out."""
+
+
+def seed_by_seed(
+    replicate: "Callable[[str, int, Stages], Mapping[str, pd.DataFrame]]", names: Iterable[str], seeds: Iterable[int]
+) -> list[tuple[str, Replicate]]:
+    """Replicates for `collect`, all names with one seed before the next seed, so that an interrupted run is complete for its first seeds.
+
+    Args:
+        replicate: Computes the tables for a name, a seed and stages.
+        names: What is computed with each seed, for example environments.
+        seeds: The seeds.
+    """
+    names = tuple(names)
+    return [(f"{name}, seed {seed}", functools.partial(replicate, name, seed)) for seed in seeds for name in names]
 
 
 def collect(
@@ -59,7 +74,7 @@ def write_results(
         kept: How they are written.
         summarise: Computes the findings.
         figures: The figures by name.
-        folder: Output folder.
+        folder: An existing folder.
         about: What the findings also hold; versions of packages are joined with those of all experiments.
 
     Returns:
@@ -67,7 +82,6 @@ def write_results(
     """
     from enhsim_tf.reproduce.figure import save_all
 
-    make_folder(folder)
     kept.write(tables, folder)
     found = summarise(kept.read(folder))
     found |= {**about, "versions": VERSIONS | about.get("versions", {})}

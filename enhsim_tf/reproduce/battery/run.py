@@ -1,6 +1,5 @@
 """`python -m enhsim_tf.reproduce --experiment battery`: runs all replicates and writes tables, findings, figures and the page."""
 
-import functools
 import importlib.metadata
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -10,7 +9,7 @@ from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.reproduce.battery import record
 from enhsim_tf.reproduce.battery.orbits import REGIMES
 from enhsim_tf.reproduce.battery.simulate import check_installed
-from enhsim_tf.reproduce.replicates import collect, write_results
+from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 
@@ -42,11 +41,11 @@ def run(settings: Settings, cache: Path, out: Path, fresh: bool, tell: Callable[
     check_installed()
     make_folder(out)
     first, number = settings.battery.first_seed, settings.battery.num_seeds
-    replicates = [
-        (f"{regime}, seed {seed}", functools.partial(replicate, settings, regime=regime, seed=seed))
-        for seed in range(first, first + number)  # seed by seed, so that an interrupted run has both regimes of the first seeds
-        for regime in REGIMES
-    ]
+
+    def tables_of(regime: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
+        return replicate(settings, stages, regime, seed)
+
+    replicates = seed_by_seed(tables_of, REGIMES, range(first, first + number))
     tables = collect("replicate", replicates, cache, fresh, tell)
     about = {"budget": settings.budget, "versions": {"pybamm": importlib.metadata.version("pybamm")}}
     return write_results(tables, KEPT, summarise, FIGURES, out, about)

@@ -1,13 +1,12 @@
 """`python -m enhsim_tf.reproduce --experiment learning-curve`: how few real windows suffice, and from how few a simulator pays."""
 
 import dataclasses
-import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import make_folder
-from enhsim_tf.reproduce.replicates import collect, write_results
+from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 
@@ -48,8 +47,7 @@ def run(
     make_folder(out)
     first = settings.curve.first_seed
     seeds = range(first, first + settings.curve.num_seeds)
-    replicates = [(f"{each}, seed {seed}", functools.partial(replicate, each, seed)) for seed in seeds for each in environments]
-    tables = collect("learning curve", replicates, cache, fresh, tell)
+    tables = collect("learning curve", seed_by_seed(replicate, environments, seeds), cache, fresh, tell)
     return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
 
 

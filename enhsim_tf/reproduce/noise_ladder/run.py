@@ -1,13 +1,12 @@
 """`python -m enhsim_tf.reproduce --experiment noise`: every rung of the noise ladder on every family of the gallery."""
 
 import dataclasses
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import make_folder
-from enhsim_tf.reproduce.replicates import collect, write_results
+from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 
@@ -45,8 +44,7 @@ def run(
     make_folder(out)
     first = settings.ladder.first_seed
     seeds = range(first, first + settings.ladder.num_seeds)
-    replicates = [(f"{each}, seed {seed}", functools.partial(replicate, each, seed)) for seed in seeds for each in families]
-    tables = collect("noise", replicates, cache, fresh, tell)
+    tables = collect("noise", seed_by_seed(replicate, families, seeds), cache, fresh, tell)
     return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
 
 

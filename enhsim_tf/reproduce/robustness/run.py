@@ -1,13 +1,12 @@
 """`python -m enhsim_tf.reproduce --experiment robustness`: runs all replicates and writes tables, findings, figures and the report."""
 
-import functools
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import make_folder
-from enhsim_tf.reproduce.replicates import collect, write_results
+from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.robustness.negative_controls import judge_controls
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
@@ -39,17 +38,13 @@ def run(
     from enhsim_tf.reproduce.robustness.findings import KEPT, summarise
     from enhsim_tf.reproduce.robustness.replicate import replicate
 
-    def tables_of(environment: str, number: int, stages: Stages) -> "dict[str, pd.DataFrame]":
-        one = replicate(settings, stages, environment, number, int(sys.stdout.isatty()))
+    def tables_of(environment: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
+        one = replicate(settings, stages, environment, seed - first, int(sys.stdout.isatty()))
         return one.tables | (DegradedModes(one).tables if environment == environments[0] else {})
 
     make_folder(out)
     chosen, first = settings.robustness, settings.robustness.first_seed
-    replicates = [
-        (f"{environment}, seed {first + number}", functools.partial(tables_of, environment, number))
-        for number in range(chosen.num_seeds)  # seed by seed, so that an interrupted run has all environments of the first seeds
-        for environment in environments
-    ]
+    replicates = seed_by_seed(tables_of, environments, range(first, first + chosen.num_seeds))
     tables = collect("replicate", replicates, cache, fresh, tell) | {"controls": _controls(settings, cache, fresh, tell)}
     return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
 

@@ -1,7 +1,6 @@
 """`python -m enhsim_tf.reproduce --experiment labelled --data FOLDER`: runs all channels and writes tables, findings, figures and the report."""
 
 import dataclasses
-import functools
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.number_words import in_words
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.reproduce.replicates import collect, write_results
+from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.telemetry.telemanom import load_channel, read_labels
@@ -63,8 +62,7 @@ def run(
 
     chosen = list(channels or labels)
     seeds = range(settings.seed, settings.seed + settings.labelled.num_seeds)
-    replicates = [(f"{name}, seed {seed}", functools.partial(tables_of, name, seed)) for seed in seeds for name in chosen]
-    tables = collect("channel", replicates, cache, fresh, tell)
+    tables = collect("channel", seed_by_seed(tables_of, chosen, seeds), cache, fresh, tell)
     if not tables:
         raise InputError(f"Expected a channel that can be used. Received: none of {len(chosen)} in {data}. The first: {skipped[chosen[0]]}")
     return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "skipped": skipped})
