@@ -20,6 +20,7 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.keras_tools.backend import keras, tf
 from enhsim_tf.keras_tools.training import seeded_initialiser
+from enhsim_tf.telemetry.quantisation import Levels
 
 NUM_LAGS = 64  # samples that the network sees one by one
 _CLIP = 6.0  # largest magnitude, in standard deviations, with which a sample enters the non-linear part
@@ -37,7 +38,8 @@ class AutoregressiveNetwork:
         window: Number of samples of a window, which is also the longest past that the network sees.
         scale: Standard deviation of the noise, in the unit of the telemetry.
         limit: Largest magnitude of a generated sample, in units of `scale`.
-        step: Distance of two values if the noise is quantised, in the unit of the telemetry, and 0 otherwise.
+        step: Distance of two levels if the noise is quantised, in the unit of the telemetry, and 0 otherwise.
+        origin: One of the levels of quantised noise, in the unit of the telemetry.
         follows_signal: Whether the density depends on the enhanced signal, too.
         num_components: Number of components of the mixture.
         units: Number of units of both hidden layers.
@@ -50,12 +52,14 @@ class AutoregressiveNetwork:
         scale: float,
         limit: float = 20.0,
         step: float = 0.0,
+        origin: float = 0.0,
         follows_signal: bool = False,
         num_components: int = 8,
         units: int = 64,
         seed: int = 0,
     ):
-        self.window, self.scale, self.limit, self.step, self.seed = int(window), float(scale), float(limit), float(step), int(seed)
+        self.window, self.scale, self.limit, self.seed = int(window), float(scale), float(limit), int(seed)
+        self.step, self.origin = float(step), float(origin)
         self.follows_signal, self.num_components, self.units = bool(follows_signal), int(num_components), int(units)
         self.lags = np.arange(1, min(NUM_LAGS, window) + 1)
         self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
@@ -76,7 +80,9 @@ class AutoregressiveNetwork:
         if not (np.isfinite(noise).all() and scale > 0):
             raise InputError("Expected finite noise that varies. Received: windows with a NaN or an infinity, or of one value.")
         limit = _LIMIT * float(np.max(np.abs(noise))) / scale
-        return cls(noise.shape[1], scale, limit, quantisation_step(noise), signal_windows is not None, seed=seed)
+        levels = Levels.find(noise)
+        step, origin = (0.0, 0.0) if levels is None else (levels.step, levels.origin)
+        return cls(noise.shape[1], scale, limit, step, origin, signal_windows is not None, seed=seed)
 
     def _build(self) -> keras.Model:
         """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
@@ -281,11 +287,11 @@ class AutoregressiveNetwork:
             series[:, num_lags + place] = value
             sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
         noise = series[:, num_lags:] * np.float32(self.scale)
-        return (self.step * np.rint(noise / self.step)).astype(np.float32) if self.step else noise
+        return (self.origin + self.step * np.rint((noise - self.origin) / self.step)).astype(np.float32) if self.step else noise
 
     def get_config(self) -> dict:
         """Returns the settings that rebuild the network, as JSON types."""
-        names = ("window", "scale", "limit", "step", "follows_signal", "num_components", "units", "seed")
+        names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "units", "seed")
         return {name: getattr(self, name) for name in names}
 
 
@@ -310,19 +316,3 @@ class _Degrees(keras.layers.Layer):
 def _degrees(weights: np.ndarray) -> np.ndarray:
     """Returns the degrees of freedom for the weights of `_Degrees`."""
     return _LEAST_DEGREES + np.logaddexp(0, weights.astype(np.float64))
-
-
-def quantisation_step(values: np.ndarray) -> float:
-    """Returns the distance of the values if they are multiples of a step, and 0 otherwise.
-
-    Args:
-        values: Values of any shape. They count as quantised if there are at least ten times as many values as different ones, and
-            if the differences of neighbouring levels are multiples of the smallest difference, to a thousandth of it.
-    """
-    levels = np.unique(np.asarray(values, np.float64))
-    if len(levels) < 2 or len(levels) > np.size(values) / 10:
-        return 0.0
-    gaps = np.diff(levels)
-    step = float(gaps[gaps > 1e-9 * (levels[-1] - levels[0])].min())
-    ratios = (levels - levels[0]) / step
-    return step if np.max(np.abs(ratios - np.rint(ratios))) < 1e-3 else 0.0

@@ -7,6 +7,7 @@ import numpy as np
 _OFTEN = 3  # a value of quantised telemetry counts as a level if it occurs at least this often
 _LEAST_SHARE = 0.99  # of the values that must be levels; the others may be interpolated
 _UNEVEN = 0.1  # largest deviation of a level from a multiple of the step, in steps
+_SAME = 1e-6  # values closer than this share of their range are one level: the difference of two float32 series is not exactly on the grid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,14 +29,14 @@ class Levels:
         """Finds the levels of telemetry.
 
         Args:
-            values: The telemetry, shape `(samples,)`. A few values between the levels, such as interpolated ones, are ignored.
+            values: The telemetry, of any shape. A few values between the levels, such as interpolated ones, are ignored.
 
         Returns:
             The levels, or None if the telemetry is not quantised.
         """
-        levels, counts = np.unique(values, return_counts=True)
-        often = levels[counts >= _OFTEN].astype(np.float64)
-        if not 2 <= len(often) <= len(values) // 10 or counts[counts >= _OFTEN].sum() < _LEAST_SHARE * len(values):
+        levels, counts = _distinct(values)
+        often = levels[counts >= _OFTEN]
+        if not 2 <= len(often) <= np.size(values) // 10 or counts[counts >= _OFTEN].sum() < _LEAST_SHARE * np.size(values):
             return None
         step = float(np.diff(often).min())
         multiples = (often - often[0]) / step
@@ -48,3 +49,18 @@ class Levels:
     def round(self, values: np.ndarray) -> np.ndarray:
         """Rounds values to the nearest level, which may lie beyond those that occurred; float32 of the same shape."""
         return (self.origin + self.step * np.rint((np.asarray(values, np.float64) - self.origin) / self.step)).astype(np.float32)
+
+
+def _distinct(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the distinct values in rising order and how often each occurs. Values that differ by a rounding error are one value.
+
+    A run of many values, each close to the next, is not one value: where values are that dense, they are returned as they are.
+    """
+    distinct, counts = np.unique(np.asarray(values, np.float64), return_counts=True)
+    same = _SAME * (distinct[-1] - distinct[0])
+    first = np.flatnonzero(np.diff(distinct, prepend=-np.inf) > same)
+    last = np.append(first[1:], len(distinct)) - 1
+    if np.max(distinct[last] - distinct[first]) > 2 * same:
+        return distinct, counts
+    numbers = np.add.reduceat(counts, first)
+    return np.add.reduceat(distinct * counts, first) / numbers, numbers
