@@ -26,6 +26,8 @@ NUM_LAGS = 64  # samples that the network sees one by one
 _CLIP = 6.0  # largest magnitude, in standard deviations, with which a sample enters the non-linear part
 _TINY = 1e-3  # added to magnitudes before their logarithm is taken
 _LOG_SCALES = (-6.0, 3.0)  # limits of the logarithm of a component's scale, in standard deviations
+_NUM_NODES = 5  # at which the density over a step is evaluated (Gauss-Legendre quadrature)
+_LEAST_SCALE = 0.25  # of a component of quantised noise, in steps: a narrower one lies between the nodes
 _LEAST_DEGREES = 2.1  # degrees of freedom of a component; at 2 its variance is infinite
 _LIMIT = 2.0  # generated samples stay within this multiple of the largest magnitude of the training windows
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
@@ -60,6 +62,8 @@ class AutoregressiveNetwork:
     ):
         self.window, self.scale, self.limit, self.seed = int(window), float(scale), float(limit), int(seed)
         self.step, self.origin = float(step), float(origin)
+        least = max(_LOG_SCALES[0], math.log(_LEAST_SCALE * self.step / self.scale)) if self.step else _LOG_SCALES[0]
+        self.log_scales = (least, _LOG_SCALES[1])
         self.follows_signal, self.num_components, self.units = bool(follows_signal), int(num_components), int(units)
         self.lags = np.arange(1, min(NUM_LAGS, window) + 1)
         self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
@@ -100,7 +104,9 @@ class AutoregressiveNetwork:
         logits, shifts, log_scales = keras.ops.split(hidden, 3, axis=1)
         logits = logits + self.start_logits
         degrees = _Degrees(self.num_components, name="degrees")
-        return keras.Model(features, [logits, linear + shifts, keras.ops.clip(log_scales, *_LOG_SCALES), degrees(logits)], name="density")
+        return keras.Model(
+            features, [logits, linear + shifts, keras.ops.clip(log_scales, *self.log_scales), degrees(logits)], name="density"
+        )
 
     def fit(
         self,
@@ -132,8 +138,6 @@ class AutoregressiveNetwork:
         """
         noise = np.asarray(noise_windows, np.float64)
         rng = np.random.default_rng([self.seed, 61])
-        if self.step:  # a density cannot describe single values: spread them over the step
-            noise = noise + self.step * rng.uniform(-0.5, 0.5, noise.shape)
         values = (noise / self.scale).astype(np.float32)
         signal = self._signal(signal_windows, values.shape)
         num_kept = max(1, round(held_out * len(values)))
@@ -193,7 +197,10 @@ class AutoregressiveNetwork:
         return np.asarray(signal_windows, np.float32)
 
     def _loss(self, values: tf.Tensor, signal: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
-        """Computes the mean negative log-likelihood of the samples at the given positions of each window."""
+        """Computes the mean negative log-likelihood of the samples at the given positions of each window.
+
+        The likelihood of a level of quantised noise is the mean density over its step.
+        """
         num_lags, num_rows = len(self.lags), tf.shape(values)[0]
         padded = tf.pad(values, [[0, 0], [num_lags, 0]])
         lags = tf.gather(padded, where[:, None] + num_lags - tf.constant(self.lags, tf.int32)[None, :], axis=1)
@@ -212,15 +219,28 @@ class AutoregressiveNetwork:
         features = tf.concat(parts, 2)
         targets = tf.reshape(tf.gather(values, where, axis=1), (-1, 1))
         logits, means, log_scales, degrees = self.network(tf.reshape(features, (-1, features.shape[2])))
+        if self.step:  # a level stands for all values that are rounded to it
+            half = self.step / self.scale / 2
+            terms = [
+                math.log(weight / 2) + self._log_density(targets + half * node, means, log_scales, degrees)
+                for node, weight in zip(*np.polynomial.legendre.leggauss(_NUM_NODES), strict=True)
+            ]
+            log_density = tf.reduce_logsumexp(tf.stack(terms), axis=0)
+        else:
+            log_density = self._log_density(targets, means, log_scales, degrees)
+        return -tf.reduce_mean(tf.reduce_logsumexp(tf.nn.log_softmax(logits) + log_density, axis=1))
+
+    @staticmethod
+    def _log_density(targets: tf.Tensor, means: tf.Tensor, log_scales: tf.Tensor, degrees: tf.Tensor) -> tf.Tensor:
+        """Computes the logarithm of the density of each component, shape `(samples, components)`."""
         standardised = (targets - means) * tf.exp(-log_scales)
-        log_density = (
+        return (
             tf.math.lgamma((degrees + 1) / 2)
             - tf.math.lgamma(degrees / 2)
             - 0.5 * tf.math.log(math.pi * degrees)
             - log_scales
             - (degrees + 1) / 2 * tf.math.log1p(standardised**2 / degrees)
         )
-        return -tf.reduce_mean(tf.reduce_logsumexp(tf.nn.log_softmax(logits) + log_density, axis=1))
 
     def generate(self, num_windows: int, seed: int | np.random.Generator, signal_windows: np.ndarray | None = None) -> np.ndarray:
         """Generates windows of noise. The same seed gives the same noise.
@@ -282,12 +302,17 @@ class AutoregressiveNetwork:
             chosen = (rng.random(num_rows)[:, None] * shares[:, -1:] > shares).sum(axis=1).clip(max=parts - 1)
             centre = features[:, :num_linear] @ linear[:, 0] + linear_bias[0] + shifts[rows, chosen]
             draw = rng.standard_normal(num_rows) / np.sqrt(2 * rng.standard_gamma(degrees[chosen] / 2) / degrees[chosen])
-            value = centre + np.exp(np.clip(log_scales[rows, chosen], *_LOG_SCALES)) * draw
-            value = np.clip(value, -self.limit, self.limit)
+            value = centre + np.exp(np.clip(log_scales[rows, chosen], *self.log_scales)) * draw
+            value = self._to_level(np.clip(value, -self.limit, self.limit))
             series[:, num_lags + place] = value
             sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
-        noise = series[:, num_lags:] * np.float32(self.scale)
-        return (self.origin + self.step * np.rint((noise - self.origin) / self.step)).astype(np.float32) if self.step else noise
+        return series[:, num_lags:] * np.float32(self.scale)
+
+    def _to_level(self, values: np.ndarray) -> np.ndarray:
+        """Rounds values, in units of the scale, to the levels of quantised noise; other noise stays as it is."""
+        if not self.step:
+            return values
+        return (self.origin + self.step * np.rint((values * self.scale - self.origin) / self.step)) / self.scale
 
     def get_config(self) -> dict:
         """Returns the settings that rebuild the network, as JSON types."""

@@ -102,6 +102,21 @@ def test_quantised_noise_stays_on_its_grid(origin):
     np.testing.assert_allclose(generated, np.rint(generated), atol=1e-4)
 
 
+def test_quantised_noise_keeps_its_scale_and_correlation():
+    rng = np.random.default_rng(5)
+    latent = np.zeros((1_000, 48))
+    for place in range(1, 48):
+        latent[:, place] = 0.8 * latent[:, place - 1] + 0.6 * rng.normal(size=1_000)
+    noise = np.rint(
+        latent[:, 16:]
+    )  # a step of one standard deviation: noise that is spread over its step loses a fifth of this correlation
+    generated = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 400).generate(1_000, 1)
+    lag = [np.mean(each[:, 8:-1] * each[:, 9:]) / np.var(each) for each in (noise, generated)]
+    assert np.std(generated) == pytest.approx(np.std(noise), rel=0.05) and lag[1] == pytest.approx(lag[0], abs=0.08)
+    shares = [[np.mean(each == level) for level in (-2, -1, 0, 1, 2)] for each in (noise, generated)]
+    np.testing.assert_allclose(shares[1], shares[0], atol=0.02)
+
+
 def test_noise_that_cannot_be_learnt_is_refused():
     for noise in (np.zeros((20, 10)), np.full((20, 10), np.nan)):
         with pytest.raises(InputError, match="Expected finite noise that varies"):
