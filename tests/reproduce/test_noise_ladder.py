@@ -68,7 +68,11 @@ def test_the_summary_counts_what_a_table_says():
 
     detectors = [rows("white", "real", 10), rows("white", "Gaussian", 12), rows("white", "autoregressive network", 30)]
     detectors += [rows("bursts", "real", 10), rows("bursts", "Gaussian", 500), rows("bursts", "autoregressive network", 30)]
-    realism = [{"family": row["family"], "seed": 1, "rung": row["rung"], "measure": "m", "value": 0.0, "ratio": 4.0} for row in detectors]
+    ratios = {"real": 1.0, "Gaussian": 4.0, "autoregressive network": 4.0}
+    realism = [
+        {"family": row["family"], "seed": 1, "rung": row["rung"], "measure": "m", "value": 0.0, "ratio": ratios[row["rung"]]}
+        for row in detectors
+    ]
     choice = [
         {
             "family": row["family"],
@@ -90,6 +94,8 @@ def test_the_summary_counts_what_a_table_says():
     assert bursts["half"] == "unseen" and bursts["rungs"]["autoregressive network"]["excess"] == pytest.approx(0.02)
     assert found["limits"]["looked at"]["kept"] == 0 and found["limits"]["unseen"]["kept"] == 1  # two points: above one, below three
     assert found["limits"]["realism"]["families_with_all"] == 0 and found["limits"]["recall"]["kept"] == 2
+    assert found["limits"]["realism"]["by_model"]["real"] == {"families_with_all": 2, "of": 2, "mean_share": 1.0}
+    assert found["limits"]["realism"]["by_model"]["convolutional GAN"] == {"families_with_all": 0, "of": 0, "mean_share": None}
 
 
 def test_the_page_says_what_the_findings_say(tmp_path):
@@ -105,6 +111,7 @@ def test_the_page_says_what_the_findings_say(tmp_path):
     assert "| bursts | unseen | 1.0% | 3.1% | gaussian |" in text and "seed 7" in text
     assert "at most 3 points: 1 of 1 families; the largest excess is 2.1 points (bursts)" in text
     assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
+    assert "fresh real noise itself keeps it on 0 of 1 families" in text and "| autoregressive network | 0 of 1 | 50% |" in text
     assert text.count("\nold\n") == 1  # the part of the other experiment
 
 

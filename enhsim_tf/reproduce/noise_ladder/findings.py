@@ -111,6 +111,17 @@ def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> d
         "families_with_all": sum(about["realism_within"] == 1 for about in learnt.values()),
         "mean_share": float(np.mean([about["realism_within"] for about in learnt.values()])) if learnt else None,
         "of": len(learnt),
+        "by_model": {name: _realism_of(name, families) for name in (REAL, *RUNGS)},
     }
     found["choice"] = {"limit": MAX_REGRET, "kept": sum(about["regret"] <= MAX_REGRET for about in families.values()), "of": len(families)}
     return found
+
+
+def _realism_of(rung: str, families: dict[str, Any]) -> dict[str, Any]:
+    """On how many families a rung keeps the limit of realism. Fresh real noise is a rung here: it says how strict the limit is."""
+    shares = [about["rungs"][rung]["realism_within"] for about in families.values() if rung in about["rungs"]]
+    return {
+        "families_with_all": sum(share == 1 for share in shares),
+        "of": len(shares),
+        "mean_share": float(np.mean(shares)) if shares else None,
+    }
