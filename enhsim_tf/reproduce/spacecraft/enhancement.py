@@ -1,9 +1,10 @@
-"""Errors of the coarse signal, ridge regression and the enhancer on nominal windows of a channel's test part."""
+"""Errors of the coarse signal, ridge regression, the nearest windows and the enhancer on nominal windows of a channel's test part."""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enhsim_tf.enhancer.baselines import nearest_window_means
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.enhancer.training_pairs import Pairs, apply_shift_and_gain, cut_pairs, window_errors
 from enhsim_tf.reproduce.spacecraft.matched import windows_that_meet
@@ -18,6 +19,7 @@ METHODS = {
     "coarse": "the coarse signal, aligned by its edges",
     "ridge": "tuned ridge regression, aligned by the edges of the coarse signal",
     "ridge, own clock": "tuned ridge regression, aligned by its own waveform",
+    "nearest windows": "the mean of the nearest training windows, aligned by the waveform of the regression",
     "ridge, network's clock": "tuned ridge regression, aligned by the waveform of the enhancer",
     "enhanced": "the enhancer, aligned by its own waveform",
 }
@@ -40,7 +42,8 @@ def errors_of_methods(simulator: "EnhancedSimulator", no_network: RidgeSimulator
     begins, starts = disjoint_starts(len(test), window), evenly_spaced_starts([train], window, len(no_network.residuals))
     begins = begins[~windows_that_meet(begins, window, len(test), channel.labels.sequences).any(axis=0)]
     by_edges = cut_pairs([test], simulator.coarse, begins, window, follow=True)
-    by_shape = simulator.pairs(test, begins)
+    by_shape, own_clock = simulator.pairs(test, begins), no_network.align(by_edges)
+    train_by_edges = cut_pairs([train], simulator.coarse, starts, window, follow=True)
 
     def ridge(training: Pairs, pairs: Pairs) -> np.ndarray:
         training = training.drop_flat()
@@ -49,8 +52,9 @@ def errors_of_methods(simulator: "EnhancedSimulator", no_network: RidgeSimulator
 
     windows = {
         "coarse": by_edges.coarse_rescaled,
-        "ridge": ridge(cut_pairs([train], simulator.coarse, starts, window, follow=True), by_edges),
-        "ridge, own clock": no_network.follow(no_network.align(by_edges)),
+        "ridge": ridge(train_by_edges, by_edges),
+        "ridge, own clock": no_network.follow(own_clock),
+        "nearest windows": nearest_window_means(no_network.align(train_by_edges), own_clock, train.interval_s),
         "ridge, network's clock": ridge(simulator.pairs(train, starts), by_shape),
         "enhanced": simulator.follow(by_shape),
     }

@@ -18,6 +18,8 @@ NEARER = 2 / 3
 """Largest ratio of the errors of the enhanced and the coarse signal for an error that is lower by a third."""
 SATURATED = 0.5
 """A channel is told apart if, for the median noisy arm, detectors alarm on more than this share of its nominal windows; fixed before the run."""
+NEARLY_ALL, FEW = 0.99, 0.01
+"""Shares of nominal windows from and up to which a detector flags nearly all and few of them; the mean of these two groups describes neither."""
 CLEAN_ARMS = ("coarse", "enhanced")
 """Arms without noise. Their detectors alarm on most windows of every channel, so they do not tell channels apart."""
 CONTROLS = ("random score", "largest step", "moving deviation", "limit check")
@@ -114,6 +116,8 @@ def _arm(tables: "Mapping[str, pd.DataFrame]", rates: Rates, rows: np.ndarray, u
         "false_alarms": _crossed(cells, "own"),
         "false_alarms_past": _crossed(cells, "past"),
         "median_false_alarms": float(cells["own"].median()),
+        "flag_nearly_all": float((cells["own"] >= NEARLY_ALL).mean()),
+        "flag_few": float((cells["own"] <= FEW).mean()),
         "found": _found(rates, rows, "own"),
         "found_past": _found(rates, rows, "past"),
         "matched": [{"rate": rate, **_found(rates, rows, rate)} for rate in RATES],
@@ -133,6 +137,7 @@ def _short(tables: "Mapping[str, pd.DataFrame]", rates: Rates, rows: np.ndarray)
     return {
         "false_alarms": float(cells["own"].mean()),
         "found": rates.found(rows, PRIMARY),
+        "found_by_rate": [rates.found(rows, rate) for rate in RATES],
         "vus_pr": float(ranking["vus_pr"].mean()),
         "auc_pr": float(ranking["auc_pr"].mean()),
     }

@@ -80,24 +80,30 @@ def table(found: dict[str, Any]) -> str:
     ]
     arms = {name: about for name, about in found["arms"].items() if name != DEGRADED_ARM}
     for name, about in (arms | {f"*one line: {name}*": about for name, about in found["controls"].items()}).items():
-        low, high = (f"{100 * about['false_alarms'][end]:.0f}" for end in ("low", "high"))
         primary = next(each for each in about["matched"] if each["rate"] == PRIMARY)
-        cells = [f"{_percent(about['false_alarms']['mean'])} ({low} to {high})", _percent(about["false_alarms_past"]["mean"])]
-        cells += [_percent(each["mean"]) for each in about["matched"]]
+        cells = [_percent(about["false_alarms"]["mean"]) + _range(about["false_alarms"]), _percent(about["false_alarms_past"]["mean"])]
+        cells += [_percent(each["mean"]) + _range(each) * (each is primary) for each in about["matched"]]
         cells += [_percent(primary["chance"]), p_value(primary["p_value"]), f"{about['auc_pr']:.2f}"]
         rows.append(f"| {name} | {' | '.join(cells)} |")
     rows += [
         "",
-        "| channel | NRMSE coarse | ridge | ridge, own clock | enhanced | false alarms, trained on its past | on generated | on ridge + residual windows | |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| channel | NRMSE coarse | ridge | ridge, own clock | nearest windows | enhanced | false alarms, trained on its past | on generated | on ridge + residual windows | |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, about in found["channels"].items():
-        cells = [f"{about['nrmse'][method]:.3f}" for method in ("coarse", "ridge", "ridge, own clock", "enhanced")]
+        cells = [f"{about['nrmse'][method]:.3f}" for method in ("coarse", "ridge", "ridge, own clock", "nearest windows", "enhanced")]
         cells += [
             _percent(about["false_alarms_by_arm"][arm]) if arm in about["false_alarms_by_arm"] else "-"
             for arm in ("real", GENERATED_ARM, RIDGE_ARM)
         ]
         rows.append(f"| {name} | {' | '.join(cells)} | {'told apart' if about['told_apart'] else ''} |")
+    shown = {"its past": "real", "generated": GENERATED_ARM, "ridge + residual windows": RIDGE_ARM}
+    shown = {name: arms[arm]["by_detector"] for name, arm in shown.items() if arm in arms}
+    rows += ["", f"| detector | {' | '.join(f'false alarms, trained on {name} | found at 1 %' for name in shown)} |"]
+    rows.append(f"|---|{'---|---|' * len(shown)}")
+    for detector in shown["its past"]:
+        cells = [cell for about in shown.values() for cell in map(_percent, _alarms_and_finds(about[detector]))]
+        rows.append(f"| {detector} | {' | '.join(cells)} |")
     num_windows = [about["num_train_windows"] for about in found["channels"].values()]
     return "\n".join(rows) + (
         f"\n\nFalse alarms and finds are means over {in_words(len(DETECTORS))} detectors (one for each of the last rows), {in_words(len(found['channels']))} channels with "
@@ -108,9 +114,27 @@ def table(found: dict[str, Any]) -> str:
         "alarms* is the share of the sequences found when each threshold is set such that 5 % of the nominal test windows are above it, so that all rows can be compared; "
         "*by chance* is what the same scores find when the labels are shifted around the circle of the test record, and *p* the probability that chance finds as many. "
         "*NRMSE* is the median over nominal test windows, after phase, offset and gain are aligned to each window; *ridge* is aligned by the edges of the square wave, and "
-        "*ridge, own clock* by its own waveform, as the enhanced signal is. A channel is *told apart* if detectors alarm on more than half of its nominal windows for the "
-        "median noisy arm: there, false alarms show that the channel has changed and do not compare arms. From `figures/labelled/findings.json`."
+        "*ridge, own clock* by its own waveform, as the enhanced signal is; *nearest windows* is the mean of the nearest training windows, aligned as "
+        f"the latter. {_lowest(found)} A channel is *told apart* if detectors alarm on more than half of its nominal windows for the "
+        "median noisy arm: there, false alarms show that the channel has changed and do not compare arms. "
+        "The last table has the means of each detector over the channels. From `figures/labelled/findings.json`."
     )
+
+
+def _range(about: dict[str, float]) -> str:
+    return f" ({100 * about['low']:.0f} to {100 * about['high']:.0f})"
+
+
+def _alarms_and_finds(about: dict[str, Any]) -> tuple[float, float]:
+    return about["false_alarms"], about["found_by_rate"][0]
+
+
+def _lowest(found: dict[str, Any]) -> str:
+    """On how many channels the enhanced signal has a larger error than each method without a network."""
+    errors = [about["nrmse"] for about in found["channels"].values()]
+    counts = {name: sum(each[name] < each["enhanced"] for each in errors) for name in ("ridge, own clock", "nearest windows")}
+    said = " and ".join(f"that of *{name}* on {count} of {len(errors)}" for name, count in counts.items())
+    return f"The error of the enhanced signal is above {said} channels."
 
 
 def _percent(share: float) -> str:
