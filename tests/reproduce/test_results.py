@@ -182,7 +182,10 @@ def _spread(value, budget="smoke", seeds=(7, 8, 9)):
 def test_the_readme_gives_the_range_over_seeds_where_it_is_known(filled):
     text = filled(spread=_spread(0.12345))
     assert "0.123 (0.1 to 0.2)" in text and "the range over 3 seeds, 7 to 9, and the verdict of most of them" in text
-    assert "By the verdicts of most of 3 seeds: [Re, in part]; by those of one seed alone: [Re, in part] with 2, [¬Re] with 1." in text
+    assert (
+        "Of 3 seeds, each judged alone, 2 give [Re, in part], 1 gives [¬Re]. With the verdict of most seeds for each claim, the title is [Re, in part]."
+        in text
+    )
     assert "| 1,234,568 | **partly**" in text, "a speed has no range over seeds"
     assert "**partly** (over seeds: 2 partly, 1 not reproduced)" in text and text.count("over seeds:") == 1
     for other in (_spread(0.15), _spread(0.12345, budget="full"), _spread(0.12345, seeds=(0, 1))):

@@ -64,7 +64,7 @@ def test_the_tables_by_hand(folder):
     assert any(line.startswith("| C2 | seconds of telemetry generated per second of computation (at least 1) | ") for line in lines)
     assert not any(line.startswith("| C3 | ") and "detectors (" in line for line in lines), "a rule that did not change"
     assert any(line.startswith("| 2 | –, not reproduced | ") and line.endswith("–, does not hold |") for line in lines)
-    assert any("by those of one seed alone: [¬Re] with 2, [Re, in part] with 1." in line for line in lines)
+    assert any("each judged alone, 2 give [¬Re], 1 gives [Re, in part]." in line for line in lines)
 
 
 def test_nothing_is_written_without_further_seeds_or_without_the_page(folder):

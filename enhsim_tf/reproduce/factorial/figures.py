@@ -10,6 +10,7 @@ from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, QUI
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import AUTOREGRESSION, CONVOLUTIONAL_GAN, LEVELS, WHOLE_WINDOWS
 from enhsim_tf.reproduce.figure import Figure
+from enhsim_tf.reproduce.publish.factorial_text import parts_of_difference
 from enhsim_tf.reproduce.publish.wording import in_list
 
 _SHOWN = {  # colour, marker and fill differ, so that the comparisons can be told apart in greyscale
@@ -18,12 +19,14 @@ _SHOWN = {  # colour, marker and fill differ, so that the comparisons can be tol
     CONVOLUTIONAL_GAN: (GENERATED, "^", GENERATED),
 }
 _ROWS = {
-    "windows": "windows:\n1,500 to 15,000",
+    "windows": "data: 1,500 to\n15,000 windows",
     "extraction": "extraction: moving\naverage to residual",
     "enhancer": "enhancer: network\nto ridge regression",
-    "generator": "generator: paper's\nGAN to the other one",
+    "generator": "generator: paper's\nGAN to {}",
 }
-_PANELS = {"gap_closed": "share of the false-alarm gap (points)", "recall_at_real_rate": "recall at the real rate (points)"}
+_WORDS = {"windows": "data", "extraction": "extraction", "enhancer": "enhancer", "generator": "generator"}
+_PANELS = {"gap_closed": "points of the gap in false alarms", "recall_at_real_rate": "points of recall at the real rate"}
+_SINGLE_ORDERS = {"first": "<", "last": ">"}  # markers of the change if a factor is switched first and last
 
 
 def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
@@ -31,50 +34,49 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     shares = found["shares"]
     name, main = next(iter(shares.items()))
     closed = main["gap_closed"]
-    ranked = sorted(LEVELS, key=lambda factor: -closed["factors"][factor]["share"]["mean"])
-    said = in_list([f"the {factor} for {round(100 * closed['factors'][factor]['share']['mean'])}" for factor in ranked])
+    parts = parts_of_difference(closed)
+    ranked = sorted(parts, key=lambda factor: -parts[factor])
+    said = in_list([f"the {_WORDS[factor]} {_signed(100 * parts[factor])}\N{NO-BREAK SPACE}%" for factor in ranked])
     figure, down = new_sheet(
         DOUBLE,
         3.6,
         f"The paper's pipeline closes {100 * closed['paper']['mean']:.0f} % of the gap in false alarms, and ridge regression with {name} of its residuals "
-        f"{100 * closed['switched']['mean']:.0f} %. Of this difference in points, {said.replace('for', 'accounts for', 1)}",
+        f"{100 * closed['switched']['mean']:.0f} %. Of this difference, {said.replace(ranked[0], f'{ranked[0]} makes', 1)}",
         "Change that switching a factor makes, as the mean over all orders of switching the four factors (Shapley value). Bars: 95 % intervals over "
-        f"environments and seeds; faint marks: single environments; crosses: change if the factor is switched first or last. {_runs(shares)}",
+        f"environments and seeds; letters: {in_list(found['environments'])} noise alone; hollow triangles: change if the factor is switched first (to the "
+        f"left) or last (to the right). On 15,000 windows the network trains for fewer epochs. {_runs(shares)}",
     )
     grid = panels(figure, down + 0.42, 1, 2, gap=(0.2, 0.25), sharey=True)[0]
-    left, offsets = 1.35 / DOUBLE, np.linspace(0.22, -0.22, len(_SHOWN))
+    left, offsets = 1.35 / DOUBLE, np.linspace(0.22, -0.22, len(shares)) if len(shares) > 1 else [0.0]
     width = (1 - left - 0.02) / 2
     for number, (axes, (outcome, label)) in enumerate(zip(grid, _PANELS.items(), strict=True)):
         place = axes.get_position()
         axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
-        for (generator, (colour, marker, face)), offset in zip(_SHOWN.items(), offsets, strict=True):
-            if generator not in shares:
-                continue
+        for (generator, (colour, marker, face)), offset in zip(((each, _SHOWN[each]) for each in shares), offsets, strict=True):
             for height, factor in enumerate(LEVELS):
                 about, at = shares[generator][outcome]["factors"][factor], offset - height
                 mean, low, high = (100 * about["share"][key] for key in ("mean", "low", "high"))
-                axes.plot(
-                    [100 * value for value in about["by_environment"].values()],
-                    [at] * len(about["by_environment"]),
-                    marker,
-                    color=colour,
-                    markersize=2.5,
-                    alpha=0.35,
-                )
-                axes.plot(
-                    [100 * about[when]["mean"] for when in ("first", "last")],
-                    [at] * 2,
-                    "x",
-                    color=colour,
-                    markersize=4,
-                    markeredgewidth=0.8,
-                )
+                for environment, value in about["by_environment"].items():
+                    centred = {"ha": "center", "va": "center", "fontsize": 6.5, "color": QUIET}
+                    axes.text(100 * value, at - 0.24, environment[0], **centred)
+                for when, single in _SINGLE_ORDERS.items():
+                    hollow = {"markersize": 4, "markeredgewidth": 0.8, "markerfacecolor": "none", "linestyle": "none"}
+                    axes.plot(100 * about[when]["mean"], at, single, color=colour, **hollow)
                 axes.plot([low, high], [at] * 2, color=colour, linewidth=2, alpha=0.6)
                 style = {"markerfacecolor": face, "markersize": 5, "linestyle": "none", "label": generator if not height else None}
                 axes.plot(mean, at, marker, color=colour, **style)
+                axes.annotate(_signed(mean), (mean, at), (0, 5), textcoords="offset points", ha="center", fontsize=7)
+        values = [
+            100 * value
+            for about in shares.values()
+            for each in about[outcome]["factors"].values()
+            for value in each["by_environment"].values()
+        ]
+        axes.update_datalim([(value, 0) for value in values])  # letters do not widen the axes by themselves
         axes.margins(x=0.06)
+        axes.autoscale_view(scaley=False)
         axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
-        axes.set_yticks(-np.arange(len(LEVELS)), [_ROWS[factor] for factor in LEVELS])
+        axes.set_yticks(-np.arange(len(LEVELS)), [_ROWS[factor].format(name if len(shares) == 1 else "another one") for factor in LEVELS])
         axes.set_ylim(-len(LEVELS) + 0.5, 0.5)
         axes.set_xlabel(label)
     handles, labels = grid[0].get_legend_handles_labels()
@@ -84,6 +86,11 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         handles, labels, loc="upper left", bbox_to_anchor=(left - 0.01, 1 - down / height), ncols=len(labels), alignment="left", **titled
     )
     return figure
+
+
+def _signed(value: float) -> str:
+    """A number without decimals, with a minus sign where it is negative, and without a sign where it rounds to zero."""
+    return f"{round(value) + 0:d}".replace("-", "\N{MINUS SIGN}")
 
 
 def _runs(shares: Mapping[str, Any]) -> str:

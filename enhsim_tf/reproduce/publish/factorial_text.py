@@ -20,10 +20,19 @@ def lines(found: Findings) -> list[str]:
 
 
 def coverage(found: Findings) -> str:
-    """How many cells were computed, and what the others are."""
+    """How many runs were computed, and what the others are. A run is a cell in one environment and with one seed."""
     seeds = found["seeds"]
-    said = f"{found['num_cells']} of {found['of_cells']} cells ({in_seeds(seeds)}, {seeds[0]} to {seeds[-1]}, in {len(found['environments'])} environments)"
+    said = (
+        f"{found['num_cells']} of {found['of_cells']} runs (a cell, an environment and a seed; {in_seeds(seeds)}, {seeds[0]} to {seeds[-1]}, in "
+        f"{len(found['environments'])} environments)"
+    )
     return said if found["num_cells"] == found["of_cells"] else f"{said}; the command continues with the others"
+
+
+def paper_cell(found: Findings) -> str:
+    """What the paper's pipeline closes of the gap, with the number of detectors and seeds."""
+    about = found["cells"][PAPER_CELL.name]
+    return f"{per_cent(about['gap_closed'], 0)}, with {len(found['detectors'])} detectors and {in_seeds(about['seeds'])},"
 
 
 def contributions(found: Findings) -> str:
@@ -43,6 +52,19 @@ def contributions(found: Findings) -> str:
     return "\n".join(rows)
 
 
+def by_environment(found: Findings) -> str:
+    """The contributions of the main comparison in each environment, and the share of each factor in the difference between the two ends."""
+    if not found["shares"]:
+        return "No seed has all cells of a comparison yet."
+    generator, about = next(iter(found["shares"].items()))
+    names, closed = found["environments"], about["gap_closed"]
+    parts = parts_of_difference(closed)
+    rows = [f"| with {generator}, points | {' | '.join(names)} | share of the difference |", f"|---|{'---|' * len(names)}---|"]
+    for factor, each in closed["factors"].items():
+        rows.append(f"| {factor} | {' | '.join(points(each['by_environment'][name]) for name in names)} | {per_cent(parts[factor], 0)} |")
+    return "\n".join(rows)
+
+
 def contrasts_table(found: Findings) -> str:
     """The differences that the conclusions use, as far as their cells exist."""
     rows = ["| first | minus second | false alarms (points) | recall at the real rate (points) | seeds |", "|---|---|---|---|---|"]
@@ -50,6 +72,16 @@ def contrasts_table(found: Findings) -> str:
         differences = " | ".join(points(about[name]) for name in ("false_alarms", "recall_at_real_rate"))
         rows.append(f"| {about['first']} | {about['second']} | {differences} | {len(about['seeds'])} |")
     return "\n".join(rows)
+
+
+def parts_of_difference(closed: Findings) -> dict[str, float]:
+    """The share that each factor has in the difference between the two ends of a comparison; the shares add up to 1.
+
+    Args:
+        closed: The outcome `gap_closed` of a comparison.
+    """
+    difference = closed["switched"]["mean"] - closed["paper"]["mean"]
+    return {factor: about["share"]["mean"] / difference for factor, about in closed["factors"].items()}
 
 
 def cells_table(found: Findings) -> str:
@@ -97,8 +129,8 @@ def short_table(found: Findings) -> str:
             )
     seeds = found["seeds"]
     return "\n".join(rows) + (
-        f"\n\nThe paper's pipeline, ridge regression with whole windows of its residuals, and the cell with the fewest false alarms for each generator, of "
-        f"{coverage(found)}. Means over {len(found['detectors'])} detectors ({in_list(found['detectors'])}), with 95 % intervals over environments and seeds "
+        f"\n\nThe paper's pipeline, ridge regression with whole windows of its residuals, and the cell with the fewest false alarms for each generator "
+        f"among those that were computed. Means over {len(found['detectors'])} detectors ({in_list(found['detectors'])}), with 95 % intervals over environments and seeds "
         f"{seeds[0]} to {seeds[-1]}. From `figures/factorial/findings.json`."
     )
 
@@ -110,12 +142,16 @@ def ranking(found: Findings) -> str:
     generator, about = next(iter(found["shares"].items()))
     closed = about["gap_closed"]
     ranked = sorted(closed["factors"].items(), key=lambda each: -each[1]["share"]["mean"])
-    said = in_list(
-        [f"the {factor} {'accounts ' * (not number)}for {points(each['share'])}" for number, (factor, each) in enumerate(ranked)]
+    parts = parts_of_difference(closed)
+    said = "; ".join(
+        [
+            f"the {factor} {'accounts ' * (not number)}for {points(each['share'])} points, or {per_cent(parts[factor], 0)}"
+            for number, (factor, each) in enumerate(ranked)
+        ]
     )
     ends = [f"the {factor} {points(each['first']['mean'], 0)} or {points(each['last']['mean'], 0)}" for factor, each in ranked]
     return (
         f"With {generator} in place of the paper's GAN ({in_seeds(about['seeds'])}), the share of the gap that is closed rises from "
-        f"{per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of this difference in points, {said}. The factors interact: the "
+        f"{per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of this difference, {said}. The factors interact: the "
         f"change in points if a factor is switched first or last is, for {in_list(ends)}."
     )

@@ -42,6 +42,8 @@ def render(
     tries: Sequence[Mapping[str, str]] = (),
     timing: Findings | None = None,
     factorial: Findings | None = None,
+    curve: Findings | None = None,
+    noise: Findings | None = None,
     template: str = "report.md.jinja",
 ) -> str:
     """The report, or the file of its tables, as Markdown.
@@ -53,6 +55,8 @@ def render(
         tries: Designs that were tried where the convolutional GAN misses a target.
         timing: The benchmark of its training iteration, as `timing_of` reads it.
         factorial: The findings of the factorial experiment, or None if it was not run.
+        curve: The findings of the experiment on the number of real windows, or None if it was not run.
+        noise: The findings of the experiment on noise, or None if it was not run.
         template: One of `PATHS`.
     """
     import jinja2
@@ -77,6 +81,7 @@ def render(
         "mean_of": mean_of,
         "capitalise": lambda text: text[:1].upper() + text[1:],
     }
+    answered = practice.answers(found, factorial, labelled, curve)
     settings, tried = make_settings(found["budget"]), [_tried(row) for row in tries]
     return environment.get_template(template).render(
         found=found,
@@ -84,8 +89,9 @@ def render(
         quietest=labelled and quietest(labelled),
         factorial=factorial,
         factorial_text=factorial_text,
-        practice=practice.bullets(found, factorial, labelled),
-        objections=objections(found, factorial, labelled),
+        practice=practice.short(answered),
+        evidence=practice.evidence(answered),
+        objections=objections(found, factorial, labelled, noise),
         designs=designs,
         tries=tried,
         tries_found=tries_found(tried),
@@ -111,7 +117,8 @@ def render_all(root: Path, found: Findings) -> dict[Path, str]:
         root: Folder of the project.
         found: The findings on robustness.
     """
-    stored = findings_of(root, "labelled"), *(designs_of(root / path) for path in TABLES), timing_of(root), findings_of(root, "factorial")
+    others = (findings_of(root, name) for name in ("factorial", "learning_curve", "noise"))
+    stored = findings_of(root, "labelled"), *(designs_of(root / path) for path in TABLES), timing_of(root), *others
     return {path: render(found, *stored, template=template) for template, path in PATHS.items()}
 
 
@@ -120,7 +127,7 @@ def findings_of(root: Path, name: str) -> Findings | None:
 
     Args:
         root: Folder of the project.
-        name: `robustness`, `factorial` or `labelled`. With `labelled` come the rows of the residual detector, as `residual`.
+        name: Name of the experiment's folder of figures. With `labelled` come the rows of the residual detector, as `residual`.
     """
     path = root / "figures" / name / "findings.json"
     found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
@@ -168,12 +175,12 @@ def report(found: Findings, root: Path) -> None:
     from enhsim_tf.reproduce.publish.results import fill_pages
     from enhsim_tf.reproduce.spacecraft import run
 
-    labelled, factorial = (findings_of(root, name) for name in ("labelled", "factorial"))
+    labelled, factorial, curve = (findings_of(root, name) for name in ("labelled", "factorial", "learning_curve"))
     for path, text in render_all(root, found).items():
         make_folder(root / path.parent)
         with replace_file(root / path) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    parts = {"practice": practice.bullets(found, factorial, labelled), "robustness": table(found)}
+    parts = {"practice": practice.short(practice.answers(found, factorial, labelled, curve)), "robustness": table(found)}
     if labelled is not None:
         parts["labelled"] = run.table(labelled)
         parts["residual"] = residual_table(labelled.get("residual", {}))

@@ -97,10 +97,13 @@ def _holds(about: Mapping[str, Any]) -> list[str | None]:
 def titles_line(found: Mapping[str, Any], spread: Mapping[str, Any]) -> str:
     """Sentences on the verdict in the title: by most seeds, by each seed alone, and on which claims the seeds are divided equally."""
     alone = collections.Counter(titles_of_seeds(found["claims"], spread))
-    counted = ", ".join(f"{title} with {number}" for title, number in alone.most_common())
-    said = f"By the verdicts of most of {len(spread['seeds'])} seeds: {title_verdict(found['claims'], spread)}; by those of one seed alone: {counted}."
+    counted = ", ".join(f"{number} {'gives' if number == 1 else 'give'} {title}" for title, number in alone.most_common())
     ties = [claim["id"] for claim in found["claims"] if is_tie(spread["claims"][claim["id"]]["verdicts"])]
-    return f"{said} On {', '.join(ties)} the seeds are divided equally, and the worse verdict counts." if ties else said
+    divided = f" On {', '.join(ties)} the seeds are divided equally, and the worse verdict counts." if ties else ""
+    return (
+        f"Of {len(spread['seeds'])} seeds, each judged alone, {counted}. With the verdict of most seeds for each claim, the title is "
+        f"{title_verdict(found['claims'], spread)}.{divided}"
+    )
 
 
 PAGES = {
@@ -184,11 +187,21 @@ def claims_in_short(found: Mapping[str, Any], spread: Mapping[str, Any] | None =
     """The claims as a Markdown table with a short row each: the sentence, the verdict, the value and what is needed."""
     lines = ["| | the paper says | verdict | value | needed |", "|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value = f"{claim['statistic'].partition(':')[0]}: {short(claim['value'])}"
+        value = f"{claim['statistic'].partition(':')[0]}: {_value(claim, spread)}"
         verdict = f"**{verdict_over(claim, spread)}**" + (f"; {claim['holds']} here" if claim.get("holds") else "")
         lines.append(f"| {claim['id']} | {claim['sentence']} | {verdict} | {value} | {NEEDED[claim['id']]} |")
-    said = "" if spread is None else f" {titles_line(found, spread)}"
+    said = "" if spread is None else f" In brackets: the range over seeds; verdicts are those of most seeds. {titles_line(found, spread)}"
     return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget.{said}"
+
+
+def _value(claim: Mapping[str, Any], spread: Mapping[str, Any] | None) -> str:
+    """The value of the statistic, with its range over seeds where that is known."""
+    over = None if spread is None else spread["claims"][claim["id"]]
+    if over is None or over["range"] is None:
+        return short(claim["value"])
+    known = sum(each is not None for each in over["values"])
+    among = f"; {known} of {len(over['values'])} seeds" if known < len(over["values"]) else ""
+    return "{} ({} to {}{})".format(*map(short, (claim["value"], *over["range"])), among)
 
 
 def fill_parts(text: str, parts: Mapping[str, str], where: str) -> str:
@@ -214,9 +227,7 @@ def claims_table(found: Mapping[str, Any], spread: Mapping[str, Any] | None = No
     """The claims as a Markdown table, with the range over seeds where it is known."""
     lines = ["| | the paper says | statistic (tolerance) | value | verdict | what we found |", "|---|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value, verdict, differ = short(claim["value"]), f"**{verdict_over(claim, spread)}**", disagreement(spread, claim["id"])
-        if spread is not None and spread["claims"][claim["id"]]["range"] is not None:
-            value += " ({} to {})".format(*map(short, spread["claims"][claim["id"]]["range"]))
+        value, verdict, differ = _value(claim, spread), f"**{verdict_over(claim, spread)}**", disagreement(spread, claim["id"])
         verdict += f" (over seeds: {differ})" if differ else ""
         lines.append(
             f"| {claim['id']} | {claim['sentence']} ({claim['section']}) | {claim['statistic']} ({claim['tolerance']}) | {value} "

@@ -94,7 +94,8 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
         "vus_pr": by_replicate(tables["traces"], "vus_pr"),
     }
     cells = [*REPLICATE, "arm", "detector"]
-    recall = trained(tables["recall"]).groupby(cells)["recall"].mean()
+    all_recalls = trained(tables["recall"]).groupby(cells)[["recall", "recall_at_real_rate"]].mean()
+    recall, at_real_rate = all_recalls["recall"], all_recalls["recall_at_real_rate"].groupby(["arm", "detector"]).mean()
     per_replicate = rate.set_index(cells)["rate"]
     per_detector, recalls = (table.groupby(["arm", "environment", "detector"]).mean() for table in (per_replicate, recall))
     keeps = [keeps_the_rule(*each) for each in ((per_detector, recalls), (per_replicate, recall))]
@@ -104,6 +105,7 @@ def _arms(rate: "pd.DataFrame", tables: "Mapping[str, pd.DataFrame]", environmen
             "false_alarms": _share(interval(blocks[arm])),
             "gap_closed": float(gap_closed(mean_rate, arm).mean()),
             **{name: float(table[arm].mean()) for name, table in others.items()},
+            "recalls_at_real_rate": {key: float(value) for key, value in at_real_rate[arm].items()},
             "by_environment": {
                 name: {
                     "false_alarms": _share(interval(blocks[arm], name)),

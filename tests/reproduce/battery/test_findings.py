@@ -15,7 +15,7 @@ from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
 from enhsim_tf.reproduce.battery.faults import ALL, SEVERITIES, SIZES
 from enhsim_tf.reproduce.battery.figures import FIGURES
 from enhsim_tf.reproduce.battery.findings import KEPT, lines, summarise
-from enhsim_tf.reproduce.battery.page import degraded_configurations, fill_page, parts_of
+from enhsim_tf.reproduce.battery.page import degraded_configurations, fill_page, parts_of, speed_penalty
 from enhsim_tf.reproduce.figure import save_all
 
 near = functools.partial(pytest.approx, rel=1e-4)  # tables hold float32
@@ -161,7 +161,8 @@ def test_the_committed_page_belongs_to_the_committed_tables():
     page = Path("docs/battery.md").read_text()
     for name, part in parts_of(found).items():
         assert part in page, name
-    assert degraded_configurations(found) in Path("docs/what_holds.md").read_text()
+    text = Path("docs/what_holds.md").read_text()
+    assert degraded_configurations(found) in text and speed_penalty(found) in text
 
 
 def test_the_sentence_on_claim_c9_counts_cases_and_gives_the_verdict():
@@ -172,3 +173,8 @@ def test_the_sentence_on_claim_c9_counts_cases_and_gives_the_verdict():
     text = degraded_configurations({"seeds": [1, 2], "regimes": {"gentle": about}})
     assert "2 seeds" in text and "at most 3.0 times its nominal error, and below the coarse simulator's error in 2 of 3 cases" in text
     assert text.endswith("C9 does not hold there either.")
+
+
+def test_the_sentence_on_claim_c2_compares_with_the_coarse_run():
+    text = speed_penalty({"regimes": {"gentle": {"seconds": {"coarse simulator": 0.004, "paper's network": 0.001}}}})
+    assert "to 1.25 times in the gentle regime (1.00 ms after 4.0 ms)" in text

@@ -117,32 +117,68 @@ def test_tables_say_what_the_findings_hold(found):
     text = factorial_text.contributions(found)
     assert "| extraction: moving average to residual | 12.5 (12.5 to 12.5) |" in text and "| seeds | 3 | 3 | 3 |" in text
     assert factorial_text.ranking(found).startswith("With whole windows in place of the paper's GAN (3 seeds), the share")
-    assert "the generator accounts for 37.5 (37.5 to 37.5), the enhancer for" in factorial_text.ranking(found)
+    assert "the generator accounts for 37.5 (37.5 to 37.5) points, or 50 %; the enhancer for" in factorial_text.ranking(found)
+    assert factorial_text.paper_cell(found) == "25 %, with 2 detectors and 3 seeds,"
+    assert "| generator | 37.5 | 37.5 | 50 % |" in factorial_text.by_environment(found)
     assert f"| {WITHOUT_NETWORK.name} (no network) | 10.0 % (10.0 to 10.0) |" in factorial_text.short_table(found)
     assert len(factorial_text.cells_table(found).splitlines()) == 2 + 34
     assert f"| {WITHOUT_NETWORK.name} | real | 0.0 (0.0 to 0.0) | 0.0 (0.0 to 0.0) | 3 |" in factorial_text.contrasts_table(found)
-    assert factorial_text.coverage(found) == "192 of 192 cells (3 seeds, 1 to 3, in 2 environments)"
+    assert factorial_text.coverage(found) == "192 of 192 runs (a cell, an environment and a seed; 3 seeds, 1 to 3, in 2 environments)"
 
 
 def test_sentences_follow_the_numbers(found):
     robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
-    said = practice.sentences(robustness, found)
-    assert "suffice** in every environment here" in said["a linear map and resampled residuals"]
+    said = practice.answers(robustness, found)
+    assert "suffice** in every environment here" in said["a linear map and resampled residuals"].sentence
+    network = said["a network"].evidence
+    assert "On nominal telemetry the network raises false alarms: with" in network and "by 15.0 (15.0 to 15.0) points (3 seeds)" in network
     assert (
-        "On nominal telemetry it raises false alarms: with" in said["a network"]
-        and "by 15.0 (15.0 to 15.0) points (3 seeds)" in said["a network"]
+        "the convolutional GAN does not change false alarms by more than 0.5 points (0.0 (0.0 to 0.0) points)"
+        in said["generated noise"].sentence
     )
-    assert "It does not change false alarms by more than 0.5 points here" in said["generated noise"]
     gan = "many / residual / ridge / convolutional GAN"
-    few = practice.sentences(robustness, findings.summarise(table(without={("shot", 1, gan)})))
-    assert "It has no settled effect on false alarms yet here" in few["generated noise"] and "points (2 seeds)" in few["generated noise"]
+    few = practice.answers(robustness, findings.summarise(table(without={("shot", 1, gan)})))["generated noise"]
+    assert "the convolutional GAN has no settled effect on false alarms yet" in few.sentence and "same residuals (2 seeds)" in few.evidence
     worse = table()
     worse.loc[(worse["cell"] == WITHOUT_NETWORK.name) & (worse["environment"] == "shot"), "alarms"] = 600
-    said = practice.sentences(robustness, findings.summarise(worse))
-    assert "suffice** on white noise here" in said["a linear map and resampled residuals"]
-    assert "; on shot noise the difference is 50.0 (50.0 to 50.0) points. Start" in said["a linear map and resampled residuals"]
-    assert "not measured yet" in practice.bullets(robustness) and len(practice.bullets(robustness).splitlines()) == 5
+    linear = practice.answers(robustness, findings.summarise(worse))["a linear map and resampled residuals"]
+    assert "suffice** on white noise here" in linear.sentence
+    assert "On shot noise the difference is 50.0 (50.0 to 50.0) points." in linear.evidence
+    unknown = practice.short(practice.answers(robustness))
+    assert "not measured yet" in unknown and len(unknown.splitlines()) == 5
     assert len(objections.objections(robustness, found)) == 9
+
+
+def _curve(pays):
+    rates = {name: {"rate": {"5": rate}} for name, rate in {practice.FITTED: 0.04, practice.RESAMPLED: 0.06, "real": 0.12}.items()}
+    return {"numbers": [5, 100], "seeds": [1, 2], "environments": {"white": {"pays": pays, "arms": rates}}}
+
+
+def test_generated_noise_pays_where_the_fitted_autoregression_does():
+    robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
+    said = practice.answers(robustness, curve=_curve({practice.FITTED: [5, 100]}))["generated noise"]
+    assert (
+        "with 5 real windows of white noise, detectors flag 4.0 % of nominal windows, against 12.0 % after training on these 5"
+        in said.sentence
+    )
+    assert "pays with 5 and 100 windows on white noise (2 seeds" in said.evidence and "residual windows give 6.0 %" in said.evidence
+    assert "**Generated noise** was not shown to pay" in practice.answers(robustness, curve=_curve({}))["generated noise"].sentence
+
+
+def test_generated_noise_pays_nowhere_if_no_noise_model_was_fitted_to_few_windows():
+    robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
+    said = practice.answers(robustness)
+    assert "**Generated noise** was not shown to pay; with many windows" in said["generated noise"].sentence
+    assert practice.evidence(said).startswith("- *A clean simulator.* (")
+
+
+def test_the_objections_say_which_experiments_are_missing(found):
+    robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
+    outcome = objections.objections(robustness, found)[-1]["outcome"]
+    assert "(4) The factorial: done, 192 of 192 runs" in outcome and "(7) Several channels with correlated noise: open." in outcome
+    less = findings.summarise(table(without={("shot", 1, "many / residual / ridge / convolutional GAN")}))
+    assert "(4) The factorial: in part, 191 of 192 runs" in objections.objections(robustness, less)[-1]["outcome"]
+    assert objections.objections(robustness)[3]["outcome"].endswith("without the convolutional GAN so far.")
 
 
 def test_committed_findings_come_from_the_committed_table(near):
@@ -154,5 +190,5 @@ def test_committed_findings_come_from_the_committed_table(near):
     assert (KEPT / TABLE).stat().st_size < 400_000
     root = KEPT.parents[1]
     assert factorial_text.page_part(kept) in (root / "docs" / "what_holds.md").read_text(encoding="utf-8")
-    robustness, labelled = (report.findings_of(KEPT.parents[1], name) for name in ("robustness", "labelled"))
-    assert practice.bullets(robustness, kept, labelled) in (root / "README.md").read_text(encoding="utf-8")
+    robustness, labelled, curve = (report.findings_of(root, name) for name in ("robustness", "labelled", "learning_curve"))
+    assert practice.short(practice.answers(robustness, kept, labelled, curve)) in (root / "README.md").read_text(encoding="utf-8")

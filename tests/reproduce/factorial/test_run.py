@@ -56,7 +56,7 @@ def test_cheap_rounds_come_first_for_every_environment_and_seed(computed, tmp_pa
     order += [(names, seed) for (names,) in others for seed in (2_000, 2_001)]
     assert computed == [(environment, seed, name) for names, seed in order for environment in command.NOISES for name in names]
     said = capsys.readouterr().out
-    assert "256 of 256 cells (2 seeds, 2000 to 2001, in 4 environments)" in said
+    assert "256 of 256 runs (a cell, an environment and a seed; 2 seeds, 2000 to 2001, in 4 environments)" in said
     folder = tmp_path / "out" / runs.FOLDER
     assert {path.name for path in folder.iterdir()} == {"cells.csv", "findings.json", "contributions.png", "contributions.svg"}
     assert 'id="watermark"' in (folder / "contributions.svg").read_text(encoding="utf-8")
