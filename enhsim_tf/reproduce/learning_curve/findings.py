@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.reproduce.learning_curve.arms import CLASSIFIER, CLASSIFIER_ON_REAL, REAL, SIMULATOR
+from enhsim_tf.reproduce.learning_curve.arms import (
+    BOTH,
+    CLASSIFIER,
+    CLASSIFIER_ON_REAL,
+    CORAL,
+    ONE_LINE,
+    REAL,
+    SIMULATOR,
+    THRESHOLD_ON_REAL,
+)
 from enhsim_tf.reproduce.tables import KeptTables
 
 if TYPE_CHECKING:
@@ -26,6 +35,7 @@ RATE = 0.01
 PAYS_SHARE = 0.5  # a simulator pays where its excess is at most this share of that of training on the real windows alone
 MAX_RECALL_LOSS = 0.03  # and its recall at the matched rate is at most this much lower
 SUFFICES = 0.005  # real windows suffice where the excess of training on them is at most this
+OTHERS = (BOTH, THRESHOLD_ON_REAL, CORAL, ONE_LINE)  # to which the rule, which was written for simulators, is also applied
 JUDGED_AT = 20  # windows at which the best simulator arm must have at most half of the excess of the real ones
 
 
@@ -36,9 +46,10 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         tables: The table `rows`.
 
     Returns:
-        For each environment and arm its curves over the number of real windows; and for each environment the numbers of real
-        windows at which each simulator arm pays, and the smallest number from which the real windows suffice. With classifiers, also
-        by how much a classifier of injected anomalies finds more if it learns from the simulator instead of the real windows.
+        For each environment and arm its curves over the number of real windows; for each environment the numbers of real windows at
+        which each simulator arm pays, those at which other methods do by the same rule, and the smallest number from which the real
+        windows suffice. With classifiers, also by how much a classifier of injected anomalies finds more if it learns from the
+        simulator instead of the real windows.
     """
     rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
     numbers = sorted({int(number) for number in rows["num_real"]})
@@ -47,7 +58,9 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         own = rows[rows["environment"] == environment]
         arms = {arm: _curves(own[own["arm"] == arm], numbers) for arm in dict.fromkeys(own["arm"])}
         real = arms[REAL]
-        simulators = [arm for arm in arms if arm.startswith(SIMULATOR)]
+        # noise networks may have fewer seeds than the other arms: they decide nothing, and are compared on their own seeds
+        simulators = [arm for arm in arms if arm.startswith(SIMULATOR) and _most_seeds(arms[arm]) == _most_seeds(real)]
+        others = [arm for arm in arms if arm in OTHERS or (arm.startswith(SIMULATOR) and arm not in simulators)]
         pays = {arm: [number for number in numbers if _pays(arms[arm], real, number)] for arm in simulators}
         suffices = [number for number in numbers if all(real["excess"][str(n)] <= SUFFICES for n in numbers if n >= number)]
         at = str(JUDGED_AT if JUDGED_AT in numbers else numbers[-1])
@@ -55,6 +68,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         environments[environment] = {
             "arms": arms,
             "pays": pays,
+            "others_pay": {arm: _other(own, arm, numbers) for arm in others},
             "real_suffices_from": suffices[0] if suffices else None,
             "bar": {
                 "num_real": int(at),
@@ -67,6 +81,24 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         if {CLASSIFIER, CLASSIFIER_ON_REAL} <= set(arms):
             environments[environment]["classifiers"] = _gain(own, numbers)
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
+
+
+def _most_seeds(curve: dict[str, Any]) -> int:
+    return max(curve["seeds"].values(), default=0)
+
+
+def _other(rows: "pd.DataFrame", arm: str, numbers: list[int]) -> dict[str, Any]:
+    """The numbers of real windows at which an arm pays, compared with the real windows of the seeds that the arm has, and its recall there."""
+    its = rows[rows["arm"] == arm]
+    real = rows[(rows["arm"] == REAL) & rows["seed"].isin(its["seed"].unique())]
+    curve, compared = _curves(its, numbers), _curves(real, numbers)
+    pays = [number for number in numbers if _pays(curve, compared, number)]
+    return {
+        "pays": pays,
+        "tried": [number for number in numbers if str(number) in curve["excess"]],
+        "seeds": _most_seeds(curve),
+        "recall": {str(number): [curve["recall"][str(number)], compared["recall"][str(number)]] for number in pays},
+    }
 
 
 def _curves(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, Any]:

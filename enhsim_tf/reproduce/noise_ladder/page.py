@@ -145,7 +145,29 @@ def learning_curve(found: Findings) -> str:
             ]
             rows.append(f"| {name} | {arm} | {' | '.join(cells)} |")
     scope = "False alarms in % / recall at 1 % false alarms in %, by the number of real windows, " + _seeds_of(found) + ":"
-    return "\n".join([*lines, *_classifiers(found), "", scope, "", *rows])
+    return "\n".join([*lines, *_others(found), *_classifiers(found), "", scope, "", *rows])
+
+
+def _others(found: Findings) -> list[str]:
+    """Where the arms that decide nothing pay by the same rule, and what they find at their own thresholds."""
+    said, names = [], {}
+    for name, about in found["environments"].items():
+        for arm, other in about["others_pay"].items():
+            some = "" if other["tried"] == found["numbers"] else f", {_numbers(other['tried'])} windows"
+            names[arm] = f"{arm} ({other['seeds']} seed{'s' * (other['seeds'] > 1)}{some})"
+            if other["pays"]:
+                at = str(other["pays"][-1])
+                own, real = (f"{100 * recall:.0f} %" for recall in other["recall"][at])
+                said.append(
+                    f"- {name}: {arm} with {_numbers(other['pays'])} windows. With {at} windows and its own thresholds it finds {own} of the anomalies; "
+                    f"training on the real windows alone finds {real}."
+                )
+    if not names:
+        return []
+    listed = "; ".join(names.values())
+    if not said:
+        return ["", f"By the same rule, none of the other methods pays: {listed}."]
+    return ["", f"Other methods were tried with the same rule: {listed}. They pay only here:", "", *said]
 
 
 def _seeds_of(found: Findings) -> str:

@@ -163,6 +163,40 @@ def test_a_simulator_pays_where_it_halves_the_excess_without_losing_recall():
     assert findings.summarise(table(real, simulated, recall=0.58))["environments"]["white"]["pays"] == {SIMULATOR + "Gaussian": [5]}
 
 
+def _with_another_seed(tables, arm):
+    """The tables with a second seed, in which the real windows have no excess and an arm has no rows."""
+    rows = tables["rows"]
+    second = rows[rows["arm"] != arm].assign(seed=2)
+    second.loc[second["arm"] == REAL, "alarms"] = 10
+    return {"rows": pd.concat([rows, second], ignore_index=True)}
+
+
+def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seeds():
+    tables = table({5: 0.11, 20: 0.03}, {5: 0.06, 20: 0.021})
+    network = tables["rows"][tables["rows"]["arm"] != REAL].assign(arm=SIMULATOR + "autoregressive network", alarms=10)
+    both = _with_another_seed({"rows": pd.concat([tables["rows"], network], ignore_index=True)}, SIMULATOR + "autoregressive network")
+    found = findings.summarise(both)
+    white = found["environments"]["white"]
+    assert list(white["pays"]) == [SIMULATOR + "Gaussian"] and white["bar"]["best"] == SIMULATOR + "Gaussian"
+    other = white["others_pay"][SIMULATOR + "autoregressive network"]
+    assert (other["pays"], other["tried"], other["seeds"]) == (
+        [5, 20],
+        [5, 20],
+        1,
+    )  # on seed 1 the real windows have excesses of 10 and 2 points
+    text = page.learning_curve(found)
+    assert "simulator + autoregressive network (1 seed). They pay only here:" in text
+    assert "With 20 windows and its own thresholds it finds 50 % of the anomalies; training on the real windows alone finds 50 %." in text
+
+
+def test_methods_without_a_simulator_are_held_to_the_same_rule():
+    tables = table({5: 0.11, 20: 0.03}, {5: 0.06, 20: 0.021})
+    coral = tables["rows"][tables["rows"]["arm"] != REAL].assign(arm=CORAL, alarms=90)
+    found = findings.summarise({"rows": pd.concat([tables["rows"], coral], ignore_index=True)})
+    assert found["environments"]["white"]["others_pay"] == {CORAL: {"pays": [], "tried": [5, 20], "seeds": 1, "recall": {}}}
+    assert "none of the other methods pays: CORAL (1 seed)." in page.learning_curve(found)
+
+
 def test_options_that_do_not_fit_are_refused_in_one_line(capsys):
     assert command.main(["--experiment", "learning-curve", "--rungs", "pink"]) == 2
     assert "Expected --rungs of none, Gaussian" in capsys.readouterr().err
