@@ -1,10 +1,11 @@
 """The figure of the factorial experiment, drawn from its findings alone."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.figure
 import numpy as np
+from matplotlib.axes import Axes
 
 from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, new_sheet, panels
 from enhsim_tf.reproduce.caption import in_seeds
@@ -19,12 +20,11 @@ _SHOWN = {  # colour, marker and fill differ, so that the comparisons can be tol
     CONVOLUTIONAL_GAN: (GENERATED, "^", GENERATED),
 }
 _ROWS = {
-    "windows": "data: 1,500 to\n15,000 windows",
+    "windows": "windows: 1,500\nto 15,000",
     "extraction": "extraction: moving\naverage to residual",
     "enhancer": "enhancer: network\nto ridge regression",
     "generator": "generator: paper's\nGAN to {}",
 }
-_WORDS = {"windows": "data", "extraction": "extraction", "enhancer": "enhancer", "generator": "generator"}
 _PANELS = {"gap_closed": "points of the gap in false alarms", "recall_at_real_rate": "points of recall at the real rate"}
 _SINGLE_ORDERS = {"first": "<", "last": ">"}  # markers of the change if a factor is switched first and last
 
@@ -36,15 +36,15 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     closed = main["gap_closed"]
     parts = parts_of_difference(closed)
     ranked = sorted(parts, key=lambda factor: -parts[factor])
-    said = in_list([f"the {_WORDS[factor]} {_signed(100 * parts[factor])}\N{NO-BREAK SPACE}%" for factor in ranked])
+    said = in_list([f"the {factor} {_signed(100 * parts[factor])}\N{NO-BREAK SPACE}%" for factor in ranked])
     figure, down = new_sheet(
         DOUBLE,
         3.6,
         f"The paper's pipeline closes {100 * closed['paper']['mean']:.0f} % of the gap in false alarms, and ridge regression with {name} of its residuals "
-        f"{100 * closed['switched']['mean']:.0f} %. Of this difference, {said.replace(ranked[0], f'{ranked[0]} makes', 1)}",
+        f"{100 * closed['switched']['mean']:.0f} %. Of this difference, {said.replace(ranked[0], f'{ranked[0]} accounts for', 1)}",
         "Change that switching a factor makes, as the mean over all orders of switching the four factors (Shapley value). Bars: 95 % intervals over "
-        f"environments and seeds; letters: {in_list(found['environments'])} noise alone; hollow triangles: change if the factor is switched first (to the "
-        f"left) or last (to the right). On 15,000 windows the network trains for fewer epochs. {_runs(shares)}",
+        f"environments and seeds; letters: {in_list(found['environments'])} noise alone; triangles: change if the factor is switched first (pointing left) "
+        f"or last (pointing right). On 15,000 windows the network trains for fewer epochs. {_runs(shares)}",
     )
     grid = panels(figure, down + 0.42, 1, 2, gap=(0.2, 0.25), sharey=True)[0]
     left, offsets = 1.35 / DOUBLE, np.linspace(0.22, -0.22, len(shares)) if len(shares) > 1 else [0.0]
@@ -56,9 +56,6 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
             for height, factor in enumerate(LEVELS):
                 about, at = shares[generator][outcome]["factors"][factor], offset - height
                 mean, low, high = (100 * about["share"][key] for key in ("mean", "low", "high"))
-                for environment, value in about["by_environment"].items():
-                    centred = {"ha": "center", "va": "center", "fontsize": 6.5, "color": QUIET}
-                    axes.text(100 * value, at - 0.24, environment[0], **centred)
                 for when, single in _SINGLE_ORDERS.items():
                     hollow = {"markersize": 4, "markeredgewidth": 0.8, "markerfacecolor": "none", "linestyle": "none"}
                     axes.plot(100 * about[when]["mean"], at, single, color=colour, **hollow)
@@ -75,6 +72,7 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.update_datalim([(value, 0) for value in values])  # letters do not widen the axes by themselves
         axes.margins(x=0.06)
         axes.autoscale_view(scaley=False)
+        _letters(axes, shares, outcome, offsets)
         axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
         axes.set_yticks(-np.arange(len(LEVELS)), [_ROWS[factor].format(name if len(shares) == 1 else "another one") for factor in LEVELS])
         axes.set_ylim(-len(LEVELS) + 0.5, 0.5)
@@ -88,6 +86,19 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     return figure
 
 
+def _letters(axes: Axes, shares: Mapping[str, Any], outcome: str, offsets: Sequence[float]) -> None:
+    """Marks the contribution in each environment by its first letter; letters that would overlap stand below each other."""
+    left, right = axes.get_xlim()
+    for about, offset in zip(shares.values(), offsets, strict=True):
+        for height, factor in enumerate(LEVELS):
+            before, lower = -np.inf, 0
+            for environment, share in sorted(about[outcome]["factors"][factor]["by_environment"].items(), key=lambda each: each[1]):
+                lower = (lower + 1) % 2 if 100 * share - before < 0.03 * (right - left) else 0
+                before = 100 * share
+                centred = {"ha": "center", "va": "center", "fontsize": 6.5, "color": QUIET}
+                axes.text(before, offset - height - 0.22 - 0.16 * lower, environment[0], **centred)
+
+
 def _signed(value: float) -> str:
     """A number without decimals, with a minus sign where it is negative, and without a sign where it rounds to zero."""
     return f"{round(value) + 0:d}".replace("-", "\N{MINUS SIGN}")
@@ -97,7 +108,8 @@ def _runs(shares: Mapping[str, Any]) -> str:
     """How many seeds each comparison rests on."""
     said = {generator: in_seeds(about["seeds"]) for generator, about in shares.items()}
     if len(set(said.values())) == 1:
-        return f"{next(iter(said.values())).capitalize()}."
+        seeds = next(iter(shares.values()))["seeds"]
+        return f"{next(iter(said.values())).capitalize()} ({seeds[0]}{f' to {seeds[-1]}' * (len(seeds) > 1)})."
     words = "; ".join(f"{generator}: {seeds}" for generator, seeds in said.items())
     return f"{words[:1].upper()}{words[1:]}."
 

@@ -19,9 +19,9 @@ _CURVES = {
     SIMULATOR + "autoregression": ("simulator + autoregression", "^", "--", AVERAGE),
     SIMULATOR + "residual windows": ("simulator + residual windows", "D", "-", ENHANCED),
     SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
-    THRESHOLD_ON_REAL: ("the same, threshold on the real windows", "d", ":", ENHANCED),
+    THRESHOLD_ON_REAL: ("the same simulator, threshold on real windows", "d", ":", ENHANCED),
     CORAL: ("CORAL", "s", ":", COARSE),
-    ADVERSARIAL: ("classifier and simulator", "x", ":", QUIET),
+    ADVERSARIAL: ("domain-adversarial classifier, simulator", "x", ":", QUIET),
     CLASSIFIER_ON_REAL: ("classifier, no simulator", "+", "-", QUIET),
 }
 """Label, marker, line style and colour of each arm that is drawn."""
@@ -88,7 +88,7 @@ def _places(places: Sequence[int], numbers: Sequence[int]) -> str:
 def _subtitle(found: Mapping[str, Any]) -> str:
     seeds = len(found["seeds"])
     return (
-        f"Detectors trained on k real windows, or on a simulator fitted to the same k windows; mean over four detectors and "
+        f"Detectors trained on k real windows, or on a simulator fitted to the same k windows; anomalies of 4 standard deviations; mean over four detectors and "
         f"{in_words(seeds)} seed{'s' * (seeds > 1)}. Thresholds are set for 1 % (horizontal line; linear below it). A simulator pays where its "
         "excess of false alarms is at most half that of the real windows and its recall at most 3 points lower." + _classifiers(found)
     )
@@ -100,7 +100,7 @@ def _classifiers(found: Mapping[str, Any]) -> str:
     seeds = max(arms[CLASSIFIER_ON_REAL]["seeds"].values(), default=0) if CLASSIFIER_ON_REAL in arms else 0
     if not seeds:
         return ""
-    return f" The classifiers learn injected anomalies ({in_words(seeds)} seed{'s' * (seeds > 1)}); the one with the simulator is domain-adversarial."
+    return f" The classifiers learn injected anomalies ({in_words(seeds)} seed{'s' * (seeds > 1)})."
 
 
 FIGURES = {

@@ -41,8 +41,9 @@ def families(found: Findings) -> str:
     names = list(dict.fromkeys(name for about in found["families"].values() for name in about["rungs"]))
     lines = [f"| family | half | {' | '.join(names)} | chosen by the rule |", "|---" * (len(names) + 3) + "|"]
     for family, about in sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at"):
+        half = f"{about['half']} (see above)" if about["half"] == "revised" else about["half"]
         rates = [f"{about['rungs'][name]['alarms']:.1%}" if name in about["rungs"] else "" for name in names]
-        lines.append(f"| {family.replace('_', ' ')} | {about['half']} | {' | '.join(rates)} | {', '.join(sorted(set(about['chosen'])))} |")
+        lines.append(f"| {family.replace('_', ' ')} | {half} | {' | '.join(rates)} | {', '.join(sorted(set(about['chosen'])))} |")
     return "\n".join([_scope(found), "", *lines])
 
 
@@ -66,6 +67,12 @@ def limits(found: Findings) -> str:
             f"point{'s' * (own['limit'] != 0.01)}: {own['kept']} of {own['of']} families; the largest excess is {100 * own['excess'][worst]:.1f} "
             f"points ({worst.replace('_', ' ')})."
         )
+    for family, excess in kept["revised"].items():
+        lines.append(
+            f"- {family.replace('_', ' ').capitalize()} noise, for which the {kept['rung']} was changed after its first result: {100 * excess:.1f} points."
+        )
+    others = [f"{name} {about['kept']} of {about['of']}" for name, about in kept["within"].items() if about["of"] and name != kept["rung"]]
+    lines.append(f"- Families on which each of the other models keeps these limits: {', '.join(others)}.")
     recall, realism, choice = kept["recall"], kept["realism"], kept["choice"]
     lines += [
         f"- Recall at the real rate within {100 * recall['limit']:g} points of that after training on real windows: {recall['kept']} of "

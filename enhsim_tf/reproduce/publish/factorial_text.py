@@ -77,10 +77,14 @@ def contrasts_table(found: Findings) -> str:
 def parts_of_difference(closed: Findings) -> dict[str, float]:
     """The share that each factor has in the difference between the two ends of a comparison; the shares add up to 1.
 
+    Where the ends are equal, there is nothing to share, and every share is zero.
+
     Args:
         closed: The outcome `gap_closed` of a comparison.
     """
     difference = closed["switched"]["mean"] - closed["paper"]["mean"]
+    if not difference:
+        return dict.fromkeys(closed["factors"], 0.0)
     return {factor: about["share"]["mean"] / difference for factor, about in closed["factors"].items()}
 
 
@@ -151,7 +155,7 @@ def ranking(found: Findings) -> str:
     )
     ends = [f"the {factor} {points(each['first']['mean'], 0)} or {points(each['last']['mean'], 0)}" for factor, each in ranked]
     return (
-        f"With {generator} in place of the paper's GAN ({in_seeds(about['seeds'])}), the share of the gap that is closed rises from "
-        f"{per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of this difference, {said}. The factors interact: the "
+        f"If all four factors are switched, with {generator} in place of the paper's GAN ({in_seeds(about['seeds'])}), the share of the gap that is closed rises "
+        f"from {per_cent(closed['paper']['mean'], 0)} to {per_cent(closed['switched']['mean'], 0)}. Of this difference, {said}. The factors interact: the "
         f"change in points if a factor is switched first or last is, for {in_list(ends)}."
     )

@@ -2,7 +2,7 @@
 
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import CONVOLUTIONAL_GAN, WITHOUT_NETWORK
-from enhsim_tf.reproduce.publish.wording import Findings, interval, per_cent, points, verdict_c8
+from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, per_cent, points, verdict_c8
 
 
 def objections(
@@ -79,8 +79,8 @@ def _labelled(labelled: Findings | None) -> str:
         "are real, they come from blocks of time that are held out in turn (cross-fitting). Detectors trained on the real past "
         f"flag {real} of later nominal windows. At a false-alarm rate of {per_cent(labelled['rates'][1], 0)} for all detectors, the best arm ({strongest}) finds "
         f"{interval(arms[strongest], 0)} of the labelled sequences, the best score of one line of code ({best}) finds {interval(controls[best], 0)}, and chance "
-        f"finds {per_cent(arms[strongest]['chance'], 0)} with the scores of this arm. A random score finds {interval(random, 0)}, because many sequences are longer than "
-        "a window. No difference between arms that was declared before the run is established."
+        f"finds {per_cent(arms[strongest]['chance'], 0)} with the scores of this arm. A random score finds {interval(random, 0)}, because several overlapping windows "
+        "share a sample with each sequence, and one of them is enough. No difference between arms that was declared before the run is established."
     )
 
 
@@ -94,7 +94,7 @@ def _factorial(found: Findings, factorial: Findings | None) -> str:
     factors = about["gap_closed"]["factors"]
     ranked = sorted(factors, key=lambda name: -factors[name]["share"]["mean"])
     return (
-        f"{said} The factorial experiment attributes these points of the gap: "
+        f"{said} The factorial experiment ({in_seeds(about['seeds'])}) attributes these points of the gap: "
         + ", ".join(f"{name} {points(factors[name]['share']['mean'], 0)}" for name in ranked)
         + "."
     )
@@ -109,7 +109,7 @@ def _unseen(noise: Findings | None) -> str:
     excess = (
         {
             rung: {name: about[rung]["excess"] for name, about in families.items() if rung in about}
-            for rung in (CONVOLUTIONAL_GAN, noise["limits"]["rung"])
+            for rung in (CONVOLUTIONAL_GAN, "residual windows", noise["limits"]["rung"])
         }
         if noise
         else {}
@@ -119,10 +119,8 @@ def _unseen(noise: Findings | None) -> str:
     parts = []
     for rung, each in excess.items():
         worst = max(each, key=each.__getitem__)
-        parts.append(
-            f"the {rung} has {points(each[worst])} points more false alarms than real windows at worst ({worst.replace('_', ' ')})"
-        )
-    return f"{said}: on {len(families)} of them ({in_seeds(noise['seeds'])}), {' and '.join(parts)}."
+        parts.append(f"{points(each[worst])} points with {'' if rung.endswith('s') else 'the '}{rung} ({worst.replace('_', ' ')})")
+    return f"{said}: on {len(families)} of them ({in_seeds(noise['seeds'])}), the largest excess of false alarms over training on real windows is {in_list(parts)}."
 
 
 def _missing(factorial: Findings | None, labelled: Findings | None) -> str:

@@ -187,11 +187,21 @@ def claims_in_short(found: Mapping[str, Any], spread: Mapping[str, Any] | None =
     """The claims as a Markdown table with a short row each: the sentence, the verdict, the value and what is needed."""
     lines = ["| | the paper says | verdict | value | needed |", "|---|---|---|---|---|"]
     for claim in found["claims"]:
-        value = f"{claim['statistic'].partition(':')[0]}: {_value(claim, spread)}"
+        value = f"{claim['statistic'].partition(':')[0]}: {_value(claim, spread)}{_beside(claim)}"
         verdict = f"**{verdict_over(claim, spread)}**" + (f"; {claim['holds']} here" if claim.get("holds") else "")
         lines.append(f"| {claim['id']} | {claim['sentence']} | {verdict} | {value} | {NEEDED[claim['id']]} |")
     said = "" if spread is None else f" In brackets: the range over seeds; verdicts are those of most seeds. {titles_line(found, spread)}"
     return "\n".join(lines) + f"\n\nSeed {found['seed']}, {found['budget']} budget.{said}"
+
+
+def _beside(claim: Mapping[str, Any]) -> str:
+    """The number that the value has to be compared with, where the value alone does not show why the verdict is what it is."""
+    details = claim.get("details") or {}
+    if claim["id"] == "C1" and "ridge_nrmse" in details:
+        return f"; ridge regression {details['ridge_nrmse']:.3f}, nearest windows {details['nearest_nrmse']:.3f}"
+    if claim["id"] == "C2" and "cost_ratio" in details:
+        return f", in {details['cost_ratio']:.1f} times the time of the coarse simulator"
+    return ""
 
 
 def _value(claim: Mapping[str, Any], spread: Mapping[str, Any] | None) -> str:
@@ -200,7 +210,7 @@ def _value(claim: Mapping[str, Any], spread: Mapping[str, Any] | None) -> str:
     if over is None or over["range"] is None:
         return short(claim["value"])
     known = sum(each is not None for each in over["values"])
-    among = f"; {known} of {len(over['values'])} seeds" if known < len(over["values"]) else ""
+    among = f" in {known} seeds, none in {len(over['values']) - known}" if known < len(over["values"]) else ""
     return "{} ({} to {}{})".format(*map(short, (claim["value"], *over["range"])), among)
 
 

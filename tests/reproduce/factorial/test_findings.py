@@ -116,7 +116,9 @@ def test_findings_are_plain_json(found):
 def test_tables_say_what_the_findings_hold(found):
     text = factorial_text.contributions(found)
     assert "| extraction: moving average to residual | 12.5 (12.5 to 12.5) |" in text and "| seeds | 3 | 3 | 3 |" in text
-    assert factorial_text.ranking(found).startswith("With whole windows in place of the paper's GAN (3 seeds), the share")
+    assert factorial_text.ranking(found).startswith(
+        "If all four factors are switched, with whole windows in place of the paper's GAN (3 seeds), the share"
+    )
     assert "the generator accounts for 37.5 (37.5 to 37.5) points, or 50 %; the enhancer for" in factorial_text.ranking(found)
     assert factorial_text.paper_cell(found) == "25 %, with 2 detectors and 3 seeds,"
     assert "| generator | 37.5 | 37.5 | 50 % |" in factorial_text.by_environment(found)
@@ -129,11 +131,11 @@ def test_tables_say_what_the_findings_hold(found):
 def test_sentences_follow_the_numbers(found):
     robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
     said = practice.answers(robustness, found)
-    assert "suffice** in every environment here" in said["a linear map and resampled residuals"].sentence
+    assert "suffice** on every noise here" in said["a linear map and resampled residuals"].sentence
     network = said["a network"].evidence
     assert "On nominal telemetry the network raises false alarms: with" in network and "by 15.0 (15.0 to 15.0) points (3 seeds)" in network
     assert (
-        "the convolutional GAN does not change false alarms by more than 0.5 points (0.0 (0.0 to 0.0) points)"
+        "the convolutional GAN does not change false alarms by more than 0.5 points on average over 2 kinds of noise (0.0 (0.0 to 0.0) points)"
         in said["generated noise"].sentence
     )
     gan = "many / residual / ridge / convolutional GAN"
@@ -150,7 +152,10 @@ def test_sentences_follow_the_numbers(found):
 
 
 def _curve(pays):
-    rates = {name: {"rate": {"5": rate}} for name, rate in {practice.FITTED: 0.04, practice.RESAMPLED: 0.06, "real": 0.12}.items()}
+    rates = {
+        name: {"rate": {"5": rate}, "low": {"5": rate / 2}, "high": {"5": 2 * rate}, "recall_at_real_rate": {"5": 0.7}}
+        for name, rate in {practice.FITTED: 0.04, practice.RESAMPLED: 0.06, "real": 0.12}.items()
+    }
     return {"numbers": [5, 100], "seeds": [1, 2], "environments": {"white": {"pays": pays, "arms": rates}}}
 
 
@@ -158,10 +163,13 @@ def test_generated_noise_pays_where_the_fitted_autoregression_does():
     robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
     said = practice.answers(robustness, curve=_curve({practice.FITTED: [5, 100]}))["generated noise"]
     assert (
-        "with 5 real windows of white noise, detectors flag 4.0 % of nominal windows, against 12.0 % after training on these 5"
+        "with 5 real windows of white noise, detectors flag 4.0 % (2.0 to 8.0) of nominal windows, against 12.0 % (6.0 to 24.0) after training on these 5"
         in said.sentence
     )
-    assert "pays with 5 and 100 windows on white noise (2 seeds" in said.evidence and "residual windows give 6.0 %" in said.evidence
+    assert (
+        "pays with 5 and 100 windows on white noise (2 seeds; in brackets" in said.evidence
+        and "residual windows give 6.0 % (3.0 to 12.0)" in said.evidence
+    )
     assert "**Generated noise** was not shown to pay" in practice.answers(robustness, curve=_curve({}))["generated noise"].sentence
 
 

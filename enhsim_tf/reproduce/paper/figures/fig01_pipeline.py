@@ -42,7 +42,7 @@ def arrays(experiment: Experiment) -> Arrays:
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
     """The nine numbered steps of the paper and their sum, with the waveforms of one window."""
-    figure, _ = new_sheet(DOUBLE, 4.5, "Two networks turn a coarse simulation into realistic telemetry")
+    figure, _ = new_sheet(DOUBLE, 4.5, "One network maps a coarse simulation to the signal, a second adds the noise")
     axes, height, gap = drawing_board(figure), 1.02, 0.3
     top = [FOOT + 0.14 + height * (3 - row) + gap * (2 - row) for row in range(3)]
     centre = [y - height / 2 for y in top]

@@ -14,7 +14,7 @@ def arrays(experiment: Experiment) -> Arrays:
 
 def draw(data: Arrays) -> matplotlib.figure.Figure:
     """Draws Figure 3."""
-    return draw_layers(data, f"The enhancer maps a coarse window to a realistic one with {int(data['total']) / 1e6:.1f} million parameters")
+    return draw_layers(data, f"The enhancer maps a coarse window to a smooth one with {int(data['total']) / 1e6:.1f} million parameters")
 
 
 FIGURE = PaperFigure(
