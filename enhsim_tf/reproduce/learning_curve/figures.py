@@ -18,10 +18,10 @@ _CURVES = {
     REAL_ARM: ("the real windows alone", "|", "-", REAL),
     SIMULATOR + "autoregression": ("simulator + autoregression", "^", "--", AVERAGE),
     SIMULATOR + "residual windows": ("simulator + residual windows", "D", "-", ENHANCED),
+    THRESHOLD_ON_REAL: ("residual windows, threshold on real", "d", ":", ENHANCED),
     SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
-    THRESHOLD_ON_REAL: ("the same simulator, threshold on real windows", "d", ":", ENHANCED),
     CORAL: ("CORAL", "s", ":", COARSE),
-    ADVERSARIAL: ("domain-adversarial classifier, simulator", "x", ":", QUIET),
+    ADVERSARIAL: ("classifier + simulator", "x", ":", QUIET),
     CLASSIFIER_ON_REAL: ("classifier, no simulator", "+", "-", QUIET),
 }
 """Label, marker, line style and colour of each arm that is drawn."""
@@ -39,6 +39,8 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
                 continue
             at = [number for number in numbers if str(number) in curve["rate"]]
             style = {"marker": marker, "linestyle": line, "color": colour, "markersize": 3.5, "linewidth": 1.0, "markerfacecolor": "none"}
+            if len(at) == 1:  # a single mark has to be seen among the lines
+                style |= {"markerfacecolor": colour, "markersize": 5, "zorder": 4}
             upper.plot(at, [100 * curve["rate"][str(number)] for number in at], label=label, **style)
             lower.plot(at, [100 * curve["recall_at_real_rate"][str(number)] for number in at], **style)
         _finish(upper, lower, numbers, name)
@@ -95,12 +97,19 @@ def _subtitle(found: Mapping[str, Any]) -> str:
 
 
 def _classifiers(found: Mapping[str, Any]) -> str:
-    """What the classifiers are, and how many seeds they have, if they are drawn."""
+    """What the classifiers are, and which of the drawn arms have fewer seeds than the others."""
     arms = next(iter(found["environments"].values()))["arms"]
-    seeds = max(arms[CLASSIFIER_ON_REAL]["seeds"].values(), default=0) if CLASSIFIER_ON_REAL in arms else 0
-    if not seeds:
-        return ""
-    return f" The classifiers learn injected anomalies ({in_words(seeds)} seed{'s' * (seeds > 1)})."
+    said = ""
+    if CLASSIFIER_ON_REAL in arms and ADVERSARIAL in arms:
+        said = " The classifiers learn injected anomalies; the one with the simulator is domain-adversarial."
+    fewer: dict[int, list[str]] = {}
+    for arm, (label, *_) in _CURVES.items():
+        number = max(arms[arm]["seeds"].values(), default=0) if arm in arms else 0
+        if 0 < number < len(found["seeds"]):
+            fewer.setdefault(number, []).append(label)
+    return said + "".join(
+        f" {in_words(number).capitalize()} seed{'s' * (number > 1)}: {in_list(labels)}." for number, labels in fewer.items()
+    )
 
 
 FIGURES = {
