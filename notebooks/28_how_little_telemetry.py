@@ -351,7 +351,8 @@ for environment, about in found["environments"].items():
         say(
             f"**{environment}**, {number:,} real windows, false alarms: "
             + ", ".join(f"{network} **{rate:.1%}**" for network, rate in by_network.items())
-            + f"; nearest to {RATE:.0%} of the other simulators and the real windows: {best.removeprefix('simulator + ')} {simple[best]:.1%}."
+            + f"; nearest to {RATE:.0%} of the other simulators and the real windows: "
+            + f"{best.removeprefix('simulator + ')} {simple[best]:.1%}."
         )
 if few_seeds:
     say(
