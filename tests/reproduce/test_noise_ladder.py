@@ -11,7 +11,7 @@ from enhsim_tf.enhanced_simulator.noise_choice import NoiseJudge, RungJudgement,
 from enhsim_tf.noise.ladder import RUNGS
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.noise_gallery import GALLERY
-from enhsim_tf.reproduce.noise_ladder import findings
+from enhsim_tf.reproduce.noise_ladder import figures, findings
 from enhsim_tf.reproduce.noise_ladder.page import families, fill_page, limits, unrealistic
 
 
@@ -94,6 +94,11 @@ def test_the_summary_counts_what_a_table_says():
     assert bursts["half"] == "unseen" and bursts["rungs"]["autoregressive network"]["excess"] == pytest.approx(0.02)
     assert found["limits"]["looked at"]["kept"] == 0 and found["limits"]["unseen"]["kept"] == 1  # two points: above one, below three
     assert found["limits"]["realism"]["families_with_all"] == 0 and found["limits"]["recall"]["kept"] == 2
+    assert found["limits"]["within"]["autoregressive network"] == {"kept": 1, "of": 2}  # as above
+    assert found["limits"]["within"]["Gaussian"] == {"kept": 1, "of": 2} and found["limits"]["within"]["residual windows"]["of"] == 0
+    assert figures._message(found["limits"]["within"], "autoregressive network") == (
+        "Limits on false alarms are kept on 1 of 2 families with the autoregressive network"
+    )
     assert found["limits"]["realism"]["by_model"]["real"] == {"families_with_all": 2, "of": 2, "mean_share": 1.0}
     assert found["limits"]["realism"]["by_model"]["convolutional GAN"] == {"families_with_all": 0, "of": 0, "mean_share": None}
 
@@ -113,6 +118,22 @@ def test_the_page_says_what_the_findings_say(tmp_path):
     assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
     assert "fresh real noise itself keeps it on 0 of 1 families" in text and "| autoregressive network | 0 of 1 | 50% |" in text
     assert text.count("\nold\n") == 1  # the part of the other experiment
+    kinds = {"quantised": kinds["bursts"] | {"half": "revised"}}
+    fill_page(page, noise=found | {"families": kinds, "limits": findings._limits(kinds)})
+    text = page.read_text(encoding="utf-8")
+    assert "Quantised noise, for which the autoregressive network was changed after its first result: 2.1 points." in text
+    assert "unseen families" not in text, "a family that is reported for the second time is not unseen"
+
+
+def test_a_family_for_which_a_model_was_changed_is_not_counted_as_unseen():
+    measured = {"excess": 0.02, "recall_difference": 0.0, "realism_within": 1.0}
+    kinds = {
+        name: {"half": half, "rungs": {"autoregressive network": measured}, "regret": 0.0}
+        for name, half in (("bursts", "unseen"), ("quantised", "revised"), ("white", "looked at"))
+    }
+    found = findings._limits(kinds)
+    assert (found["unseen"]["kept"], found["unseen"]["of"]) == (1, 1) and found["revised"] == {"quantised": 0.02}
+    assert found["within"]["autoregressive network"] == {"kept": 2, "of": 3}  # two points: too many where the design may look
 
 
 def test_the_published_findings_and_the_page_come_from_the_published_tables(near):

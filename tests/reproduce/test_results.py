@@ -195,6 +195,19 @@ def test_the_readme_gives_the_range_over_seeds_where_it_is_known(filled):
     assert "over seeds" not in filled(spread=older), "ranges of another ledger"
 
 
+def test_a_value_stands_beside_the_number_that_decides(filled, found):
+    found["claims"] = [RECORDS[0] | {"details": {"ridge_nrmse": 0.03, "nearest_nrmse": 0.05}}, *RECORDS[1:]]
+    assert "; ridge regression 0.030, nearest windows 0.050 |" in filled()
+    found["claims"] = [RECORDS[0], RECORDS[1] | {"details": {"cost_ratio": 11.94}}, *RECORDS[2:]]
+    assert ", in 11.9 times the time of the coarse simulator |" in filled()
+
+
+def test_a_range_says_how_many_seeds_have_a_value(filled):
+    spread = _spread(0.12345)
+    spread["claims"]["C1"]["values"] = [0.12345, 0.1, None]
+    assert "0.123 (0.1 to 0.123 in 2 seeds, none in 1)" in filled(spread=spread)
+
+
 def test_a_value_lies_in_its_range_and_a_verdict_is_counted_whatever_the_seed_had_before(filled, found):
     spread = _spread(0.12345)
     spread["claims"]["C9"] |= {"range": [1, 2], "values": [1.5, 1, 2], "verdicts": ["partly"] * 3}
