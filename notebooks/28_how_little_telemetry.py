@@ -365,8 +365,8 @@ else:
 
 # %% [markdown]
 # *What to see:* a rate far below 1 % is no success: it means that thresholds are too high, and anomalies are missed. On 5,000 windows
-# (notebook 25) the autoregressive network is the best learnt model. With few windows, a model with an assumption that is true beats a
-# network that has to find it.
+# (notebook 25) the autoregressive network is the best learnt model. With few windows, a model
+# whose assumptions hold, such as the autoregression on white and autoregressive noise, beats a network that has to find the same structure.
 
 # %% [markdown]
 # ## Learning from injected anomalies

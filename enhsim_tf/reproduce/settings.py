@@ -242,7 +242,7 @@ class CurveSettings:
         (20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
     )
     num_real_networks: tuple[int, ...] = setting(
-        (20, 300), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn", smoke=(20,)
+        (20,), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn"
     )
 
 

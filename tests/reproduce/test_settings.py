@@ -73,7 +73,6 @@ COUNTS = {
     "curve.gan_iterations",
     "curve.num_steps",
     "curve.num_real_classifiers",
-    "curve.num_real_networks",
     "ladder.num_iterations",
     "ladder.gan_iterations",
     "ladder.num_anomalous",
