@@ -368,6 +368,20 @@ else:
 # (notebook 25) the autoregressive network is the best learnt model. With few windows, a model
 # whose assumptions hold, such as the autoregression on white and autoregressive noise, beats a network that has to find the same structure.
 
+# %%
+simple, learnt = "simulator + autoregression", "simulator + autoregressive network"
+nearer = {}
+for environment in ("white", "autoregressive"):
+    arms = found["environments"][environment]["arms"]
+    for number in arms.get(learnt, {}).get("excess", {}):
+        distance = {arm: abs(arms[arm]["excess"][number]) for arm in (simple, learnt)}
+        nearer[f"{environment}, {int(number):,} windows"] = distance[simple] < distance[learnt]
+say(
+    f"The autoregression is nearer to {RATE:.0%} than the network in **{sum(nearer.values())} of {len(nearer)}** cases "
+    f"({'; '.join(nearer)})."
+)
+assert all(nearer.values())
+
 # %% [markdown]
 # ## Learning from injected anomalies
 #
