@@ -10,7 +10,7 @@ from typing import Any
 
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import WITHOUT_NETWORK
-from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, mean_of, per_cent, points
+from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, mean_of, modes_tried, modes_where_better, per_cent, points
 from enhsim_tf.reproduce.robustness.targets import MARGIN
 from enhsim_tf.reproduce.spacecraft.study import DEGRADED_ARM, GENERATED_ARM
 
@@ -157,13 +157,9 @@ def _network(found: Findings, factorial: Findings | None) -> Answer:
 
 def _where_ridge_is_better(found: Findings) -> str:
     """The degraded modes in which ridge regression has a smaller error than the network that learnt from the same windows."""
-    cells = {(row["method"], row["mode"], row["severity"]): row["nrmse"] for row in found["modes"]["by_mode"] if row["mode"] != "nominal"}
-    tried = [key[1:] for key in cells if key[0] == "randomised"]
-    better = [mode for mode, severity in tried if cells["ridge, randomised", mode, severity] < cells["randomised", mode, severity]]
-    counts = [
-        f"{mode.replace('_', ' ')} ({better.count(mode)} of {sum(mode == each for each, _ in tried)} severities)"
-        for mode in dict.fromkeys(better)
-    ]
+    tried = [mode for mode, _ in modes_tried(found)]
+    better = [mode for mode, _ in modes_where_better(found, "ridge, randomised")]
+    counts = [f"{mode.replace('_', ' ')} ({better.count(mode)} of {tried.count(mode)} severities)" for mode in dict.fromkeys(better)]
     return f" Ridge regression has the smaller error in these modes: {', '.join(counts)}." if counts else ""
 
 

@@ -210,21 +210,35 @@ def opposite_signs(found: Findings, least: float = 0.1) -> str:
     return "; ".join(said)
 
 
+def modes_tried(found: Findings, method: str = "randomised") -> dict[tuple[str, float], float]:
+    """The error of an enhancer in each degraded mode at each severity."""
+    return {
+        (row["mode"], row["severity"]): row["nrmse"]
+        for row in found["modes"]["by_mode"]
+        if row["method"] == method and row["mode"] != "nominal"
+    }
+
+
+def modes_where_better(found: Findings, method: str) -> list[tuple[str, float]]:
+    """The modes and severities at which a method has a smaller error than the network that is trained on randomised configurations."""
+    errors = modes_tried(found, method)
+    return [key for key, error in modes_tried(found).items() if errors[key] < error]
+
+
 def modes_found(found: Findings) -> str:
     """Compares the enhancers with simple baselines in the degraded modes."""
     errors = found["modes"]["nrmse"]
     at = {name: {where: f"{errors[name][where]:.2f}" for where in ("inside", "outside")} for name in errors}
-    cells = {(row["method"], row["mode"], row["severity"]): row["nrmse"] for row in found["modes"]["by_mode"] if row["mode"] != "nominal"}
-    network = {key[1:]: error for key, error in cells.items() if key[0] == "randomised"}
-    better = sum(cells["ridge, randomised", *key] < error for key, error in network.items())
-    coarse = sum(cells["identity", *key] < error for key, error in network.items())
+    tried, better, coarse = (
+        len(each) for each in (modes_tried(found), modes_where_better(found, "ridge, randomised"), modes_where_better(found, "identity"))
+    )
     worse = "above" if errors["paper"]["outside"] > errors["identity"]["outside"] else "below"
     return (
         f"For severities outside the training range, the error of the paper's enhancer is {at['paper']['outside']}, {worse} that of the coarse signal "
         f"({at['identity']['outside']}); that of the smoothed coarse signal is {at['moving average']['outside']}. Training on random configurations reduces the error. It needs "
         "the true response to them, which is known here: the targets are the true degraded signals with noise. Ridge regression trained in this way "
         f"has an error of {at['ridge, randomised']['inside']} inside and {at['ridge, randomised']['outside']} outside, and a network trained on the same windows has "
-        f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {len(network)} pairs of mode and severity the regression has a smaller error than that "
+        f"{at['randomised']['inside']} and {at['randomised']['outside']}. In {better} of {tried} pairs of mode and severity the regression has a smaller error than that "
         f"network, and in {coarse} the coarse signal has."
     )
 

@@ -116,7 +116,7 @@ def table(found: dict[str, Any]) -> str:
         "*NRMSE* is the median over nominal test windows, after phase, offset and gain are aligned to each window; *ridge* is aligned by the edges of the square wave, and "
         "*ridge, own clock* by its own waveform, as the enhanced signal is; *nearest windows* is the mean of the nearest training windows, aligned as "
         f"the latter. {_lowest(found)} A channel is *told apart* if detectors alarm on more than half of its nominal windows for the "
-        "median noisy arm: there, false alarms do not compare arms: either the channel has changed, or its *train* part is too short for a threshold of 1 %, "
+        "median noisy arm. There, false alarms do not compare arms: either the channel has changed, or its *train* part is too short for a threshold of 1 %, "
         "which this study cannot tell apart. "
         "The last table has the means of each detector over the channels. From `figures/labelled/findings.json`."
     )
