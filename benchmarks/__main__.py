@@ -77,16 +77,19 @@ def measure(options: argparse.Namespace) -> dict:
     budget, began = benchmark_rows.QUICK if options.quick else benchmark_rows.Budget(), time.time()
     if options.repetitions:
         budget = dataclasses.replace(budget, repetitions=options.repetitions)
-    kept = json.loads(options.out.read_text())["rows"] if options.only and options.out.exists() else []
+    this = machine() | {"as_without_avx512": options.avx2}
+    kept = json.loads(options.out.read_text()) if options.only and options.out.exists() else {"machine": this, "rows": []}
+    about = kept["machine"]
+    # a row of another processor than the rest says so
+    elsewhere = {} if this["processor"] == about["processor"] else {"machine": this}
     found = []
     for name in ROWS:
         if options.only and name not in options.only:
-            found += [row for row in kept if row.get("of") == name]
+            found += [row for row in kept["rows"] if row.get("of") == name]
             continue
         for row in benchmark_rows.ROWS[name](budget):
-            found.append({"of": name, **row})
+            found.append({"of": name, **row, **elsewhere})
             print(line_of(row), flush=True)
-    about = machine() | {"as_without_avx512": options.avx2}
     for row in benchmark_rows.reproduction(found, benchmark_rows.bar_of_reproduction(about)):
         found.append({"of": "reproduction", **row})
         print(line_of(row), flush=True)

@@ -34,19 +34,23 @@ def _table(results: dict) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     for row in results["rows"]:
+        work = f"{row['work']} *" if "machine" in row else row["work"]
         words = {True: "reached", False: "**not reached**", None: ""}[row.get("reached")]
         if "skipped" in row:
-            lines.append(f"| {row['work']} | | {row['comparison']} | skipped: {row['skipped']} | | | |")
+            lines.append(f"| {work} | | {row['comparison']} | skipped: {row['skipped']} | | | |")
         elif "bar_faults" in row:
-            lines.append(f"| {row['work']} | {row['seconds']:.0f} s | | | at most {row['bar_faults']:,} | {words} | {row['faults']:,} |")
+            lines.append(f"| {work} | {row['seconds']:.0f} s | | | at most {row['bar_faults']:,} | {words} | {row['faults']:,} |")
         elif "ratio" in row and "bar_s" not in row:
             ratio, bar = row["ratio"], f"at most {row['bar']:.2f}" if row["bar"] else ""
             faults = " / ".join(_few(row[key]) for key in ("faults", "their_faults") if key in row)
             figures = f"{row['ours']['median']:.3g} {row['unit']} | {row['comparison']} | {ratio['median']:.2f} ({ratio['low']:.2f} to {ratio['high']:.2f})"
-            lines.append(f"| {row['work']} | {figures} | {bar} | {words} | {faults} |")
+            lines.append(f"| {work} | {figures} | {bar} | {words} | {faults} |")
         elif "bar_s" in row:
-            lines.append(f"| {row['work']} | {row['ours']['median']:.2g} s | | | below {row['bar_s']} s | {words} | |")
-    return "\n".join(lines) + f"\n\n{machine_in_words(results['machine'])} From `benchmarks/{file_of(results['machine'])}`."
+            lines.append(f"| {work} | {row['ours']['median']:.2g} s | | | below {row['bar_s']} s | {words} | |")
+    others = {machine_in_words(row["machine"]) for row in results["rows"] if "machine" in row}
+    marked = "".join(f" Rows with * were measured on another processor: {words}" for words in sorted(others))
+    about = results["machine"]
+    return "\n".join(lines) + f"\n\n{machine_in_words(about)}{marked} From `benchmarks/{file_of(about)}`."
 
 
 def _few(number: float) -> str:

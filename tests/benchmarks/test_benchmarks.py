@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from benchmarks import figures, rows
 from benchmarks.__main__ import ROWS, main, parse
 from benchmarks.figures import draw
+from benchmarks.machine import machine
 from benchmarks.report import fill_page, line_of, markdown, with_words
 from benchmarks.worker import Worker
 from enhsim_tf.common.errors import InputError
@@ -156,7 +157,8 @@ def test_a_quick_run_measures_and_keeps_other_rows(tmp_path, monkeypatch):
     monkeypatch.chdir(Path(__file__).parents[2])
     out = tmp_path / "results.json"
     kept = {"of": "gan", "work": "GAN iteration", "comparison": "x", "skipped": "y", "unit": "ms"}
-    out.write_text(json.dumps({"rows": [kept]}))
+    elsewhere = {"processor": "another processor", "cores": 64, "tensorflow": "2.21.0"}
+    out.write_text(json.dumps({"machine": elsewhere, "rows": [kept]}))
     assert main(["--quick", "--only", "loading", "--out", str(out), "--figures", str(tmp_path)]) == 0
     found = json.loads(out.read_text())
     assert found["quick"] is True and kept in found["rows"]
@@ -164,6 +166,9 @@ def test_a_quick_run_measures_and_keeps_other_rows(tmp_path, monkeypatch):
     assert loading["ratio"]["low"] <= loading["ratio"]["median"] <= loading["ratio"]["high"]
     assert np.isfinite(loading["ours"]["median"]) and loading["peak_mb"] > 100
     assert {row["of"] for row in found["rows"]} <= set(ROWS)
+    assert found["machine"] == elsewhere and loading["machine"]["processor"] == machine()["processor"]
+    text = markdown([found])
+    assert "| loading a simulator * |" in text and "| GAN iteration |" in text and text.count("another processor: ") == 1
 
 
 def test_the_page_gets_the_table_between_its_markers(tmp_path):

@@ -16,6 +16,7 @@ from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator import noise_choice
 from enhsim_tf.noise import ladder
+from enhsim_tf.reproduce.noise_ladder.findings import REAL
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLES = ("detectors", "realism", "choice")
-REAL = "real"
-"""The arm of real windows, with which every rung is compared."""
 JUDGED = 1_000  # held-out windows on which a rung is chosen
 
 

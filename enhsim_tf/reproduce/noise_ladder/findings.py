@@ -20,6 +20,7 @@ KEPT = KeptTables(
     command="python -m enhsim_tf.reproduce --experiment noise",
 )
 REAL = "real"
+"""The arm of real windows, with which every rung is compared."""
 # Limits that were fixed before the run. All are in shares; excess is that over detectors trained on as many real windows.
 MAX_EXCESS = {"looked at": 0.01, "unseen": 0.03}
 REVISED = ("quantised",)  # unseen families for which a model was changed after its first result: the second one is reported apart

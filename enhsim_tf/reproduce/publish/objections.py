@@ -105,16 +105,14 @@ def _unseen(noise: Findings | None) -> str:
         "Right. The design was chosen on other seeds of the same four processes, so the statements of this report are limited to these processes. "
         "The [experiment on noise](noise.md) tries all noise models on families of noise for which no design was chosen"
     )
-    families = {} if noise is None else {name: about["rungs"] for name, about in noise["families"].items() if about["half"] == "unseen"}
-    excess = (
-        {
-            rung: {name: about[rung]["excess"] for name, about in families.items() if rung in about}
-            for rung in (CONVOLUTIONAL_GAN, "residual windows", noise["limits"]["rung"])
-        }
-        if noise
-        else {}
-    )
-    if not excess or any(len(each) < len(families) for each in excess.values()):
+    if noise is None:
+        return f"{said}; it has not been run."
+    families = {name: about["rungs"] for name, about in noise["families"].items() if about["half"] == "unseen"}
+    excess = {
+        rung: {name: about[rung]["excess"] for name, about in families.items() if rung in about}
+        for rung in (CONVOLUTIONAL_GAN, "residual windows", noise["limits"]["rung"])
+    }
+    if any(len(each) < len(families) for each in excess.values()):
         return f"{said}, without the convolutional GAN so far."
     parts = []
     for rung, each in excess.items():
