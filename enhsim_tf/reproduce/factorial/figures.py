@@ -1,6 +1,6 @@
 """The figure of the factorial experiment, drawn from its findings alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import matplotlib.figure
@@ -26,6 +26,7 @@ _ROWS = {
     "generator": "generator: paper's\nGAN to {}",
 }
 _PANELS = {"gap_closed": "points of the gap in false alarms", "recall_at_real_rate": "points of recall at the real rate"}
+_LINE, _SPACE = 0.3, 0.5  # height of a line in inches, and space between two factors in lines
 _SINGLE_ORDERS = {"first": "<", "last": ">"}  # markers of the change if a factor is switched first and last
 
 
@@ -40,30 +41,37 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     said = in_list([f"the {factor} {verbs[factor]}{_signed(100 * parts[factor])}\N{NO-BREAK SPACE}%" for factor in ranked])
     figure, down = new_sheet(
         DOUBLE,
-        3.6,
+        2.5 + _LINE * len(LEVELS) * (len(shares) + _SPACE),
         f"The paper's pipeline closes {100 * closed['paper']['mean']:.0f} % of the gap in false alarms, and ridge regression with {name} of its residuals "
         f"{100 * closed['switched']['mean']:.0f} %. Of this difference, {said}",
         "Change that switching a factor makes, as the mean over all orders of switching the four factors (Shapley value). Bars: 95 % intervals over "
         f"environments and seeds; letters: {in_list(found['environments'])} noise alone; triangles: change if the factor is switched first (pointing left) "
-        f"or last (pointing right). On 15,000 windows the network trains for fewer epochs. {_runs(shares)}",
+        f"or last (pointing right); numbers at the right: means. On 15,000 windows the network trains for fewer epochs. {_runs(shares)}",
     )
     grid = panels(figure, down + 0.42, 1, 2, gap=(0.2, 0.25), sharey=True)[0]
-    left, offsets = 1.35 / DOUBLE, np.linspace(0.22, -0.22, len(shares)) if len(shares) > 1 else [0.0]
+    left, heights = 1.35 / DOUBLE, _heights(shares)
     width = (1 - left - 0.02) / 2
     for number, (axes, (outcome, label)) in enumerate(zip(grid, _PANELS.items(), strict=True)):
         place = axes.get_position()
         axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
-        for (generator, (colour, marker, face)), offset in zip(((each, _SHOWN[each]) for each in shares), offsets, strict=True):
-            for height, factor in enumerate(LEVELS):
-                about, at = shares[generator][outcome]["factors"][factor], offset - height
+        for generator in shares:
+            colour, marker, face = _SHOWN[generator]
+            for factor in LEVELS:
+                about, at = shares[generator][outcome]["factors"][factor], heights[generator, factor]
                 mean, low, high = (100 * about["share"][key] for key in ("mean", "low", "high"))
                 for when, single in _SINGLE_ORDERS.items():
                     hollow = {"markersize": 4, "markeredgewidth": 0.8, "markerfacecolor": "none", "linestyle": "none"}
                     axes.plot(100 * about[when]["mean"], at, single, color=colour, **hollow)
                 axes.plot([low, high], [at] * 2, color=colour, linewidth=2, alpha=0.6)
-                style = {"markerfacecolor": face, "markersize": 5, "linestyle": "none", "label": generator if not height else None}
+                style = {
+                    "markerfacecolor": face,
+                    "markersize": 5,
+                    "linestyle": "none",
+                    "label": generator if factor == next(iter(LEVELS)) else None,
+                }
                 axes.plot(mean, at, marker, color=colour, **style)
-                axes.annotate(_signed(mean), (mean, at), (0, 5), textcoords="offset points", ha="center", fontsize=7)
+                numbered = {"transform": axes.get_yaxis_transform(), "ha": "right", "va": "center", "fontsize": 7, "color": colour}
+                axes.text(1.0, at, _signed(mean), **numbered)
         values = [
             100 * value
             for about in shares.values()
@@ -73,10 +81,13 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.update_datalim([(value, 0) for value in values])  # letters do not widen the axes by themselves
         axes.margins(x=0.06)
         axes.autoscale_view(scaley=False)
-        _letters(axes, shares, outcome, offsets)
+        lowest, highest = axes.get_xlim()
+        axes.set_xlim(lowest, highest + 0.08 * (highest - lowest))  # room for the numbers
+        _letters(axes, shares, outcome, heights)
         axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
-        axes.set_yticks(-np.arange(len(LEVELS)), [_ROWS[factor].format(name if len(shares) == 1 else "another one") for factor in LEVELS])
-        axes.set_ylim(-len(LEVELS) + 0.5, 0.5)
+        middles = [np.mean([heights[generator, factor] for generator in shares]) for factor in LEVELS]
+        axes.set_yticks(middles, [_ROWS[factor].format(name if len(shares) == 1 else "another one") for factor in LEVELS])
+        axes.set_ylim(min(heights.values()) - 0.9, 0.6)
         axes.set_xlabel(label)
     handles, labels = grid[0].get_legend_handles_labels()
     _, height = figure.get_size_inches()
@@ -87,17 +98,26 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     return figure
 
 
-def _letters(axes: Axes, shares: Mapping[str, Any], outcome: str, offsets: Sequence[float]) -> None:
+def _heights(shares: Mapping[str, Any]) -> dict[tuple[str, str], float]:
+    """Where each generator and factor stands, in lines from the top: a line for each generator, and space between the factors."""
+    return {
+        (generator, factor): -(group * (len(shares) + _SPACE) + line)
+        for group, factor in enumerate(LEVELS)
+        for line, generator in enumerate(shares)
+    }
+
+
+def _letters(axes: Axes, shares: Mapping[str, Any], outcome: str, heights: Mapping[tuple[str, str], float]) -> None:
     """Marks the contribution in each environment by its first letter; letters that would overlap stand below each other."""
     left, right = axes.get_xlim()
-    for about, offset in zip(shares.values(), offsets, strict=True):
-        for height, factor in enumerate(LEVELS):
-            before, lower = -np.inf, 0
-            for environment, share in sorted(about[outcome]["factors"][factor]["by_environment"].items(), key=lambda each: each[1]):
-                lower = (lower + 1) % 2 if 100 * share - before < 0.03 * (right - left) else 0
-                before = 100 * share
-                centred = {"ha": "center", "va": "center", "fontsize": 6.5, "color": QUIET}
-                axes.text(before, offset - height - 0.22 - 0.16 * lower, environment[0], **centred)
+    for (generator, factor), height in heights.items():
+        before, lower = -np.inf, 0
+        by_environment = shares[generator][outcome]["factors"][factor]["by_environment"]
+        for environment, share in sorted(by_environment.items(), key=lambda each: each[1]):
+            lower = (lower + 1) % 2 if 100 * share - before < 0.03 * (right - left) else 0
+            before = 100 * share
+            centred = {"ha": "center", "va": "center", "fontsize": 6.5, "color": QUIET}
+            axes.text(before, height - 0.36 - 0.25 * lower, environment[0], **centred)
 
 
 def _signed(value: float) -> str:

@@ -10,7 +10,8 @@ windows, and all arms cut the same overlapping windows from it, evenly spaced ov
 - `simulator, threshold on real`: the detectors of `simulator + residual windows`, with the threshold set on windows of the record.
 - `real and simulator`: trained on both, with the threshold of `real`.
 - `CORAL`: windows of the simulator with Gaussian noise, whose mean and covariance are aligned with those of the record
-  (Sun, Feng and Saenko 2016).
+  (Sun, Feng and Saenko 2016). The covariance of the simulator comes from ten times as many further windows. In the first run it came from
+  the windows that train the detectors, which the map whitens better than others; thresholds were too high.
 - `classifier`, `domain-adversarial`: see `domain_adversarial`; they also learn from anomalies injected into windows of the simulator. The
   record sets the threshold.
 - `classifier without simulator`: the same network, which learns from windows of the record and from anomalies injected into them. Scores
