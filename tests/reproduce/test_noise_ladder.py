@@ -67,7 +67,8 @@ def test_the_summary_counts_what_a_table_says():
         }
 
     detectors = [rows("white", "real", 10), rows("white", "Gaussian", 12), rows("white", "autoregressive network", 30)]
-    detectors += [rows("bursts", "real", 10), rows("bursts", "Gaussian", 500), rows("bursts", "autoregressive network", 30)]
+    detectors += [rows("bursts", "real", 10), rows("bursts", "autoregressive network", 30), rows("bursts", "Gaussian", 500)]
+    detectors[-2]["recall"] = 0.46  # at own thresholds; at the real rate it is that of the others
     ratios = {"real": 1.0, "Gaussian": 4.0, "autoregressive network": 4.0}
     realism = [
         {"family": row["family"], "seed": 1, "rung": row["rung"], "measure": "m", "value": 0.0, "ratio": ratios[row["rung"]]}
@@ -95,6 +96,12 @@ def test_the_summary_counts_what_a_table_says():
     assert found["limits"]["looked at"]["kept"] == 0 and found["limits"]["unseen"]["kept"] == 1  # two points: above one, below three
     assert found["limits"]["realism"]["families_with_all"] == 0 and found["limits"]["recall"]["kept"] == 2
     assert found["limits"]["within"]["autoregressive network"] == {"kept": 1, "of": 2}  # as above
+    assert found["limits"]["within_strict"]["autoregressive network"] == {"kept": 0, "of": 2}
+    assert found["limits"]["recall"]["missed"] == {} and found["limits"]["recall"]["lost"] == {"bursts": pytest.approx(0.04)}
+    # the network passes nowhere: two points more false alarms than real windows; Gaussian noise is judged first, wherever its row is
+    assert (white["passing"], bursts["passing"]) == ([["Gaussian"]], [[]]) and bursts["chosen"] == ["autoregressive network"]
+    assert found["limits"]["choice"]["none_passes"] == ["bursts"] and found["limits"]["choice"]["learnt_passes"] == 0
+    assert found["limits"]["choice"]["missed"] == {}
     assert found["limits"]["within"]["Gaussian"] == {"kept": 1, "of": 2} and found["limits"]["within"]["residual windows"]["of"] == 0
     assert figures._message(found["limits"]["within"], "autoregressive network") == (
         "Limits on false alarms are kept on 1 of 2 families with the autoregressive network"
@@ -103,9 +110,24 @@ def test_the_summary_counts_what_a_table_says():
     assert found["limits"]["realism"]["by_model"]["convolutional GAN"] == {"families_with_all": 0, "of": 0, "mean_share": None}
 
 
+def test_the_order_of_the_rows_does_not_decide_which_rung_is_simplest():
+    rows = [
+        {"rung": rung, "auc": 0.5, "real_auc": 0.5, "alarms": 0.01, "real_alarms": 0.01}
+        for rung in ("convolutional GAN", "autoregression", "Gaussian")
+    ]
+    assert findings._chosen(pd.DataFrame(rows)) == "Gaussian"
+    assert findings._passing(pd.DataFrame(rows)) == ["Gaussian", "autoregression", "convolutional GAN"]
+
+
 def test_the_page_says_what_the_findings_say(tmp_path):
-    measured = {"alarms": 0.031, "excess": 0.021, "recall_difference": 0.01, "realism_within": 0.5, "beyond": {"rank": 4.2, "energy": 7.1}}
-    about = {"half": "unseen", "rungs": {"real": measured | {"alarms": 0.01}, "autoregressive network": measured}, "chosen": ["gaussian"]}
+    measured = {"alarms": 0.031, "excess": 0.021, "recall": 0.4, "recall_difference": 0.01, "realism_within": 0.5}
+    measured["beyond"] = {"rank": 4.2, "energy": 7.1}
+    about = {
+        "half": "unseen",
+        "rungs": {"real": measured | {"alarms": 0.01}, "autoregressive network": measured},
+        "chosen": ["gaussian"],
+        "passing": [[]],
+    }
     kinds = {"bursts": about | {"regret": 0.0, "best": "autoregressive network", "seeds": [7]}}
     found = {"families": kinds, "limits": findings._limits(kinds), "seeds": [7], "budget": "full"}
     page = tmp_path / "noise.md"
@@ -116,7 +138,12 @@ def test_the_page_says_what_the_findings_say(tmp_path):
     assert "| bursts | unseen | 1.0% | 3.1% | gaussian |" in text and "seed 7" in text
     assert "at most 3 points: 1 of 1 families; the largest excess is 2.1 points (bursts)" in text
     assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
-    assert "fresh real noise itself keeps it on 0 of 1 families" in text and "| autoregressive network | 0 of 1 | 50% |" in text
+    assert "two thirds are beyond reach: fresh real noise itself keeps the limit on 0 of 1 families" in text
+    assert (
+        "On bursts noise, no model passes the rule, and the smallest departure decides. The autoregressive network passes on 0 families."
+        in text
+    )
+    assert "| autoregressive network | 0 of 1 | 50% |" in text
     assert text.count("\nold\n") == 1  # the part of the other experiment
     kinds = {"quantised": kinds["bursts"] | {"half": "revised"}}
     fill_page(page, noise=found | {"families": kinds, "limits": findings._limits(kinds)})
@@ -126,9 +153,9 @@ def test_the_page_says_what_the_findings_say(tmp_path):
 
 
 def test_a_family_for_which_a_model_was_changed_is_not_counted_as_unseen():
-    measured = {"excess": 0.02, "recall_difference": 0.0, "realism_within": 1.0}
+    measured = {"excess": 0.02, "recall": 0.5, "recall_difference": 0.0, "realism_within": 1.0}
     kinds = {
-        name: {"half": half, "rungs": {"autoregressive network": measured}, "regret": 0.0}
+        name: {"half": half, "rungs": {"real": measured, "autoregressive network": measured}, "regret": 0.0, "passing": [["none"]]}
         for name, half in (("bursts", "unseen"), ("quantised", "revised"), ("white", "looked at"))
     }
     found = findings._limits(kinds)

@@ -21,8 +21,8 @@ _CURVES = {
     THRESHOLD_ON_REAL: ("residual windows, threshold on real", "d", ":", ENHANCED),
     SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
     CORAL: ("CORAL", "s", ":", COARSE),
-    ADVERSARIAL: ("classifier + simulator", "x", ":", QUIET),
-    CLASSIFIER_ON_REAL: ("classifier, no simulator", "+", "-", QUIET),
+    ADVERSARIAL: ("domain-adversarial classifier", "x", ":", QUIET),
+    CLASSIFIER_ON_REAL: ("classifier without simulator", "+", "-", QUIET),
 }
 """Label, marker, line style and colour of each arm that is drawn."""
 
@@ -45,7 +45,7 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
             lower.plot(at, [100 * curve["recall_at_real_rate"][str(number)] for number in at], **style)
         _finish(upper, lower, numbers, name)
     grid[0, 0].set_ylabel("false alarms (%)")
-    grid[1, 0].set_ylabel("recall at 1 % alarms (%)")
+    grid[1, 0].set_ylabel("recall at 1 % false alarms (%)")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     height = figure.get_size_inches()[1]
     figure.legend(handles, labels, frameon=False, ncols=3, loc="upper left", bbox_to_anchor=(0.07, 1 - (down - 0.02) / height))
@@ -63,7 +63,7 @@ def _finish(upper: Axes, lower: Axes, numbers: list[int], name: str) -> None:
     lower.set_ylim(0, 100)
     lower.set_xscale("log")
     lower.set_xlim(numbers[0] / 1.25, numbers[-1] * 1.25)
-    shown = [number for number in numbers if number in (10, 100, 1_000)] or numbers
+    shown = [number for number in numbers if number in (10, 100, 1_000, 10_000)] or numbers
     lower.set_xticks(shown, [f"{number:,}" for number in shown], fontsize=7)
     lower.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
 
@@ -77,8 +77,10 @@ def _message(found: Mapping[str, Any]) -> str:
     said = [f"{_places(places, numbers)} on {in_list(names)} noise" for places, names in by_places.items() if places]
     nowhere = by_places.get((), [])
     if not said:
-        return "A fitted simulator pays nowhere on this curve"
-    return f"A fitted simulator pays {', '.join(said)}" + (f", and nowhere on {in_list(nowhere)} noise" if nowhere else "")
+        return "A fitted simulator with a simple noise model pays nowhere on this curve"
+    return f"A fitted simulator with a simple noise model pays {', '.join(said)}" + (
+        f", and nowhere on {in_list(nowhere)} noise" if nowhere else ""
+    )
 
 
 def _places(places: Sequence[int], numbers: Sequence[int]) -> str:
@@ -101,7 +103,7 @@ def _classifiers(found: Mapping[str, Any]) -> str:
     arms = next(iter(found["environments"].values()))["arms"]
     said = ""
     if CLASSIFIER_ON_REAL in arms and ADVERSARIAL in arms:
-        said = " The classifiers learn injected anomalies; the one with the simulator is domain-adversarial."
+        said = " The classifiers learn injected anomalies, the domain-adversarial one from windows of the simulator."
     fewer: dict[int, list[str]] = {}
     for arm, (label, *_) in _CURVES.items():
         number = max(arms[arm]["seeds"].values(), default=0) if arm in arms else 0

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.reproduce.learning_curve.arms import (
+    ADVERSARIAL,
     BOTH,
     CLASSIFIER,
     CLASSIFIER_ON_REAL,
@@ -49,7 +50,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         For each environment and arm its curves over the number of real windows; for each environment the numbers of real windows at
         which each simulator arm pays, those at which other methods do by the same rule, and the smallest number from which the real
         windows suffice. With classifiers, also by how much a classifier of injected anomalies finds more if it learns from the
-        simulator instead of the real windows.
+        simulator instead of the real windows. Arms with fewer seeds than the others also stand beside the others on the same seeds.
     """
     rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
     numbers = sorted({int(number) for number in rows["num_real"]})
@@ -79,7 +80,10 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
             },
         }
         if {CLASSIFIER, CLASSIFIER_ON_REAL} <= set(arms):
-            environments[environment]["classifiers"] = _gain(own, numbers)
+            gains = {arm: _gain(own, arm, numbers) for arm in (CLASSIFIER, ADVERSARIAL) if arm in arms}
+            environments[environment]["classifiers"] = gains
+        if few := [arm for arm in arms if _most_seeds(arms[arm]) < _most_seeds(real)]:
+            environments[environment]["few_seeds"] = _few_seeds(own, few, [REAL, *simulators], numbers)
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
 
@@ -93,9 +97,11 @@ def _other(rows: "pd.DataFrame", arm: str, numbers: list[int]) -> dict[str, Any]
     real = rows[(rows["arm"] == REAL) & rows["seed"].isin(its["seed"].unique())]
     curve, compared = _curves(its, numbers), _curves(real, numbers)
     pays = [number for number in numbers if _pays(curve, compared, number)]
+    tried = [number for number in numbers if str(number) in curve["excess"]]
     return {
         "pays": pays,
-        "tried": [number for number in numbers if str(number) in curve["excess"]],
+        "tried": tried,
+        "cannot": [number for number in tried if compared["excess"][str(number)] <= SUFFICES],
         "seeds": _most_seeds(curve),
         "recall": {str(number): [curve["recall"][str(number)], compared["recall"][str(number)]] for number in pays},
     }
@@ -118,10 +124,25 @@ def _curves(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, Any]:
     return found
 
 
-def _gain(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, dict[str, Any]]:
-    """Recall at the matched rate of the classifier with the simulator minus that without: mean and range over the same seeds."""
+def _few_seeds(rows: "pd.DataFrame", few: list[str], others: list[str], numbers: list[int]) -> dict[str, Any]:
+    """Arms with fewer seeds beside others on the same seeds and numbers, and which detector finds most after training on the real windows."""
+    its = rows[rows["arm"].isin(few)]
+    same = rows[rows["seed"].isin(its["seed"].unique()) & rows["num_real"].isin(its["num_real"].unique())]
+    recall = same[same["arm"] == REAL].groupby(["num_real", "detector"])["recall_at_real_rate"].mean()
+    best = {int(number): recall.loc[number].idxmax() for number in sorted(its["num_real"].unique())}
+    return {
+        "seeds": sorted(int(seed) for seed in its["seed"].unique()),
+        "arms": {arm: _curves(same[same["arm"] == arm], numbers) for arm in (*others, *few)},
+        "best_detector": {
+            str(number): {"name": name, "recall_at_real_rate": float(recall.loc[number, name])} for number, name in best.items()
+        },
+    }
+
+
+def _gain(rows: "pd.DataFrame", arm: str, numbers: list[int]) -> dict[str, dict[str, Any]]:
+    """Recall at the matched rate of a classifier with the simulator minus that without: mean and range over the same seeds."""
     recall = rows.pivot_table("recall_at_real_rate", ["num_real", "seed"], "arm")
-    gain = (recall[CLASSIFIER] - recall[CLASSIFIER_ON_REAL]).dropna()
+    gain = (recall[arm] - recall[CLASSIFIER_ON_REAL]).dropna()
     found = {}
     for number in numbers:
         if number in gain.index.get_level_values("num_real"):

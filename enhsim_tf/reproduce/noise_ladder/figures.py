@@ -30,13 +30,15 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     families = sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at")
     kept, rung = found["limits"], found["limits"]["rung"]
     seeds = max(len(about["seeds"]) for _, about in families)
+    strict = [f"{name} {about['kept']}" for name, about in kept["within_strict"].items() if about["of"] and name in _MARKS]
     figure, down = new_sheet(
         DOUBLE,
-        1.9 + 0.22 * len(families),
+        2.05 + 0.22 * len(families),
         _message(kept["within"], rung),
         f"Mean over {in_words(len(DETECTORS))} detectors whose thresholds are set for 1 % (vertical line); {in_words(seeds)} seed"
         f"{'s' * (seeds > 1)}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
         f"windows on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the others. "
+        f"Families within {100 * kept['looked at']['limit']:.0f} point: {', '.join(strict)}. "
         "Without added noise, detectors flag nearly all windows (not shown).",
     )
     axes = panels(figure, down + 0.45, 1, 1)[0, 0]

@@ -1,5 +1,6 @@
 """What the experiment on noise found: false alarms, recall and realism of each rung on each family, and the rungs that are chosen."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
 
     Returns:
         For each family, its half, its seeds, each rung's false-alarm rate, excess, recall, share of realism measures within
-        `MAX_REALISM_RATIO` times their floor and those beyond it (mean over seeds), the chosen rung and the best one; and whether each limit is kept.
+        `MAX_REALISM_RATIO` times their floor and those beyond it (mean over seeds), the chosen rung, those that pass the rule, and the best one; and whether each limit is kept.
     """
     detectors, realism, choice = (tables[name] for name in ("detectors", "realism", "choice"))
     families = {}
@@ -71,11 +72,13 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         learnt = {name: values for name, values in rungs.items() if name != REAL}
         best = min(learnt, key=lambda name: learnt[name]["excess"])
         chosen = [_chosen(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
+        passing = [_passing(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
         families[family] = {
             "half": "looked at" if family in LOOKED_AT else "revised" if family in REVISED else "unseen",
             "seeds": sorted(int(seed) for seed in set(own["seed"])),
             "rungs": rungs,
             "chosen": chosen,
+            "passing": passing,
             "best": best,
             "regret": float(np.mean([learnt[name]["excess"] for name in chosen]) - learnt[best]["excess"]),
         }
@@ -83,10 +86,21 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
     return {"families": families, "limits": _limits(families), "seeds": seeds}
 
 
+def _judgements(rows: "pd.DataFrame") -> list[RungJudgement]:
+    """The judgements of one family and seed, the simplest rung first, in whatever order they were computed."""
+    names = [field for field in RungJudgement.__dataclass_fields__ if field != "rung"]
+    judged = [RungJudgement(row["rung"], *(float(row[name]) for name in names)) for row in rows.to_dict("records")]
+    return sorted(judged, key=lambda each: list(RUNGS).index(each.rung))
+
+
 def _chosen(rows: "pd.DataFrame") -> str:
     """The rung that the rule chooses from the judgements of one family and seed."""
-    names = [field for field in RungJudgement.__dataclass_fields__ if field != "rung"]
-    return choose([RungJudgement(row["rung"], *(float(row[name]) for name in names)) for row in rows.to_dict("records")])
+    return choose(_judgements(rows))
+
+
+def _passing(rows: "pd.DataFrame") -> list[str]:
+    """The rungs that pass the rule. If there is none, the smallest departure decides."""
+    return [each.rung for each in _judgements(rows) if each.passes]
 
 
 def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> dict[str, Any]:
@@ -105,11 +119,22 @@ def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> d
     found["revised"] = {
         name: about["rungs"][rung]["excess"] for name, about in families.items() if about["half"] == "revised" and rung in about["rungs"]
     }
-    found["within"] = {name: _within(name, families) for name in RUNGS}
+    found["within"] = {name: _within(name, families, MAX_EXCESS) for name in RUNGS}
+    strict = dict.fromkeys(MAX_EXCESS, MAX_EXCESS["looked at"])  # who looked at what concerns the learnt rung alone
+    found["within_strict"] = {name: _within(name, families, strict) for name in RUNGS}
     learnt = {name: about["rungs"][rung] for name, about in families.items() if rung in about["rungs"]}
     found["recall"] = {
         "limit": MAX_RECALL_DIFFERENCE,
         "kept": sum(abs(about["recall_difference"]) <= MAX_RECALL_DIFFERENCE for about in learnt.values()),
+        "missed": {
+            name: about["recall_difference"] for name, about in learnt.items() if abs(about["recall_difference"]) > MAX_RECALL_DIFFERENCE
+        },
+        # few false alarms are no success where thresholds are so high that anomalies are missed
+        "lost": {
+            name: loss
+            for name, about in learnt.items()
+            if (loss := families[name]["rungs"][REAL]["recall"] - about["recall"]) > MAX_RECALL_DIFFERENCE
+        },
         "of": len(learnt),
     }
     found["realism"] = {
@@ -119,14 +144,21 @@ def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> d
         "of": len(learnt),
         "by_model": {name: _realism_of(name, families) for name in (REAL, *RUNGS)},
     }
-    found["choice"] = {"limit": MAX_REGRET, "kept": sum(about["regret"] <= MAX_REGRET for about in families.values()), "of": len(families)}
+    found["choice"] = {
+        "limit": MAX_REGRET,
+        "kept": sum(about["regret"] <= MAX_REGRET for about in families.values()),
+        "of": len(families),
+        "missed": {name: about["regret"] for name, about in families.items() if about["regret"] > MAX_REGRET},
+        "none_passes": [name for name, about in families.items() if not all(about["passing"])],
+        "learnt_passes": sum(all(rung in names for names in about["passing"]) for about in families.values()),
+    }
     return found
 
 
-def _within(rung: str, families: dict[str, Any]) -> dict[str, int]:
+def _within(rung: str, families: dict[str, Any], limits: Mapping[str, float]) -> dict[str, int]:
     """On how many families the excess of a rung keeps the limit of their half; revised families are held to that of the unseen ones."""
     kept = [
-        about["rungs"][rung]["excess"] <= MAX_EXCESS.get(about["half"], MAX_EXCESS["unseen"])
+        about["rungs"][rung]["excess"] <= limits.get(about["half"], limits["unseen"])
         for about in families.values()
         if rung in about["rungs"]
     ]

@@ -1,15 +1,17 @@
 """Fills the generated parts of `docs/noise.md` from the findings of the experiments on noise and on the number of real windows."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.reproduce.noise_ladder.findings import REAL
 from enhsim_tf.reproduce.publish.results import fill_parts
+from enhsim_tf.reproduce.publish.wording import in_list
 
 Findings = Mapping[str, Any]
 PAGE = Path("docs/noise.md")
+_ENOUGH = 2 / 3  # of the families must keep the limit on realism
 _NAMED = 3  # measures that are named for a family
 
 
@@ -73,15 +75,40 @@ def limits(found: Findings) -> str:
         )
     others = [f"{name} {about['kept']} of {about['of']}" for name, about in kept["within"].items() if about["of"] and name != kept["rung"]]
     lines.append(f"- Families on which each of the other models keeps these limits: {', '.join(others)}.")
+    strict = [f"{name} {about['kept']}" for name, about in kept["within_strict"].items() if about["of"]]
+    lines.append(
+        f"- Families on which each model stays within {100 * kept['looked at']['limit']:g} point of the real windows: {', '.join(strict)}."
+    )
     recall, realism, choice = kept["recall"], kept["realism"], kept["choice"]
     lines += [
         f"- Recall at the real rate within {100 * recall['limit']:g} points of that after training on real windows: {recall['kept']} of "
-        f"{recall['of']} families.",
+        f"{recall['of']} families{_differences(recall['missed'])}.",
+        f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows{_losses(recall['lost'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
         f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
-        f"- Excess of the chosen model within {100 * choice['limit']:g} points of that of the best model: {choice['kept']} of {choice['of']} families.",
+        f"- Excess of the chosen model within {100 * choice['limit']:g} points of that of the best model: {choice['kept']} of {choice['of']} "
+        f"families{_differences(choice['missed'])}. On {_families(choice['none_passes'])}, no model passes the rule, and the smallest departure decides. The "
+        f"{kept['rung']} passes on {choice['learnt_passes']} families.",
     ]
     return "\n".join([*lines, "", *_realism(realism["by_model"])])
+
+
+def _families(names: Sequence[str]) -> str:
+    return in_list([name.replace("_", " ") for name in names]) + " noise" if names else "no family"
+
+
+def _differences(missed: Findings) -> str:
+    """The families that miss a limit, with their differences in points."""
+    if not missed:
+        return ""
+    return " (not on " + in_list([f"{name.replace('_', ' ')}, {100 * value:+.1f} points" for name, value in missed.items()]) + ")"
+
+
+def _losses(lost: Findings) -> str:
+    """The families on which thresholds are so high that anomalies are missed, with the loss in points."""
+    if not lost:
+        return ": none"
+    return ": " + in_list([f"{name.replace('_', ' ')} ({100 * value:.1f} points)" for name, value in lost.items()])
 
 
 def _realism(models: Findings) -> list[str]:
@@ -92,9 +119,10 @@ def _realism(models: Findings) -> list[str]:
         for name, about in models.items()
         if about["of"]
     ]
+    is_within_reach = real["families_with_all"] >= _ENOUGH * real["of"]
     return [
-        f"With fifteen measures, the limit on realism is strict: fresh real noise itself keeps it on {real['families_with_all']} of {real['of']} "
-        "families. The same count for every model:",
+        f"With fifteen measures, {'the limit on realism is strict' if is_within_reach else 'two thirds are beyond reach'}: fresh real noise itself keeps the "
+        f"limit on {real['families_with_all']} of {real['of']} families. The same count for every model:",
         "",
         "| noise | families with every measure within three times its floor | measures within it, mean |",
         "|---|---|---|",
@@ -133,26 +161,70 @@ def learning_curve(found: Findings) -> str:
         where = "; ".join(f"{arm.removeprefix('simulator + ')}: {_numbers(places)}" for arm, places in pays.items()) or "nowhere"
         enough = f"from {about['real_suffices_from']:,} on" if about["real_suffices_from"] else "nowhere on this curve"
         lines.append(
-            f"- **{name}**: a simulator pays with these numbers of real windows: {where}. Real windows alone suffice (excess at most half a point) {enough}. "
+            f"- **{name}**: a simulator with noise of a simple model pays with these numbers of real windows: {where}. "
+            f"Real windows alone suffice (excess at most half a point) {enough}. "
             f"With {bar['num_real']} windows, the excess is {100 * real['excess'][str(bar['num_real'])]:.1f} points for the real windows alone and "
             f"{100 * bar['excess']:.1f} for the best simulator ({bar['best'].removeprefix('simulator + ')}): "
             f"{'no excess to halve' if bar['real_excess'] <= 0 else 'at most half' if bar['is_kept'] else 'more than half'}."
         )
-    arms = list(dict.fromkeys(arm for about in found["environments"].values() for arm in about["arms"]))
-    head = f"| environment | training | {' | '.join(f'{number:,}' for number in numbers)} |"
-    rows = [head, "|---" * (len(numbers) + 2) + "|"]
-    for name, about in found["environments"].items():
-        for arm in arms:
-            curve = about["arms"].get(arm)
-            if curve is None:
+    few = {arm for about in found["environments"].values() for arm in _of_few_seeds(about)}
+    scope = f"False alarms in % / recall at 1 % false alarms in %, by the number of real windows, means over {_counted(len(found['seeds']), 'seed')}:"
+    table = _curve_table({name: about["arms"] for name, about in found["environments"].items()}, numbers, few)
+    return "\n".join([*lines, *_others(found), "", scope, "", *table, *_few_seeds(found), *_classifiers(found)])
+
+
+def _of_few_seeds(about: Findings) -> list[str]:
+    """The arms of an environment that have fewer seeds than the others."""
+    most = max(_seeds_of(curve) for curve in about["arms"].values())
+    return [arm for arm, curve in about["arms"].items() if _seeds_of(curve) < most]
+
+
+def _seeds_of(curve: Findings) -> int:
+    return max(curve["seeds"].values())
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number:,} {what}{'s' * (number != 1)}"
+
+
+def _curve_table(environments: Mapping[str, Findings], numbers: Sequence[int], without: Collection[str] = ()) -> list[str]:
+    """Rates and recalls of the arms of each environment, one column for each number of real windows."""
+    rows = [f"| environment | training | {' | '.join(f'{number:,}' for number in numbers)} |", "|---" * (len(numbers) + 2) + "|"]
+    for name, arms in environments.items():
+        for arm, curve in arms.items():
+            if arm in without:
                 continue
             cells = [
                 f"{100 * curve['rate'][str(n)]:.1f} / {100 * curve['recall_at_real_rate'][str(n)]:.0f}" if str(n) in curve["rate"] else ""
                 for n in numbers
             ]
             rows.append(f"| {name} | {arm} | {' | '.join(cells)} |")
-    scope = "False alarms in % / recall at 1 % false alarms in %, by the number of real windows, " + _seeds_of(found) + ":"
-    return "\n".join([*lines, *_others(found), *_classifiers(found), "", scope, "", *rows])
+    return rows
+
+
+def _few_seeds(found: Findings) -> list[str]:
+    """The arms with fewer seeds, beside the others on the same seeds."""
+    environments = {name: about["few_seeds"] for name, about in found["environments"].items() if "few_seeds" in about}
+    if not environments:
+        return []
+    seeds = sorted({seed for about in environments.values() for seed in about["seeds"]})
+    tried = [number for number in found["numbers"] if any(str(number) in about["best_detector"] for about in environments.values())]
+    rows = _curve_table({name: about["arms"] for name, about in environments.items()}, tried)
+    scope = (
+        f"Noise networks and classifiers take minutes each and have {_counted(len(seeds), 'seed')} ({', '.join(map(str, seeds))}). "
+        f"The same table for {'this seed' if len(seeds) == 1 else 'these seeds'} alone:"
+    )
+    best = []
+    for name, about in environments.items():
+        told = [
+            f"{_counted(int(number), 'window')}: {each['name']} {100 * each['recall_at_real_rate']:.0f} %"
+            for number, each in about["best_detector"].items()
+        ]
+        best.append(f"- {name}: {'; '.join(told)}.")
+    head = (
+        "A row of detectors is a mean. The single detector that finds most, at 1 % false alarms, after training on the real windows alone:"
+    )
+    return ["", scope, "", *rows, "", head, "", *best]
 
 
 def _others(found: Findings) -> list[str]:
@@ -173,33 +245,38 @@ def _others(found: Findings) -> list[str]:
         return []
     listed = "; ".join(names.values())
     if not said:
-        return ["", f"By the same rule, none of the other methods pays: {listed}."]
-    return ["", f"Other methods were tried with the same rule: {listed}. They pay only here:", "", *said]
+        return ["", f"By the same rule, none of the other methods pays: {listed}.{_impossible(found)}"]
+    return ["", f"Other methods were tried with the same rule: {listed}.{_impossible(found)} They pay only here:", "", *said]
 
 
-def _seeds_of(found: Findings) -> str:
-    """How many seeds the arms have, which differs between them."""
-    by_number: dict[int, list[str]] = {}
-    for arm, curve in next(iter(found["environments"].values()))["arms"].items():
-        by_number.setdefault(max(curve["seeds"].values()), []).append(arm)
-    most, *others = sorted(by_number, reverse=True)
-    words = f"means over {most} seed{'s' * (most > 1)}"
-    for number in others:
-        words += f"; {', '.join(by_number[number])}: {number} seed{'s' * (number > 1)}"
-    return words
+def _impossible(found: Findings) -> str:
+    """Where noise networks cannot pay, because on their seeds the real windows alone have no excess to halve."""
+    cannot = {
+        f"{name} noise ({_numbers(other['cannot'])} windows)": None
+        for name, about in found["environments"].items()
+        for arm, other in about["others_pay"].items()
+        if arm in _of_few_seeds(about) and other["cannot"]
+    }
+    said = in_list(list(cannot))
+    return (
+        f" On the seeds of the noise networks, the real windows alone suffice on {said}, so that nothing could pay there." if cannot else ""
+    )
 
 
 def _classifiers(found: Findings) -> list[str]:
     """What the simulator adds to a classifier that learns from injected anomalies."""
     lines = []
     for name, about in found["environments"].items():
-        if gains := about.get("classifiers"):
-            told = ", ".join(f"{int(number):,} real windows {_gain(gain)}" for number, gain in gains.items())
-            lines.append(f"- {name}: {told}.")
+        told = [
+            f"{arm} {', '.join(f'{_gain(gain)} with {int(number):,} real windows' for number, gain in gains.items())}"
+            for arm, gains in about.get("classifiers", {}).items()
+        ]
+        if told:
+            lines.append(f"- {name}: {'; '.join(told)}.")
     head = (
-        "A classifier that learns from anomalies injected into windows of the simulator finds so many points more of the anomalies, at 1 % "
-        "false alarms, than one that learns from anomalies injected into the real windows (in brackets the range over seeds, if there are "
-        "several):"
+        "What the simulator adds to a classifier of injected anomalies: recall at 1 % false alarms if it learns from anomalies injected into windows of the "
+        "simulator, minus recall if it learns from anomalies injected into the real windows, in percentage points (in brackets the range over "
+        "seeds, if there are several):"
     )
     return ["", head, "", *lines] if lines else []
 

@@ -88,15 +88,15 @@ def _factorial(found: Findings, factorial: Findings | None) -> str:
     bootstrap, gan = (found["arms"][f"residual + {name}"]["gap_closed"] for name in ("bootstrap", "convolutional GAN"))
     said = f"Right: blocks of the residuals close {per_cent(bootstrap, 0)} of the gap, and the convolutional GAN {per_cent(gan, 0)}."
     shares = (factorial or {}).get("shares", {})
-    about = shares.get(CONVOLUTIONAL_GAN) or next(iter(shares.values()), None)
-    if about is None:
+    if not shares:
         return f"{said} A factorial experiment that separates the factors has begun."
+    generator = CONVOLUTIONAL_GAN if CONVOLUTIONAL_GAN in shares else next(iter(shares))
+    about = shares[generator]
     factors = about["gap_closed"]["factors"]
     ranked = sorted(factors, key=lambda name: -factors[name]["share"]["mean"])
     return (
-        f"{said} The factorial experiment ({in_seeds(about['seeds'])}) attributes these points of the gap: "
-        + ", ".join(f"{name} {points(factors[name]['share']['mean'], 0)}" for name in ranked)
-        + "."
+        f"{said} The factorial experiment attributes these points of the gap to the factors, with {generator} in place of the paper's GAN "
+        f"({in_seeds(about['seeds'])}): " + ", ".join(f"{name} {points(factors[name]['share']['mean'], 0)}" for name in ranked) + "."
     )
 
 

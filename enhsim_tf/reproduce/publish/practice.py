@@ -100,15 +100,15 @@ def _linear(factorial: Findings | None, curve: Findings | None) -> Answer:
     beyond = {name: each["false_alarms"] for name, each in against["by_environment"].items() if name not in within}
     everywhere = len(within) == len(against["by_environment"])
     where = "on every noise" if everywhere else f"on {in_list(within)} noise" if within else "on none of the kinds of noise"
-    differences = {name: each["false_alarms"]["mean"] for name, each in against["by_environment"].items()}
+    differences = [f"{name} {points(each['false_alarms'])}" for name, each in against["by_environment"].items()]
     sentence = (
         f"**A linear map and resampled residuals suffice** {where} here: detectors trained on the output of ridge regression plus whole windows of its residuals flag "
-        f"at most {points(MARGIN)} points more nominal windows there than after training on real telemetry (differences: "
-        f"{', '.join(f'{name} {points(each)}' for name, each in differences.items())}); where you have real windows of what you monitor, train on these first."
+        f"at most {points(MARGIN)} points more nominal windows there than after training on real telemetry, by the upper end of the interval "
+        f"({', '.join(differences)}); where you have real windows of what you monitor, train on these first."
     )
     others = "".join(f" On {name} noise the difference is {points(each)} points." for name, each in beyond.items())
     behind = (
-        f"({len(factorial['detectors'])} detectors, {in_seeds(about['seeds'])}; *at most* goes by the upper end of the interval.) This method has no network. Over all "
+        f"({len(factorial['detectors'])} detectors, {in_seeds(about['seeds'])}.) This method has no network. Over all "
         f"kinds of noise these detectors flag {interval(about['false_alarms'])} of real nominal windows, against {interval(real['false_alarms'])}. "
         "It meets the criterion of claim C8 in "
         f"{about['kept']} of {about['pairs']} pairs of environment and detector.{others} It does not do better than the real windows from which the residuals are "

@@ -50,7 +50,8 @@ def p_value(value: float) -> str:
 
 def in_list(names: Sequence[str]) -> str:
     """Joins names with commas, and the last one with "and"."""
-    return " and ".join(", ".join(names).rsplit(", ", 1))
+    names = list(names)
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def reached(is_reached: bool) -> str:

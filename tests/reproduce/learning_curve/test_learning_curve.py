@@ -171,7 +171,7 @@ def _with_another_seed(tables, arm):
     return {"rows": pd.concat([rows, second], ignore_index=True)}
 
 
-def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seeds():
+def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seeds(near):
     tables = table({5: 0.11, 20: 0.03}, {5: 0.06, 20: 0.021})
     network = tables["rows"][tables["rows"]["arm"] != REAL].assign(arm=SIMULATOR + "autoregressive network", alarms=10)
     both = _with_another_seed({"rows": pd.concat([tables["rows"], network], ignore_index=True)}, SIMULATOR + "autoregressive network")
@@ -184,16 +184,32 @@ def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seed
         [5, 20],
         1,
     )  # on seed 1 the real windows have excesses of 10 and 2 points
+    assert other["cannot"] == []
+    few = white["few_seeds"]
+    assert few["seeds"] == [1] and list(few["arms"]) == [REAL, SIMULATOR + "Gaussian", SIMULATOR + "autoregressive network"]
+    assert few["arms"][REAL]["rate"] == {"5": 0.11, "20": 0.03} and white["arms"][REAL]["rate"] == near({"5": 0.06, "20": 0.02})
+    assert few["best_detector"]["20"] == {"name": "a", "recall_at_real_rate": 0.6}
     text = page.learning_curve(found)
     assert "simulator + autoregressive network (1 seed). They pay only here:" in text
+    assert "| white | real | 6.0 / 60 | 2.0 / 60 |" in text and "| white | real | 11.0 / 60 | 3.0 / 60 |" in text
+    assert text.count("| white | simulator + autoregressive network |") == 1 and "- white: 5 windows: a 60 %; 20 windows: a 60 %." in text
     assert "With 20 windows and its own thresholds it finds 50 % of the anomalies; training on the real windows alone finds 50 %." in text
+
+
+def test_where_real_windows_suffice_on_the_seeds_of_a_network_the_page_says_that_it_cannot_pay():
+    tables = table({5: 0.11, 20: 0.012}, {5: 0.06, 20: 0.01})
+    network = tables["rows"][tables["rows"]["arm"] != REAL].assign(arm=SIMULATOR + "autoregressive network", alarms=10)
+    both = _with_another_seed({"rows": pd.concat([tables["rows"], network], ignore_index=True)}, SIMULATOR + "autoregressive network")
+    found = findings.summarise(both)
+    assert found["environments"]["white"]["others_pay"][SIMULATOR + "autoregressive network"]["cannot"] == [20]
+    assert "the real windows alone suffice on white noise (20 windows), so that nothing could pay there." in page.learning_curve(found)
 
 
 def test_methods_without_a_simulator_are_held_to_the_same_rule():
     tables = table({5: 0.11, 20: 0.03}, {5: 0.06, 20: 0.021})
     coral = tables["rows"][tables["rows"]["arm"] != REAL].assign(arm=CORAL, alarms=90)
     found = findings.summarise({"rows": pd.concat([tables["rows"], coral], ignore_index=True)})
-    assert found["environments"]["white"]["others_pay"] == {CORAL: {"pays": [], "tried": [5, 20], "seeds": 1, "recall": {}}}
+    assert found["environments"]["white"]["others_pay"] == {CORAL: {"pays": [], "tried": [5, 20], "cannot": [], "seeds": 1, "recall": {}}}
     assert "none of the other methods pays: CORAL (1 seed)." in page.learning_curve(found)
 
 
@@ -206,16 +222,19 @@ def test_options_that_do_not_fit_are_refused_in_one_line(capsys):
 def test_the_page_and_the_figure_say_where_the_simulator_pays():
     found = findings.summarise(table({5: 0.11, 20: 0.03, 100: 0.012}, {5: 0.06, 20: 0.021, 100: 0.01}))
     text = page.learning_curve(found)
-    assert "**white**: a simulator pays with these numbers of real windows: Gaussian: 5. Real windows alone suffice" in text
+    assert (
+        "**white**: a simulator with noise of a simple model pays with these numbers of real windows: Gaussian: 5. Real windows alone suffice"
+        in text
+    )
     assert (
         "from 100 on. With 20 windows, the excess is 2.0 points for the real windows alone and 1.1 for the best simulator (Gaussian): more"
         in text
     )
     assert "| white | real | 11.0 / 60 | 3.0 / 60 | 1.2 / 60 |" in text
-    assert figures._message(found) == "A fitted simulator pays with 5 real windows on white noise"
+    assert figures._message(found) == "A fitted simulator with a simple noise model pays with 5 real windows on white noise"
     found["environments"] |= {"shot": {"pays": {"a": []}}, "other": {"pays": {"a": [5], "b": [20]}}}
     assert figures._message(found) == (
-        "A fitted simulator pays with 5 real windows on white noise, with up to 20 real windows on other noise, and nowhere on shot noise"
+        "A fitted simulator with a simple noise model pays with 5 real windows on white noise, with up to 20 real windows on other noise, and nowhere on shot noise"
     )
 
 
