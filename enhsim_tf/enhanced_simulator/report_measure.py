@@ -18,7 +18,7 @@ from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
 from enhsim_tf.realism import real_floor
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import disjoint_starts, evenly_spaced_starts
+from enhsim_tf.telemetry.windows import evenly_spaced_starts, scattered_starts
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -127,12 +127,16 @@ def _typical(windows: np.ndarray, target: np.ndarray) -> int:
 
 
 def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], seed: int) -> tuple[int, list[dict[str, Any]]]:
-    """Compares generated with extracted noise in all measures, in windows short enough that there are many disjoint ones."""
+    """Compares generated with extracted noise in all measures, in windows short enough that there are many disjoint ones.
+
+    The windows begin at random phases of the signal, as generated windows do. In windows of one phase, errors of the enhancer that
+    depend on the phase would make all generated noise look wrong, even whole residual windows drawn again.
+    """
     window = simulator.window
     whole = [part for part in parts if len(part) >= window]
-    starts, before = [], 0
+    starts, before, rng = [], 0, np.random.default_rng([seed, 4])
     for part in whole:
-        starts += list(before + disjoint_starts(len(part), window))
+        starts += list(before + scattered_starts(len(part), window, rng))
         before += len(part) - window + 1
     pairs = simulator.pairs(whole, np.array(starts))
     residual = pairs.target - simulator.follow(pairs)

@@ -6,7 +6,14 @@ import pytest
 
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, check_values
 from enhsim_tf.telemetry.sources import read_telemetry
-from enhsim_tf.telemetry.windows import cut_windows, disjoint_starts, evenly_spaced_starts, random_window_starts, split_by_time
+from enhsim_tf.telemetry.windows import (
+    cut_windows,
+    disjoint_starts,
+    evenly_spaced_starts,
+    random_window_starts,
+    scattered_starts,
+    split_by_time,
+)
 
 RAMP = np.arange(12.0)
 
@@ -266,6 +273,16 @@ def test_random_starts_reach_every_window_and_no_more(refused):
     assert (starts != random_window_starts([range(30)], 20, 5_000, np.random.default_rng(1))).any()
     with refused("at least 20 samples", "Received: 19"):
         random_window_starts([range(19)], 20, 3, np.random.default_rng(0))
+
+
+def test_scattered_starts_share_no_sample_and_begin_at_all_phases():
+    rng = np.random.default_rng(0)
+    found = [scattered_starts(80_000, 400, rng) for _ in range(20)]
+    for starts in found:
+        assert len(starts) == 175 and np.all(np.diff(starts) >= 400) and starts[0] >= 0 and starts[-1] <= 79_600
+    phases = np.bincount(np.concatenate(found) % 400 // 100)  # quarters of the window; 3,500 starts, and 26 is one standard deviation
+    assert np.all(np.abs(phases - 875) < 4 * 26)
+    assert [scattered_starts(length, 400, rng).shape[0] for length in (399, 400, 799, 1_000)] == [0, 1, 1, 2]
 
 
 def test_disjoint_starts_share_no_sample():
