@@ -135,7 +135,11 @@ def test_the_page_says_what_the_findings_say(tmp_path):
     page.write_text("".join(f"<!-- {name}: generated -->\nold\n<!-- end of {name} -->\n" for name in names), encoding="utf-8")
     fill_page(page, noise=found)
     text = page.read_text(encoding="utf-8")
-    assert "| bursts | unseen | 1.0% | 3.1% | gaussian |" in text and "seed 7" in text
+    assert (
+        "| bursts | unseen | 1.0% | 3.1% | gaussian |" in text
+        and "- bursts: White noise that is louder during bursts," in text
+        and "seed 7" in text
+    )
     assert "at most 3 points: 1 of 1 families; the largest excess is 2.1 points (bursts)" in text
     assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
     assert "two thirds are beyond reach: fresh real noise itself keeps the limit on 0 of 1 families" in text

@@ -1,10 +1,12 @@
 """Fills the generated parts of `docs/noise.md` from the findings of the experiments on noise and on the number of real windows."""
 
+import inspect
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.reproduce.noise_gallery import GALLERY
 from enhsim_tf.reproduce.noise_ladder.findings import REAL
 from enhsim_tf.reproduce.publish.results import fill_parts
 from enhsim_tf.reproduce.publish.wording import in_list
@@ -39,14 +41,20 @@ def fill_page(path: Path, noise: Findings | None = None, curve: Findings | None 
 
 
 def families(found: Findings) -> str:
-    """The table of false-alarm rates, a row for each family and a column for each noise model."""
+    """The table of false-alarm rates, a row for each family and a column for each noise model, and what the families are."""
     names = list(dict.fromkeys(name for about in found["families"].values() for name in about["rungs"]))
     lines = [f"| family | half | {' | '.join(names)} | chosen by the rule |", "|---" * (len(names) + 3) + "|"]
     for family, about in sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at"):
         half = f"{about['half']} (see above)" if about["half"] == "revised" else about["half"]
         rates = [f"{about['rungs'][name]['alarms']:.1%}" if name in about["rungs"] else "" for name in names]
         lines.append(f"| {family.replace('_', ' ')} | {half} | {' | '.join(rates)} | {', '.join(sorted(set(about['chosen'])))} |")
-    return "\n".join([_scope(found), "", *lines])
+    kinds = [f"- {family.replace('_', ' ')}: {_kind(family)}" for family in found["families"]]
+    return "\n".join([_scope(found), "", *lines, "", "The families (AR(1): autoregressive of first order):", "", *kinds])
+
+
+def _kind(family: str) -> str:
+    """What a family of noise is: the first sentence about its process."""
+    return (inspect.getdoc(type(GALLERY[family])) or "").partition("\n")[0]
 
 
 def _scope(found: Findings) -> str:
