@@ -95,7 +95,7 @@ def _factorial(found: Findings, factorial: Findings | None) -> str:
     factors = about["gap_closed"]["factors"]
     ranked = sorted(factors, key=lambda name: -factors[name]["share"]["mean"])
     return (
-        f"{said} The factorial experiment attributes these points of the gap to the factors, with {generator} in place of the paper's GAN "
+        f"{said} The factorial experiment attributes these points of the gap to the factors, with {'the ' * ('GAN' in generator)}{generator} in place of the paper's GAN "
         f"({in_seeds(about['seeds'])}): " + ", ".join(f"{name} {points(factors[name]['share']['mean'], 0)}" for name in ranked) + "."
     )
 
