@@ -115,8 +115,9 @@ def test_the_order_of_the_rows_does_not_decide_which_rung_is_simplest():
         {"rung": rung, "auc": 0.5, "real_auc": 0.5, "alarms": 0.01, "real_alarms": 0.01}
         for rung in ("convolutional GAN", "autoregression", "Gaussian")
     ]
-    assert findings._chosen(pd.DataFrame(rows)) == "Gaussian"
-    assert findings._passing(pd.DataFrame(rows)) == ["Gaussian", "autoregression", "convolutional GAN"]
+    judged = findings._judgements(pd.DataFrame(rows))
+    assert choose(judged) == "Gaussian"
+    assert [each.rung for each in judged if each.passes] == ["Gaussian", "autoregression", "convolutional GAN"]
 
 
 def test_the_page_says_what_the_findings_say(tmp_path):

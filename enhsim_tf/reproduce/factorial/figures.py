@@ -82,7 +82,7 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         axes.margins(x=0.06)
         axes.autoscale_view(scaley=False)
         lowest, highest = axes.get_xlim()
-        axes.set_xlim(lowest, highest + 0.08 * (highest - lowest))  # room for the numbers
+        axes.set_xlim(lowest, highest + 0.08 * (highest - lowest))  # space for the numbers at the right
         _letters(axes, shares, outcome, heights)
         axes.axvline(0, color=QUIET, linewidth=0.6, zorder=0)
         middles = [np.mean([heights[generator, factor] for generator in shares]) for factor in LEVELS]

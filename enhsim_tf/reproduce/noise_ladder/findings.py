@@ -71,14 +71,14 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
             values["recall_difference"] = values["recall_at_real_rate"] - rungs[REAL]["recall_at_real_rate"]
         learnt = {name: values for name, values in rungs.items() if name != REAL}
         best = min(learnt, key=lambda name: learnt[name]["excess"])
-        chosen = [_chosen(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
-        passing = [_passing(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
+        judged = [_judgements(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
+        chosen = [choose(each) for each in judged]
         families[family] = {
             "half": "looked at" if family in LOOKED_AT else "revised" if family in REVISED else "unseen",
             "seeds": sorted(int(seed) for seed in set(own["seed"])),
             "rungs": rungs,
             "chosen": chosen,
-            "passing": passing,
+            "passing": [[rung.rung for rung in each if rung.passes] for each in judged],  # none: the smallest departure decides
             "best": best,
             "regret": float(np.mean([learnt[name]["excess"] for name in chosen]) - learnt[best]["excess"]),
         }
@@ -91,16 +91,6 @@ def _judgements(rows: "pd.DataFrame") -> list[RungJudgement]:
     names = [field for field in RungJudgement.__dataclass_fields__ if field != "rung"]
     judged = [RungJudgement(row["rung"], *(float(row[name]) for name in names)) for row in rows.to_dict("records")]
     return sorted(judged, key=lambda each: list(RUNGS).index(each.rung))
-
-
-def _chosen(rows: "pd.DataFrame") -> str:
-    """The rung that the rule chooses from the judgements of one family and seed."""
-    return choose(_judgements(rows))
-
-
-def _passing(rows: "pd.DataFrame") -> list[str]:
-    """The rungs that pass the rule. If there is none, the smallest departure decides."""
-    return [each.rung for each in _judgements(rows) if each.passes]
 
 
 def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> dict[str, Any]:

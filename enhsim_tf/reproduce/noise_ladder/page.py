@@ -109,7 +109,7 @@ def _differences(missed: Findings) -> str:
     """The families that miss a limit, with their differences in points."""
     if not missed:
         return ""
-    return " (not on " + in_list([f"{name.replace('_', ' ')}, {100 * value:+.1f} points" for name, value in missed.items()]) + ")"
+    return "; not on " + in_list([f"{name.replace('_', ' ')} ({100 * value:+.1f} points)" for name, value in missed.items()])
 
 
 def _losses(lost: Findings) -> str:
