@@ -2,7 +2,7 @@
 
 A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each rung of the
 ladder is therefore judged on held-out noise in two ways: how much better than chance a classifier separates generated from real
-windows, and how many false alarms two cheap detectors raise on real windows after training on generated ones. The simplest rung
+windows of noise and the signal below them, and how many false alarms two cheap detectors raise on real windows after training on generated ones. The simplest rung
 that passes both is chosen. Rule and tolerances were fixed before the experiment that judges them.
 """
 
@@ -14,7 +14,8 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.realism.two_sample import two_sample_auc
+from enhsim_tf.realism.two_sample import boosted_trees
+from enhsim_tf.realism.window_features import signal_edges, signal_features, window_features
 
 MAX_AUC_EXCESS = 0.05  # by which the AUC of a rung may exceed that of real windows against other real windows
 MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows
@@ -61,8 +62,8 @@ class NoiseJudge:
         signals: Three arrays of clean signal windows, to which generated, learnt and held-out noise are added.
         rate: False-alarm rate for which thresholds are set.
         seed: Seed of the classifier and the detectors.
-        compared: Learnt and held-out noise for the classifier, if it differs from those above: if windows overlap, the classifier
-            recognises single windows of real noise, whatever the noise is like.
+        compared: What the classifier sees of learnt and held-out noise (see `features_of`), if it differs from the windows above: if
+            windows overlap, the classifier recognises single windows of real noise, whatever the noise is like.
 
     Raises:
         InputError: If there are fewer than 20 windows of a kind.
@@ -81,8 +82,14 @@ class NoiseJudge:
         _check_number(number)
         self.rate, self.seed, self._signals = rate, seed, signals
         self._judged = signals[2][: len(held_out)] + held_out
-        learnt_noise, self._held_out_noise = (learnt[:number], held_out[:number]) if compared is None else compared
-        self.real_auc = two_sample_auc(learnt_noise, self._held_out_noise, seed)
+        self._edges = signal_edges(signals[1])
+        if compared is None:
+            compared = [
+                features_of(noise[:number], signal[:number], self._edges)
+                for noise, signal in ((learnt, signals[1]), (held_out, signals[2]))
+            ]
+        learnt_features, self._held_out_features = compared
+        self.real_auc = boosted_trees(learnt_features, self._held_out_features, seed).auc
         self.real_alarms = self._alarms(signals[1][: len(learnt)] + learnt)
 
     def _alarms(self, training: np.ndarray) -> float:
@@ -100,12 +107,28 @@ class NoiseJudge:
         Args:
             rung: Name of the rung.
             generated: Generated noise windows, as many as real ones; half train the detectors, and half set their thresholds.
-            compared: Generated noise for the classifier, if real noise is given for it.
+            compared: What the classifier sees of generated noise, if that of real noise was given.
         """
         _check_number(len(generated))
-        tried = generated[: len(self._held_out_noise)] if compared is None else compared
-        auc, alarms = two_sample_auc(tried, self._held_out_noise, self.seed), self._alarms(self._signals[0][: len(generated)] + generated)
-        return RungJudgement(rung, auc, self.real_auc, alarms, self.real_alarms)
+        signal = self._signals[0][: len(generated)]
+        if compared is None:
+            compared = features_of(generated, signal, self._edges)[: len(self._held_out_features)]
+        auc = boosted_trees(compared, self._held_out_features, self.seed).auc
+        return RungJudgement(rung, auc, self.real_auc, self._alarms(signal + generated), self.real_alarms)
+
+
+def features_of(noise: np.ndarray, signal: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """What the classifier sees: features of the noise, and of the noise where the signal has different levels and slopes.
+
+    Args:
+        noise: Windows of noise, shape `(windows, samples)`.
+        signal: The signal below them, of the same shape.
+        edges: As returned by `window_features.signal_edges`.
+
+    Returns:
+        float64 array of shape `(windows, 26)`; short windows have fewer frequency bands and therefore fewer columns.
+    """
+    return np.concatenate([window_features(noise), signal_features(noise, signal, edges)], axis=1)
 
 
 def _check_number(number: int) -> None:

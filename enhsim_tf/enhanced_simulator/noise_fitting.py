@@ -8,7 +8,7 @@ A chosen rung without a network is fitted again to all of the time.
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,9 +16,14 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import noise_choice
 from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import BY_OPTION, NETWORKS
-from enhsim_tf.realism.two_sample import two_sample_auc
+from enhsim_tf.noise.rung_names import BY_OPTION, FOLLOWERS, NETWORKS, STREAMS
+from enhsim_tf.realism.two_sample import boosted_trees
+from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.telemetry.quantisation import Levels
+from enhsim_tf.telemetry.series import Telemetry
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 JUDGED_SHARE = 0.25  # of the time, at its end, on which rungs are judged
 MOST_JUDGED = 1_000  # windows
@@ -35,7 +40,7 @@ class NoiseWindows:
     Args:
         noise: Telemetry minus enhanced signal, shape `(windows, samples)`, in the unit of the telemetry.
         clean: Enhanced windows of the same shape.
-        starts: Start of each window in samples, in ascending order, shape `(windows,)`. Needed to judge with these windows.
+        starts: Start of each window in samples, shape `(windows,)`. Needed to judge with these windows.
     """
 
     noise: np.ndarray
@@ -43,17 +48,30 @@ class NoiseWindows:
     starts: np.ndarray | None = None
 
     @property
-    def disjoint(self) -> np.ndarray:
-        """Noise windows that share no sample, shape `(windows, samples)`."""
+    def disjoint(self) -> "NoiseWindows":
+        """Those windows that share no sample."""
         chosen, end = [], -np.inf
-        for row, start in enumerate(self.starts):
-            if start >= end:
+        for row in np.argsort(self.starts, kind="stable"):
+            if self.starts[row] >= end:
                 chosen.append(row)
-                end = start + self.noise.shape[1]
-        return self.noise[chosen]
+                end = self.starts[row] + self.noise.shape[1]
+        return NoiseWindows(self.noise[chosen], self.clean[chosen], self.starts[chosen])
 
     def __len__(self) -> int:
         return len(self.noise)
+
+
+def noise_windows(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], starts: np.ndarray) -> NoiseWindows:
+    """Returns the noise of telemetry, and the enhanced signal below it.
+
+    Args:
+        simulator: The simulator, whose enhancer is trained.
+        parts: Telemetry, or the parts between its gaps.
+        starts: Start of each window, counted over all parts as in `telemetry.windows`.
+    """
+    pairs = simulator.pairs(parts, starts)
+    clean = simulator.follow(pairs)
+    return NoiseWindows(pairs.target - clean, clean, starts)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +119,7 @@ def fit_noise(option: str, windows: NoiseWindows, training: NoiseTraining, notes
     name = "noise GAN, iteration" if is_adversarial else "noise network, iteration"
     count = training.progress.loop(name, number) if option in NETWORKS else None
     watch = ladder.Watch(None if training.verbose == "auto" else bool(training.verbose), count, notes.append)
-    signal = training.to_unit(windows.clean) if option == "autoregressive network" else None
+    signal = training.to_unit(windows.clean) if option in FOLLOWERS else None
     if option == "paper":
         return ladder.fit_paper_gan(windows.noise, number, training.seed, training.unit, watch)
     return ladder.RUNGS[BY_OPTION[option]](windows.noise, signal, number, training.seed, watch)
@@ -123,7 +141,7 @@ def choose_noise(
         The noise model; and for each rung its `name`, the numbers of `noise_choice.RungJudgement`, `passes` and `is_chosen`. The
         list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
     """
-    if min(len(judged), len(learnt)) < _LEAST_JUDGED or len(compare(learnt.noise, learnt, judged)[0]) < _LEAST_JUDGED:
+    if min(len(judged), len(learnt)) < _LEAST_JUDGED or len(compare(learnt, learnt, judged)[0]) < _LEAST_JUDGED:
         notes.append("there is too little telemetry to judge noise models; whole residual windows are drawn")
         return fit_noise("residual windows", everything, training, notes), []
     models, judgements, judge = {}, [], HeldOutJudge(learnt, judged, training)
@@ -153,7 +171,7 @@ class HeldOutJudge:
         rows = np.linspace(0, len(learnt) - 1, number).astype(int)
         self._learnt, self._held_out, self._training, self._clean = learnt, judged, training, learnt.clean[rows]
         signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[:number])]
-        _, *compared = compare(learnt.noise[rows], learnt, judged)
+        _, *compared = compare(NoiseWindows(learnt.noise[rows], self._clean), learnt, judged)
         self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[:number], signals, seed=training.seed, compared=compared)
 
     def judge(self, option: str, model: Any) -> noise_choice.RungJudgement:
@@ -164,37 +182,60 @@ class HeldOutJudge:
             model: The noise model.
         """
         training, clean = self._training, self._clean
-        rng = np.random.default_rng([training.seed, _DRAW, list(BY_OPTION).index(option)])
+        rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
         noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
         if training.quantisation is not None:
             noise = training.quantisation.round(clean + noise) - clean
-        return self._judge.judge(option, noise, compare(noise, self._learnt, self._held_out)[0])
+        return self._judge.judge(option, noise, compare(NoiseWindows(noise, clean), self._learnt, self._held_out)[0])
 
 
-def compare(generated: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows) -> list[np.ndarray]:
-    """Returns generated, learnt and held-out noise for a classifier: disjoint windows, cut into pieces if there are few.
+def compare(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows) -> list[np.ndarray]:
+    """Returns what a classifier sees of generated, learnt and held-out noise: features of the pieces of `pieces_of`.
 
     Args:
-        generated: Generated windows of noise, shape `(windows, samples)`.
+        generated: Generated windows of noise.
         learnt: Windows from which the noise model was fitted.
         judged: Windows that it has not seen.
 
     Returns:
-        Three arrays of the same number of pieces, shape `(pieces, samples)`.
+        Three arrays of the same shape, `(pieces, features)`; see `noise_choice.features_of`.
     """
-    groups = [generated, learnt.disjoint, judged.disjoint]
-    number, window = min(map(len, groups)), generated.shape[1]
-    pieces = max(1, min(-(-_ENOUGH_PIECES // number), window // _LEAST_PIECE))
-    short = window // pieces
-    spread = [each[np.linspace(0, len(each) - 1, number).astype(int)] for each in groups]
-    return [each[:, : short * pieces].reshape(-1, short) for each in spread]
+    groups = pieces_of(generated, learnt, judged)
+    if not len(groups[0]):
+        return [np.zeros((0, 0))] * 3
+    edges = signal_edges(groups[1].clean)
+    return [noise_choice.features_of(each.noise, each.clean, edges) for each in groups]
 
 
-def auc_of(generated: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows, seed: int) -> dict[str, float]:
-    """Returns how well a classifier tells generated, and learnt, from held-out noise, in disjoint windows or pieces of them.
+def pieces_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows) -> list[NoiseWindows]:
+    """Returns disjoint windows of each kind, as many of each, cut into pieces if there are few.
 
     Args:
         generated: Generated windows of noise.
+        learnt: Windows from which the noise model was fitted.
+        judged: Windows that it has not seen.
+
+    Returns:
+        The pieces of each, shape `(pieces, samples)`.
+    """
+    groups = [generated, learnt.disjoint, judged.disjoint]
+    number, window = min(map(len, groups)), generated.noise.shape[1]
+    if not number:
+        return [NoiseWindows(*np.zeros((2, 0, window)))] * 3
+    pieces = max(1, min(-(-_ENOUGH_PIECES // number), window // _LEAST_PIECE))
+    short = window // pieces
+    found = []
+    for each in groups:
+        rows = np.linspace(0, len(each) - 1, number).astype(int)
+        found.append(NoiseWindows(*(windows[rows, : short * pieces].reshape(-1, short) for windows in (each.noise, each.clean))))
+    return found
+
+
+def auc_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows, seed: int) -> dict[str, float]:
+    """Returns how well a classifier tells generated, and learnt, from held-out noise, in disjoint windows or pieces of them.
+
+    Args:
+        generated: Generated windows of noise, and the enhanced windows that it was generated for.
         learnt: Windows from which the noise model was fitted.
         judged: Windows that it has not seen.
         seed: Seed of the classifier.
@@ -207,7 +248,7 @@ def auc_of(generated: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows, se
     tried = compare(generated, learnt, judged)
     if len(tried[0]) < _LEAST_JUDGED:
         return {}
-    return {kind: two_sample_auc(noise, tried[2], seed) for kind, noise in (("generated", tried[0]), ("real", tried[1]))}
+    return {kind: boosted_trees(features, tried[2], seed).auc for kind, features in (("generated", tried[0]), ("real", tried[1]))}
 
 
 def sentence_of(rows: Sequence[Mapping[str, Any]], used: str) -> str:

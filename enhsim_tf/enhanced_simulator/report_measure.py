@@ -11,7 +11,7 @@ import numpy as np
 
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, NoiseWindows, auc_of
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, NoiseWindows, auc_of, noise_windows
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
 from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
@@ -105,13 +105,9 @@ def report_on(
 
 def _noise_auc(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], seed: int) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out noise; empty if there are too few windows."""
-    real, rng = [], np.random.default_rng([seed, 3])
-    for parts in (learnt, held_out):
-        starts = evenly_spaced_starts(parts, simulator.window, MOST_JUDGED)
-        pairs = simulator.pairs(parts, starts)
-        clean = simulator.follow(pairs)
-        real.append(NoiseWindows(pairs.target - clean, clean, starts))
-    return auc_of(simulator.add_noise(real[0].clean, rng) - real[0].clean, *real, seed)
+    real = [noise_windows(simulator, parts, evenly_spaced_starts(parts, simulator.window, MOST_JUDGED)) for parts in (learnt, held_out)]
+    clean, rng = real[0].clean, np.random.default_rng([seed, 3])
+    return auc_of(NoiseWindows(simulator.add_noise(clean, rng) - clean, clean), *real, seed)
 
 
 def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:
@@ -138,8 +134,7 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     for part in whole:
         starts += list(before + scattered_starts(len(part), window, rng))
         before += len(part) - window + 1
-    pairs = simulator.pairs(whole, np.array(starts))
-    residual = pairs.target - simulator.follow(pairs)
+    residual = noise_windows(simulator, whole, np.array(starts)).noise
     pieces = max(1, -(-_NUM_NOISE_WINDOWS // len(residual)))
     short = window // pieces
     if short < _LEAST_NOISE_WINDOW:

@@ -16,7 +16,15 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts, check_size, is_finite
 from enhsim_tf.enhanced_simulator.choosing import choose_enhancer
-from enhsim_tf.enhanced_simulator.noise_fitting import BEST, JUDGED_SHARE, NoiseTraining, NoiseWindows, choose_noise, fit_noise
+from enhsim_tf.enhanced_simulator.noise_fitting import (
+    BEST,
+    JUDGED_SHARE,
+    NoiseTraining,
+    NoiseWindows,
+    choose_noise,
+    fit_noise,
+    noise_windows,
+)
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
 from enhsim_tf.keras_tools.backend import keras
@@ -149,7 +157,7 @@ def train(
     training = _noise_training(simulator, settings, verbose, progress)
     rng = np.random.default_rng([settings.seed, 1])
     if by_enhancer:
-        windows = _noise_windows(simulator, rest, random_window_starts(rest, settings.window, settings.num_windows, rng))
+        windows = noise_windows(simulator, rest, random_window_starts(rest, settings.window, settings.num_windows, rng))
     else:
         starts = random_window_starts(averaged, settings.window, settings.num_windows, rng)
         noise, _ = cut_windows_from_parts(averaged, starts, settings.window)
@@ -170,18 +178,12 @@ def _noise_training(simulator: "EnhancedSimulator", settings: TrainingSettings, 
     )
 
 
-def _noise_windows(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], starts: np.ndarray) -> NoiseWindows:
-    pairs = simulator.pairs(parts, starts)
-    clean = simulator.follow(pairs)
-    return NoiseWindows(pairs.target - clean, clean, np.sort(starts))
-
-
 def _evenly_spaced(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: TrainingSettings) -> NoiseWindows:
     """Returns windows of noise in the order of time, or none if no part is long enough."""
     parts = [part for part in parts if len(part) >= settings.window]
     if not parts:
         return NoiseWindows(*np.zeros((2, 0, settings.window), np.float32), np.zeros(0, int))
-    return _noise_windows(simulator, parts, evenly_spaced_starts(parts, settings.window, settings.num_windows))
+    return noise_windows(simulator, parts, evenly_spaced_starts(parts, settings.window, settings.num_windows))
 
 
 def _build(

@@ -16,6 +16,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.enhanced_simulator.checks import check_parts, is_finite
+from enhsim_tf.enhanced_simulator.noise_fitting import noise_windows
 from enhsim_tf.enhanced_simulator.residual_detector import AlignedResidual
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
@@ -24,7 +25,7 @@ from enhsim_tf.enhancer.training_pairs import split_end, window_errors
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.keras_tools.training import fit_windows
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, num_window_starts, random_window_starts
 
@@ -148,11 +149,14 @@ def _tune_enhancer(
 
 def _update_noise(simulator: EnhancedSimulator, parts: Sequence[Telemetry], seed: int, notes: list[str]) -> None:
     """Fits the noise model to new residuals. Networks keep their weights, and their output is scaled."""
-    residuals = simulator.residual_windows(parts, _NUM_NOISE, np.random.default_rng([seed, 1]))
+    windows = noise_windows(simulator, parts, random_window_starts(parts, simulator.window, _NUM_NOISE, np.random.default_rng([seed, 1])))
+    residuals = windows.noise
     real_sd, generated_sd = float(np.std(residuals, dtype=np.float64)), simulator.noise_sd
     noise = simulator.noise
     if isinstance(noise, WindowBootstrap | GaussianNoise):
         simulator.noise = type(noise).fit(residuals)
+    elif isinstance(noise, MatchedWindowBootstrap):
+        simulator.noise = MatchedWindowBootstrap.fit(residuals, simulator.in_unit(windows.clean))
     elif isinstance(noise, GaussianAutoregression):
         simulator.noise = GaussianAutoregression.fit(residuals, min(_MOST_ORDER, simulator.window - 1))
     elif isinstance(getattr(noise, "scale", None), float) and generated_sd > 0 and real_sd > 0:

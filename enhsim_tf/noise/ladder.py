@@ -54,6 +54,12 @@ def _residual_windows(noise: np.ndarray, signal: np.ndarray | None, num_iteratio
     return WindowBootstrap.fit(noise)
 
 
+def _matched_windows(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
+    from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap
+
+    return MatchedWindowBootstrap.fit(noise, signal)
+
+
 def _network(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
     from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
 
@@ -105,6 +111,7 @@ RUNGS: dict[str, Fit] = {
     "Gaussian": _gaussian,
     "autoregression": _autoregression,
     "residual windows": _residual_windows,
+    "matched residual windows": _matched_windows,
     "autoregressive network": _network,
     "GAN of the paper": _paper_gan,
     "convolutional GAN": _convolutional_gan,

@@ -5,6 +5,7 @@ BY_OPTION = {
     "gaussian": "Gaussian",
     "autoregression": "autoregression",
     "residual windows": "residual windows",
+    "matched residual windows": "matched residual windows",
     "autoregressive network": "autoregressive network",
     "paper": "GAN of the paper",
     "convolutional": "convolutional GAN",
@@ -12,3 +13,16 @@ BY_OPTION = {
 """Maps the value of an option to the name of its rung in `ladder.RUNGS`, the simplest first."""
 NETWORKS = ("autoregressive network", "paper", "convolutional")
 """Options whose rungs train networks."""
+FOLLOWERS = ("matched residual windows", "autoregressive network")
+"""Options whose rungs make noise that can follow the enhanced signal."""
+STREAMS = {
+    "none": 0,
+    "gaussian": 1,
+    "autoregression": 2,
+    "residual windows": 3,
+    "autoregressive network": 4,
+    "paper": 5,
+    "convolutional": 6,
+    "matched residual windows": 7,
+}
+"""Number of the stream of random draws of each option. A new option gets the next number, so that the draws of the others stay."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 
 if TYPE_CHECKING:
     from enhsim_tf.keras_tools.backend import keras
@@ -21,6 +21,7 @@ _KINDS = {
     GaussianNoise: "gaussian",
     GaussianAutoregression: "autoregression",
     WindowBootstrap: "residual windows",
+    MatchedWindowBootstrap: "matched residual windows",
 }
 _AUTOREGRESSIVE_NETWORK = "autoregressive network"
 _OLD_NAMES = {"resampled": "residual windows"}  # of models that were saved before
@@ -65,6 +66,8 @@ def state_of(model: Any) -> NoiseState:
         return NoiseState(settings, arrays={"coefficients": model.coefficients})
     if kind == "residual windows":
         return NoiseState({"kind": kind}, arrays={"windows": model.windows})
+    if kind == "matched residual windows":
+        return NoiseState({"kind": kind}, arrays={"windows": model.windows, "signals": model.signals})
     from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
     from enhsim_tf.noise.gan import NoiseGAN
 
@@ -101,6 +104,8 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         return GaussianAutoregression(arrays["coefficients"], _positive(values["innovation_sd"]), values["window"])
     if kind == "residual windows":
         return WindowBootstrap(arrays["windows"])
+    if kind == "matched residual windows":
+        return MatchedWindowBootstrap(arrays["windows"], arrays["signals"])
     if kind == _AUTOREGRESSIVE_NETWORK:
         from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
 

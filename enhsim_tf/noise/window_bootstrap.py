@@ -1,8 +1,15 @@
-"""Resampled residuals: a noise model without a network that draws whole windows of real noise (a baseline of section 2.3)."""
+"""Resampled residuals: noise models without networks, which draw whole windows of real noise (baselines of section 2.3)."""
+
+import math
+from collections.abc import Callable
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+
+_NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over these segments
+_EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
+_BATCH = 2**24  # distances that are computed at a time
 
 
 class WindowBootstrap:
@@ -20,11 +27,7 @@ class WindowBootstrap:
     """
 
     def __init__(self, windows: np.ndarray):
-        self.windows = np.asarray(windows, np.float32)
-        if self.windows.ndim != 2 or self.windows.shape[0] < 1 or self.windows.shape[1] < 4 or not np.isfinite(self.windows).all():
-            raise InputError(
-                f"Expected finite windows of noise of at least 4 samples. Received: shape {self.windows.shape}. Extract noise first."
-            )
+        self.windows = _checked(windows)
 
     @classmethod
     def fit(cls, windows: np.ndarray) -> "WindowBootstrap":
@@ -43,15 +46,150 @@ class WindowBootstrap:
 
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws a series of any length without seams, float32 of shape `(num_samples,)`. The same seed gives the same series."""
-        rng, window = np.random.default_rng(seed), self.windows.shape[1]
-        fade = window // 4
-        hop = window - fade
-        lead = int(rng.integers(0, hop))  # a random beginning, so that every sample of the series has the same distribution
-        num_windows = -(-(num_samples + lead + fade) // hop)
-        rise = np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade)
-        weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]])
-        series = np.zeros(num_windows * hop + fade)
-        for number, drawn in enumerate(self.generate(num_windows, rng)):
-            series[number * hop : number * hop + window] += weights * drawn
-        begin = fade + lead
-        return series[begin : begin + num_samples].astype(np.float32)
+        rng = np.random.default_rng(seed)
+        return _cross_faded(self.windows.shape[1], num_samples, rng, lambda starts: (self.generate(len(starts), rng), 0.0))
+
+
+class MatchedWindowBootstrap:
+    """Draws whole windows of real noise whose signal is similar to the one that the noise is added to.
+
+    The noise of many sensors depends on what they measure, and residuals contain errors of the enhancer, which do, too. A window of
+    noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
+    whose signal is the same. The distance of two signals is that of their means over 64 segments. This is the nearest-neighbour
+    bootstrap of Lall and Sharma (1996), with the number of neighbours that they recommend and equal weights.
+
+    In a longer series, the mean of the candidates, which neighbouring windows have in common, is cross-faded with weights that add
+    up to one, and the rest as by `WindowBootstrap`.
+
+    Args:
+        windows: Windows of real noise, float32 of shape `(windows, samples)`.
+        signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`.
+
+    Raises:
+        InputError: If there is no window, a value is not finite, or the numbers of windows differ.
+    """
+
+    follows_signal = True
+
+    def __init__(self, windows: np.ndarray, signals: np.ndarray):
+        self.windows, self.signals = _checked(windows), np.asarray(signals, np.float32)
+        expected = (len(self.windows), min(_NUM_SEGMENTS, self.windows.shape[1]))
+        if self.signals.shape != expected or not np.isfinite(self.signals).all():
+            raise InputError(f"Expected the finite signal of each window, shape {expected}. Received: shape {self.signals.shape}.")
+
+    @classmethod
+    def fit(cls, windows: np.ndarray, signal_windows: np.ndarray) -> "MatchedWindowBootstrap":
+        """Stores noise windows, and the signal below them, both of shape `(windows, samples)`."""
+        return cls(windows, _segment_means(signal_windows, np.shape(windows)))
+
+    @property
+    def scale(self) -> float:
+        """Standard deviation of the noise."""
+        return float(np.std(self.windows, dtype=np.float64))
+
+    def generate(self, num_windows: int, seed: int | np.random.Generator, signal_windows: np.ndarray) -> np.ndarray:
+        """Draws windows. The same seed gives the same windows.
+
+        Args:
+            num_windows: Number of windows.
+            seed: Seed, or a random number generator, whose state advances.
+            signal_windows: The signal that the noise is added to, shape `(num_windows, samples)`, in the unit of the fit.
+
+        Returns:
+            float32 array of shape `(num_windows, samples)`.
+        """
+        drawn, _ = self._draw(signal_windows, num_windows, np.random.default_rng(seed), with_mean=False)
+        return drawn
+
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator, signal: np.ndarray) -> np.ndarray:
+        """Draws a series of any length without seams. The same seed gives the same series.
+
+        Args:
+            num_samples: Length of the series.
+            seed: Seed, or a random number generator, whose state advances.
+            signal: The signal that the noise is added to, shape `(num_samples,)`, in the unit of the fit.
+
+        Returns:
+            float32 array of shape `(num_samples,)`.
+        """
+        rng, window, signal = np.random.default_rng(seed), self.windows.shape[1], np.asarray(signal, np.float32)
+        if signal.shape != (num_samples,):
+            raise InputError(f"Expected the enhanced signal of shape {(num_samples,)}, which this noise follows. Received: {signal.shape}.")
+
+        def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)]
+            return self._draw(below, len(starts), rng, with_mean=True)
+
+        return _cross_faded(window, num_samples, rng, draw)
+
+    def _draw(
+        self, signal_windows: np.ndarray, number: int, rng: np.random.Generator, with_mean: bool
+    ) -> tuple[np.ndarray, np.ndarray | float]:
+        """Draws windows, and computes the mean of the windows that each was drawn from."""
+        from sklearn.metrics.pairwise import euclidean_distances
+
+        window, choices = self.windows.shape[1], rng.random(number)
+        wanted = _segment_means(signal_windows, (number, window)).astype(np.float64)
+        centre = self.signals.mean(axis=0, dtype=np.float64)
+        known, wanted = self.signals - centre, wanted - centre  # smaller numbers, smaller rounding errors
+        nearest = math.ceil(math.sqrt(len(known)))
+        equal = _EQUAL**2 * known.shape[1] * np.var(self.signals, dtype=np.float64)
+        drawn, means = np.empty((number, window), np.float32), np.empty((number if with_mean else 0, window), np.float32)
+        for begin in range(0, number, max(1, _BATCH // len(known))):
+            rows = slice(begin, begin + max(1, _BATCH // len(known)))
+            apart = euclidean_distances(wanted[rows], known, squared=True)
+            reach = np.maximum(np.partition(apart, nearest - 1, axis=1)[:, nearest - 1], equal)
+            is_near = apart <= reach[:, None]
+            counts = is_near.sum(axis=1)
+            wanted_rank = np.floor(choices[rows] * counts).astype(int)
+            drawn[rows] = self.windows[np.argmax(np.cumsum(is_near, axis=1) > wanted_rank[:, None], axis=1)]
+            if with_mean:
+                means[rows] = (is_near.astype(np.float32) @ self.windows) / counts[:, None]
+        return drawn, means if with_mean else 0.0
+
+
+def _checked(windows: np.ndarray) -> np.ndarray:
+    """Returns windows of noise as float32."""
+    windows = np.asarray(windows, np.float32)
+    if windows.ndim != 2 or windows.shape[0] < 1 or windows.shape[1] < 4 or not np.isfinite(windows).all():
+        raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {windows.shape}. Extract noise first.")
+    return windows
+
+
+def _segment_means(signal_windows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Returns the means of signals over segments of nearly equal length, shape `(windows, segments)`."""
+    if signal_windows is None or np.shape(signal_windows) != shape:
+        raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal_windows)}.")
+    edges = np.linspace(0, shape[1], min(_NUM_SEGMENTS, shape[1]) + 1).astype(int)
+    return np.add.reduceat(np.asarray(signal_windows, np.float64), edges[:-1], axis=1).astype(np.float32) / np.diff(edges).astype(
+        np.float32
+    )
+
+
+def _cross_faded(
+    window: int, num_samples: int, rng: np.random.Generator, draw: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | float]]
+) -> np.ndarray:
+    """Joins windows of noise to a series without seams.
+
+    Args:
+        window: Length of a window in samples.
+        num_samples: Length of the series.
+        rng: Draws where the first window begins, so that every sample of the series has the same distribution.
+        draw: Draws windows, given where they begin in the series, and what neighbouring windows have in common.
+
+    Returns:
+        float32 array of shape `(num_samples,)`.
+    """
+    fade = window // 4
+    hop = window - fade
+    lead = int(rng.integers(0, hop))
+    num_windows = -(-(num_samples + lead + fade) // hop)
+    rise = np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade)
+    weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]])
+    begin = fade + lead
+    drawn, common = draw(hop * np.arange(num_windows) - begin)
+    pieces = weights * (drawn - common) + weights**2 * common  # the squares of the weights of two neighbours add up to one
+    series = np.zeros(num_windows * hop + fade)
+    for number, piece in enumerate(pieces):
+        series[number * hop : number * hop + window] += piece
+    return series[begin : begin + num_samples].astype(np.float32)

@@ -7,12 +7,12 @@ import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, compare, sentence_of
+from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, compare, pieces_of, sentence_of
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import BY_OPTION
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -92,11 +92,29 @@ def test_a_quantised_channel_is_judged_with_its_levels():
 def test_a_classifier_sees_disjoint_windows_and_pieces_of_them():
     rows = np.arange(9)[:, None] * 30 + np.arange(90.0)  # windows of 90 samples that begin every 30 samples
     windows = NoiseWindows(rows, rows, 30 * np.arange(9))
-    np.testing.assert_array_equal(windows.disjoint, rows[[0, 3, 6]])
-    generated, learnt, judged = compare(-rows, windows, windows)
-    assert generated.shape == learnt.shape == (15, 18)  # five pieces each: shorter ones would have fewer than 16 samples
-    np.testing.assert_array_equal(np.sort(learnt.ravel()), np.arange(270.0))
-    np.testing.assert_array_equal(learnt, judged)
+    np.testing.assert_array_equal(windows.disjoint.noise, rows[[0, 3, 6]])
+    np.testing.assert_array_equal(NoiseWindows(rows[::-1], rows, 30 * np.arange(9)[::-1]).disjoint.noise, rows[[0, 3, 6]])
+    generated, learnt, judged = pieces_of(NoiseWindows(-rows, rows), windows, windows)
+    assert generated.noise.shape == learnt.noise.shape == (15, 18)  # five pieces each: shorter ones would have fewer than 16 samples
+    np.testing.assert_array_equal(np.sort(learnt.noise.ravel()), np.arange(270.0))
+    np.testing.assert_array_equal(learnt.noise, judged.noise)
+    np.testing.assert_array_equal(generated.noise, -generated.clean)
+    assert [each.shape for each in compare(windows, windows, windows)] == [(15, 24)] * 3  # in 18 samples, there are six frequency bands
+
+
+@pytest.mark.usefixtures("no_networks")
+def test_noise_that_follows_the_signal_gets_windows_that_match_it():
+    clean = np.sin(2 * np.pi * np.arange(24_000) / 40)
+    noise = 0.2 * (1.1 + clean) * np.random.default_rng(0).standard_normal(24_000)
+    simulator = fit(Telemetry((clean + noise).astype(np.float32), name="volts"))
+    assert type(simulator.noise) is MatchedWindowBootstrap
+    rows = {each["name"]: each for each in simulator.trained["noise_ladder"]}
+    assert rows["residual windows"]["auc"] > 0.8 > 0.65 > rows["matched residual windows"]["auc"]
+    windows = simulator.generate_clean(2_000, seed=1)
+    drawn = simulator.draw_noise(windows, 1)
+    for level in (-0.9, 0.0, 0.9):  # the scale is that of the process at each level of the signal
+        there = np.abs(windows - level) < 0.1
+        assert drawn[there].std() == pytest.approx(0.2 * (1.1 + level), rel=0.15, abs=0.03)
 
 
 @pytest.mark.usefixtures("no_networks")

@@ -1,9 +1,9 @@
-"""Residual windows drawn again: whole windows stay real, and a series has the same scale at its seams as elsewhere."""
+"""Residual windows drawn again: whole windows stay real, a series has the same scale at its seams, and noise can follow the signal."""
 
 import numpy as np
 import pytest
 
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 
 
 def ar1(num_windows, window, coefficient=0.9, seed=0):
@@ -51,3 +51,79 @@ def test_same_seed_same_noise():
 def test_unusable_windows_are_refused(refused, windows):
     with refused("windows of noise"):
         WindowBootstrap(windows)
+
+
+def sines(num_windows, window, seed=0, period=40):
+    """Windows of a sine that begin at random phases."""
+    begins = np.random.default_rng(seed).integers(0, period, num_windows)
+    return np.sin(2 * np.pi * (begins[:, None] + np.arange(window)) / period)
+
+
+def loud_where_high(signal, seed=1):
+    """White noise of standard deviation 1.1 + signal."""
+    return (1.1 + signal) * np.random.default_rng(seed).standard_normal(np.shape(signal))
+
+
+def test_matched_windows_are_real_ones_of_the_nearest_signals():
+    signal, windows = sines(400, 80), np.random.default_rng(2).standard_normal((400, 80)).astype(np.float32)
+    drawn = MatchedWindowBootstrap.fit(windows, signal).generate(400, 3, signal)
+    rows = [np.flatnonzero((windows == each).all(axis=1))[0] for each in drawn]
+    apart = np.abs(
+        np.angle(np.exp(2j * np.pi * (np.array([np.argmax(each[:40]) for each in signal[rows]]) - signal[:, :40].argmax(axis=1)) / 40))
+    )
+    assert apart.max() <= 1.01 * 2 * np.pi * 2 / 40  # 20 of 400 windows: at most two of 40 phases away
+    assert len(set(rows)) > 150  # of 400 draws with replacement, 253 are expected to differ
+
+
+def test_matched_noise_follows_the_signal_and_whole_windows_do_not():
+    signal = sines(2_000, 80)
+    noise, new = loud_where_high(signal), sines(3_000, 80, seed=5)
+    matched = MatchedWindowBootstrap.fit(noise, signal).generate(3_000, 3, new)
+    whole = WindowBootstrap(noise).generate(3_000, 3)
+    for low, high in ((-1, -0.8), (-0.1, 0.1), (0.8, 1)):
+        there = (new >= low) & (new <= high)
+        truth = np.sqrt(np.mean((1.1 + new[there]) ** 2))
+        assert matched[there].std() == pytest.approx(truth, rel=0.15 if low > -0.5 else 0.5)
+        assert whole[there].std() == pytest.approx(noise.std(), rel=0.05)
+
+
+def test_a_matched_series_keeps_scale_and_mean_across_seams():
+    signal = sines(2_000, 80)
+    error = 0.5 * np.cos(2 * np.pi * np.arange(4_000) / 40)  # of the enhancer: the same in every period
+    series_signal = np.sin(2 * np.pi * np.arange(4_000) / 40)
+    windows = loud_where_high(signal) + 0.5 * np.gradient(signal, axis=1) * 40 / (2 * np.pi)
+    noise = MatchedWindowBootstrap.fit(windows, signal)
+    series = np.stack([noise.generate_series(4_000, seed, series_signal) for seed in range(60)])
+    # sums of squared weights are one, so that neither the scale nor the error of the enhancer is larger at seams
+    assert np.abs(series.mean(axis=0) - error).max() < 0.3 * 4  # standard error at the loudest phase: 0.27
+    assert np.polyfit(error, series.mean(axis=0), 1)[0] == pytest.approx(1, abs=0.05)
+    spread = series.reshape(60, 100, 40).std(axis=(0, 1))
+    np.testing.assert_allclose(spread, 1.1 + series_signal[:40], atol=0.12)
+
+
+def test_where_all_signals_are_equal_every_window_can_be_drawn():
+    windows = ar1(50, 40)
+    for signal in (np.zeros((50, 40)), np.tile(np.sin(np.arange(40.0)), (50, 1))):
+        drawn = MatchedWindowBootstrap.fit(windows, signal).generate(1_000, 0, np.repeat(signal[:1], 1_000, axis=0))
+        assert len(np.unique(drawn, axis=0)) == 50
+
+
+def test_matched_noise_has_the_same_seed_the_same_noise():
+    signal = sines(30, 40)
+    noise = MatchedWindowBootstrap.fit(ar1(30, 40), signal)
+    np.testing.assert_array_equal(noise.generate(30, 5, signal), noise.generate(30, 5, signal))
+    np.testing.assert_array_equal(noise.generate_series(90, 5, signal.ravel()[:90]), noise.generate_series(90, 5, signal.ravel()[:90]))
+    assert not np.array_equal(noise.generate(30, 5, signal), noise.generate(30, 6, signal))
+
+
+def test_a_signal_of_another_shape_is_refused(refused):
+    noise = MatchedWindowBootstrap.fit(ar1(30, 40), sines(30, 40))
+    for draw in (
+        lambda: noise.generate(3, 0, None),
+        lambda: noise.generate(3, 0, sines(4, 40)),
+        lambda: noise.generate_series(90, 0, np.zeros(80)),
+        lambda: MatchedWindowBootstrap.fit(ar1(30, 40), None),
+        lambda: MatchedWindowBootstrap(ar1(30, 40), np.zeros((29, 40))),
+    ):
+        with refused("signal"):
+            draw()

@@ -92,8 +92,9 @@ def fit_run_model(
     ladder = fit_ladder(*windows, RUNGS, options.seed, options.epochs, refit="chosen", wanted=options.enhancer)
     rung = ladder.rungs[ladder.chosen]
     residuals = held_out_residuals(learnt, windows, ladder.edges, ladder.before_refit[ladder.chosen], options.seed, options.epochs)
+    below = list(zip(residuals, _clean_below(residuals, learnt), strict=True))
     levels = Levels.find(np.concatenate([pair.telemetry.values for pair in learnt]))
-    noise, judged_noise, noted = _fit_noise(residuals, learnt, rung, levels, window, options, verbose, progress)
+    noise, judged_noise, noted = _fit_noise(below, rung, levels, window, options, verbose, progress)
     notes += noted
     coverage = Coverage.fit(windows[0], windows[2], rung.scaling)
     trained = {
@@ -109,7 +110,7 @@ def fit_run_model(
         rung, noise, coverage, nominal, window, delay.seconds, None if isinstance(coarse, Recording) else coarse, trained, levels
     )
     judged = end if options.held_out and end else learnt
-    return model, _report(model, ladder, judged, bool(options.held_out and end), residuals, notes, options, windows)
+    return model, _report(model, ladder, judged, bool(options.held_out and end), below, notes, options, windows)
 
 
 def _default_window(num_samples: float) -> int:
@@ -181,8 +182,7 @@ def split_pairs(pairs: Sequence[Pair], share: float) -> tuple[list[Pair], list[P
 
 
 def _fit_noise(
-    residuals: Sequence[Telemetry],
-    pairs: Sequence[Pair],
+    residuals: Sequence[tuple[Telemetry, Telemetry]],
     rung: Rung,
     levels: Levels | None,
     window: int,
@@ -190,29 +190,26 @@ def _fit_noise(
     verbose: int | str,
     progress: Progress,
 ) -> tuple[Any, list[dict[str, Any]], list[str]]:
-    """Fits the noise model to held-out residuals; returns it with the judgements of all rungs and what is to be said about it."""
+    """Fits the noise model to held-out residuals, each with the enhanced run below it.
+
+    Returns:
+        The noise model, the judgements of all rungs, and what is to be said about it.
+    """
     # `score --coarse` judges the difference from the enhanced run, so the detectors see the noise alone
     training = NoiseTraining(
         options.num_iterations, options.seed, rung.scaling.scale_target, levels, with_signal=False, verbose=verbose, progress=progress
     )
-    clean = _clean_below(residuals, pairs)
     notes: list[str] = []
-
-    def cut(some: Sequence[tuple[Telemetry, Telemetry]], starts: np.ndarray) -> NoiseWindows:
-        windows = (cut_windows_from_parts([each[which] for each in some], starts, window)[0] for which in (0, 1))
-        return NoiseWindows(*windows, np.sort(starts))
-
-    both = list(zip(residuals, clean, strict=True))
-    everything = cut(both, random_window_starts(residuals, window, options.num_windows, np.random.default_rng([options.seed, 1])))
+    noise = [each for each, _ in residuals]
+    everything = _cut(residuals, random_window_starts(noise, window, options.num_windows, np.random.default_rng([options.seed, 1])), window)
     if not np.std(everything.noise, dtype=np.float64) > 0:  # networks cannot learn noise of size 0
         return WindowBootstrap(everything.noise), [], notes
     if options.noise != BEST:
         return fit_noise(options.noise, everything, training, notes), [], notes
-    halves = []
-    for some in zip(*(split_end(each, JUDGED_SHARE) for each in (residuals, clean)), strict=True):
-        usable = [each for each in zip(*some, strict=True) if len(each[0]) >= window]
-        starts = evenly_spaced_starts([each[0] for each in usable], window, options.num_windows) if usable else []
-        halves.append(cut(usable, starts) if usable else NoiseWindows(*np.zeros((2, 0, window), np.float32), np.zeros(0, int)))
+    halves = [
+        _evenly_spaced(list(zip(*some, strict=True)), window, options.num_windows)
+        for some in zip(*(split_end(each, JUDGED_SHARE) for each in zip(*residuals, strict=True)), strict=True)
+    ]
     return *choose_noise(*halves, everything, training, notes), notes
 
 
@@ -243,7 +240,7 @@ def _report(
     ladder: Ladder,
     judged: Sequence[Pair],
     is_held_out: bool,
-    residuals: Sequence[Telemetry],
+    residuals: Sequence[tuple[Telemetry, Telemetry]],
     notes: Sequence[str],
     options: RunOptions,
     windows: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -274,31 +271,36 @@ def _report(
         is_held_out,
         len(target),
         {name: _rms(np.concatenate(each) - target) / deviation for name, each in (("coarse", coarse), ("enhanced", enhanced))},
-        compare_noise([part.values for part in residuals], generated),
+        compare_noise([part.values for part, _ in residuals], generated),
         float(np.mean(alarms)),
         float(np.mean(outside)),
         tuple(model.trained["noise_ladder"]),
         options.noise,
-        _noise_auc(model, judged, left, [part.values for part in residuals], options.seed),
+        _noise_auc(model, residuals, list(zip(map(Telemetry, left), map(Telemetry, enhanced), strict=True)), options.seed),
         judged[0].telemetry.unit,
         {"coarse": coarse[0][:shown], "enhanced": enhanced[0][:shown], "real": judged[0].telemetry.values[:shown], "generated": copy},
     )
 
 
 def _noise_auc(
-    model: RunModel, judged: Sequence[Pair], left: Sequence[np.ndarray], learnt: Sequence[np.ndarray], seed: int
+    model: RunModel, learnt: Sequence[tuple[Telemetry, Telemetry]], left: Sequence[tuple[Telemetry, Telemetry]], seed: int
 ) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out residuals; empty if there are too few windows."""
-
-    def windows_of_residuals(parts: Sequence[np.ndarray]) -> NoiseWindows:
-        parts = [Telemetry(values) for values in parts if len(values) >= model.window]
-        starts = evenly_spaced_starts(parts, model.window, MOST_JUDGED) if parts else np.zeros(0, int)
-        windows = cut_windows_from_parts(parts, starts, model.window)[0] if parts else np.zeros((0, model.window), np.float32)
-        return NoiseWindows(windows, windows, starts)
-
-    real = [windows_of_residuals(parts) for parts in (learnt, left)]
+    real = [_evenly_spaced(residuals, model.window, MOST_JUDGED) for residuals in (learnt, left)]
     clean = np.concatenate([*model.nominal_chunks(MOST_JUDGED, np.random.default_rng([seed, 8]))])
-    return auc_of(model.add_noise(clean, np.random.default_rng([seed, 9])) - clean, *real, seed)
+    return auc_of(NoiseWindows(model.add_noise(clean, np.random.default_rng([seed, 9])) - clean, clean), *real, seed)
+
+
+def _evenly_spaced(residuals: Sequence[tuple[Telemetry, Telemetry]], window: int, num_windows: int) -> NoiseWindows:
+    """Returns windows of residuals in the order of time, or none if no part is long enough."""
+    usable = [each for each in residuals if len(each[0]) >= window]
+    if not usable:
+        return NoiseWindows(*np.zeros((2, 0, window), np.float32), np.zeros(0, int))
+    return _cut(usable, evenly_spaced_starts([each for each, _ in usable], window, num_windows), window)
+
+
+def _cut(residuals: Sequence[tuple[Telemetry, Telemetry]], starts: np.ndarray, window: int) -> NoiseWindows:
+    return NoiseWindows(*(cut_windows_from_parts([each[which] for each in residuals], starts, window)[0] for which in (0, 1)), starts)
 
 
 def _one_run(model: RunModel, pair: Pair) -> Recording:

@@ -15,7 +15,7 @@ from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, noise_file, read_ar
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.scaling import Scaling
 from enhsim_tf.noise.states import state_of
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def _model_from(folder: Path, networks: Mapping[str, Any], settings: Mapping[str
     coarse = SquareWaveSimulator.from_config(kept["config"]) if kept.get("kind") == "square waves" else None
     rung = Rung(str(settings["rung"]), networks["enhancer"], scaling)
     columns = len(nominal.columns)
-    if isinstance(noise, WindowBootstrap) and noise.windows.shape[1] != window:
+    if isinstance(noise, WindowBootstrap | MatchedWindowBootstrap) and noise.windows.shape[1] != window:
         raise ValueError("noise of another window length than the settings say")
     shapes = rung.network.input_shape[1:], rung.network.output_shape[1:], np.shape(scaling.input_scale)
     if shapes != ((window * columns,), (window,), (columns,)) or not (np.isfinite(coverage.limit) and coverage.limit > 0):

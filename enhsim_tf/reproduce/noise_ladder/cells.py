@@ -14,8 +14,9 @@ import numpy as np
 
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator import noise_choice
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseTraining, NoiseWindows
 from enhsim_tf.noise import ladder
+from enhsim_tf.noise.rung_names import BY_OPTION, STREAMS
 from enhsim_tf.reproduce.noise_ladder.findings import REAL
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 from enhsim_tf.reproduce.settings import Settings
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLES = ("detectors", "realism", "choice")
-JUDGED = 1_000  # held-out windows on which a rung is chosen
+OPTIONS = {rung: option for option, rung in BY_OPTION.items()}
 
 
 class Cell:
@@ -89,13 +90,12 @@ class Cell:
         else:
             number_of_iterations = chosen.ladder.gan_iterations if "GAN" in rung else chosen.ladder.num_iterations
             model = ladder.RUNGS[rung](self.learnt["noise"], self.learnt["truth"], number_of_iterations, seed)
-            draws = np.random.default_rng([seed, list(ladder.RUNGS).index(rung), 71])
+            draws = np.random.default_rng([seed, STREAMS[OPTIONS[rung]], 71])
             waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
             generated = ladder.generate(model, len(held_out), draws, more)
-            judge, below = self._judge
-            choice = [dataclasses.asdict(judge.judge(rung, ladder.generate(model, len(below), draws, below)))]
+            choice = [dataclasses.asdict(dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung))]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
         rates = evaluation.false_alarm_rates(judged["alarms"])
         detectors = [
@@ -115,13 +115,11 @@ class Cell:
         self.stages.tell(f"  {rung:24} false alarms {np.mean(list(rates.values())):.2%}")
 
     @functools.cached_property
-    def _judge(self) -> tuple[noise_choice.NoiseJudge, np.ndarray]:
-        """Judges rungs as `fit` would: on held-out windows of the same telemetry; and the clean windows below generated noise."""
-        judged = self._with_noise("calibration", min(JUDGED, self.settings.ladder.num_windows), "ladder, judged")
-        learnt = {name: values[: len(judged["noise"])] for name, values in self.learnt.items()}
-        clean = self.data.windows("train", len(judged["noise"]), "ladder, judged, waves")["truth"]
-        signals = (clean, learnt["truth"], judged["truth"])
-        return noise_choice.NoiseJudge(learnt["noise"], judged["noise"], signals, seed=self.settings.seed), clean
+    def _judge(self) -> HeldOutJudge:
+        """Judges noise models as `fit` does, by windows of the same telemetry that they have not seen."""
+        held_out = self._with_noise("calibration", min(MOST_JUDGED, self.settings.ladder.num_windows), "ladder, judged")
+        learnt, judged = (NoiseWindows(each["noise"], each["truth"], each["start"]) for each in (self.learnt, held_out))
+        return HeldOutJudge(learnt, judged, NoiseTraining(0, self.settings.seed, to_unit=lambda clean: clean))
 
     @functools.cached_property
     def trial(self) -> evaluation.Trial:
