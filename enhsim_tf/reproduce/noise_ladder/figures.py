@@ -19,6 +19,7 @@ _MARKS = {
     "GAN of the paper": ("x", GENERATED, GENERATED),
     "convolutional GAN": ("+", GENERATED, GENERATED),
     "residual windows": ("D", QUIET, "none"),
+    "matched residual windows": ("d", QUIET, QUIET),
     "autoregressive network": ("o", ENHANCED, ENHANCED),
     "real": ("|", REAL, REAL),
 }

@@ -28,6 +28,9 @@ REVISED = ("quantised",)  # unseen families for which a model was changed after 
 MAX_RECALL_DIFFERENCE = 0.03
 MAX_REALISM_RATIO = 3.0
 MAX_REGRET = 0.005  # by which the excess of the chosen rung may be above that of the best rung
+PRESENT, FIRST = "present", "first"
+"""The rules of the choice. The classifier of the first one saw the noise alone, in windows that overlap."""
+NEWEST = "matched residual windows"  # the rung that came with the present rule: seeds without it were judged by the first one
 
 
 def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
@@ -37,8 +40,10 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         tables: The tables of `KEPT`.
 
     Returns:
-        For each family, its half, its seeds, each rung's false-alarm rate, excess, recall, share of realism measures within
-        `MAX_REALISM_RATIO` times their floor and those beyond it (mean over seeds), the chosen rung, those that pass the rule, and the best one; and whether each limit is kept.
+        For each family, its half, its seeds, each rung's seeds, false-alarm rate, excess, recall, share of realism measures within
+        `MAX_REALISM_RATIO` times their floor and those beyond it (means over seeds); and for each seed, the rule
+        that judged it, the chosen rung, those that pass, and the best one. And whether each limit is kept. Rungs are compared with
+        real windows of their own seeds.
     """
     detectors, realism, choice = (tables[name] for name in ("detectors", "realism", "choice"))
     families = {}
@@ -49,14 +54,21 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
             rows = own[own["rung"] == rung]
             if rows.empty:
                 continue
-            rate = (rows["alarms"] / rows["windows"]).groupby(rows["seed"]).mean()
+            by_seed = _by_seed(rows)
+            real = _by_seed(own[own["rung"] == REAL]).loc[by_seed.index]
+            rate = by_seed["rate"]
             measured = realism[(realism["family"] == family) & (realism["rung"] == rung)]
             ratios, by_measure = measured["ratio"], measured.groupby("measure")["ratio"].mean()
             rungs[rung] = {
                 "alarms": float(rate.mean()),
                 "alarms_range": [float(rate.min()), float(rate.max())],
-                "recall": float(rows["recall"].mean()),
-                "recall_at_real_rate": float(rows["recall_at_real_rate"].mean()),
+                "seeds": [int(seed) for seed in by_seed.index],
+                "excess": float((rate - real["rate"]).mean()),
+                "excess_range": [float((rate - real["rate"]).min()), float((rate - real["rate"]).max())],
+                "recall": float(by_seed["recall"].mean()),
+                "recall_at_real_rate": float(by_seed["recall_at_real_rate"].mean()),
+                "recall_change": float((by_seed["recall"] - real["recall"]).mean()),
+                "recall_difference": float((by_seed["recall_at_real_rate"] - real["recall_at_real_rate"]).mean()),
                 "realism_within": float(np.mean(ratios <= MAX_REALISM_RATIO)),
                 "beyond": {
                     name: float(ratio)
@@ -66,24 +78,51 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
                     if not ratio <= MAX_REALISM_RATIO
                 },
             }
-        for values in rungs.values():
-            values["excess"] = values["alarms"] - rungs[REAL]["alarms"]
-            values["recall_difference"] = values["recall_at_real_rate"] - rungs[REAL]["recall_at_real_rate"]
-        learnt = {name: values for name, values in rungs.items() if name != REAL}
-        best = min(learnt, key=lambda name: learnt[name]["excess"])
-        judged = [_judgements(choice[(choice["family"] == family) & (choice["seed"] == seed)]) for seed in sorted(set(own["seed"]))]
-        chosen = [choose(each) for each in judged]
+        choices = [
+            _choice(choice[(choice["family"] == family) & (choice["seed"] == seed)], _by_rung(own[own["seed"] == seed]))
+            for seed in sorted(set(choice[choice["family"] == family]["seed"]))
+        ]
         families[family] = {
             "half": "looked at" if family in LOOKED_AT else "revised" if family in REVISED else "unseen",
             "seeds": sorted(int(seed) for seed in set(own["seed"])),
             "rungs": rungs,
-            "chosen": chosen,
-            "passing": [[rung.rung for rung in each if rung.passes] for each in judged],  # none: the smallest departure decides
-            "best": best,
-            "regret": float(np.mean([learnt[name]["excess"] for name in chosen]) - learnt[best]["excess"]),
+            "choices": choices,
         }
     seeds = sorted({seed for about in families.values() for seed in about["seeds"]})
     return {"families": families, "limits": _limits(families), "seeds": seeds}
+
+
+def _by_seed(rows: "pd.DataFrame") -> "pd.DataFrame":
+    """Means over the detectors of one family and rung, a row for each seed."""
+    return rows.assign(rate=rows["alarms"] / rows["windows"]).groupby("seed")[["rate", "recall", "recall_at_real_rate"]].mean()
+
+
+def _by_rung(rows: "pd.DataFrame") -> dict[str, float]:
+    """The false-alarm rate of each rung, mean over the detectors, of one family and seed."""
+    return rows.assign(rate=rows["alarms"] / rows["windows"]).groupby("rung")["rate"].mean().to_dict()
+
+
+def _choice(rows: "pd.DataFrame", rates: Mapping[str, float]) -> dict[str, Any]:
+    """What the rule chooses for one family and seed.
+
+    Args:
+        rows: The judgements.
+        rates: The false-alarm rate of each rung.
+
+    Returns:
+        The seed, the rule, the chosen rung, those that pass the rule (none: the smallest departure decides), the best rung, and by how much
+        more the detectors of the chosen rung alarm than those of the best one.
+    """
+    judged = _judgements(rows)
+    chosen, best = choose(judged), min((each.rung for each in judged), key=rates.__getitem__)
+    return {
+        "seed": int(rows["seed"].iloc[0]),
+        "rule": PRESENT if NEWEST in rates else FIRST,
+        "chosen": chosen,
+        "passing": [each.rung for each in judged if each.passes],
+        "best": best,
+        "regret": rates[chosen] - rates[best],
+    }
 
 
 def _judgements(rows: "pd.DataFrame") -> list[RungJudgement]:
@@ -120,11 +159,7 @@ def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> d
             name: about["recall_difference"] for name, about in learnt.items() if abs(about["recall_difference"]) > MAX_RECALL_DIFFERENCE
         },
         # few false alarms are no success where thresholds are so high that anomalies are missed
-        "lost": {
-            name: loss
-            for name, about in learnt.items()
-            if (loss := families[name]["rungs"][REAL]["recall"] - about["recall"]) > MAX_RECALL_DIFFERENCE
-        },
+        "lost": {name: loss for name, about in learnt.items() if (loss := -about["recall_change"]) > MAX_RECALL_DIFFERENCE},
         "of": len(learnt),
     }
     found["realism"] = {
@@ -134,15 +169,24 @@ def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> d
         "of": len(learnt),
         "by_model": {name: _realism_of(name, families) for name in (REAL, *RUNGS)},
     }
-    found["choice"] = {
-        "limit": MAX_REGRET,
-        "kept": sum(about["regret"] <= MAX_REGRET for about in families.values()),
-        "of": len(families),
-        "missed": {name: about["regret"] for name, about in families.items() if about["regret"] > MAX_REGRET},
-        "none_passes": [name for name, about in families.items() if not all(about["passing"])],
-        "learnt_passes": sum(all(rung in names for names in about["passing"]) for about in families.values()),
-    }
+    found["choice"], found["first_choice"] = (_choices(families, rule, rung) for rule in (PRESENT, FIRST))
     return found
+
+
+def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
+    """How far the detectors of what a rule chooses are from those of the best rung, in the mean over the seeds that it judged."""
+    judged = {name: [each for each in about["choices"] if each["rule"] == rule] for name, about in families.items()}
+    judged = {name: each for name, each in judged.items() if each}
+    regrets = {name: float(np.mean([each["regret"] for each in choices])) for name, choices in judged.items()}
+    return {
+        "limit": MAX_REGRET,
+        "kept": sum(regret <= MAX_REGRET for regret in regrets.values()),
+        "of": len(judged),
+        "seeds": sorted({each["seed"] for choices in judged.values() for each in choices}),
+        "missed": {name: regret for name, regret in regrets.items() if regret > MAX_REGRET},
+        "none_passes": [name for name, choices in judged.items() if not all(each["passing"] for each in choices)],
+        "learnt_passes": sum(all(rung in each["passing"] for each in choices) for choices in judged.values()),
+    }
 
 
 def _within(rung: str, families: dict[str, Any], limits: Mapping[str, float]) -> dict[str, int]:

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.noise.ladder import RUNGS
 from enhsim_tf.reproduce.noise_gallery import GALLERY
-from enhsim_tf.reproduce.noise_ladder.findings import REAL
+from enhsim_tf.reproduce.noise_ladder.findings import FIRST, PRESENT, REAL
 from enhsim_tf.reproduce.publish.results import fill_parts
 from enhsim_tf.reproduce.publish.wording import in_list
 
@@ -42,12 +43,13 @@ def fill_page(path: Path, noise: Findings | None = None, curve: Findings | None 
 
 def families(found: Findings) -> str:
     """The table of false-alarm rates, a row for each family and a column for each noise model, and what the families are."""
-    names = list(dict.fromkeys(name for about in found["families"].values() for name in about["rungs"]))
+    used = {name for about in found["families"].values() for name in about["rungs"]}
+    names = [name for name in (REAL, *RUNGS) if name in used]
     lines = [f"| family | half | {' | '.join(names)} | chosen by the rule |", "|---" * (len(names) + 3) + "|"]
     for family, about in sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at"):
         half = f"{about['half']} (see above)" if about["half"] == "revised" else about["half"]
         rates = [f"{about['rungs'][name]['alarms']:.1%}" if name in about["rungs"] else "" for name in names]
-        lines.append(f"| {family.replace('_', ' ')} | {half} | {' | '.join(rates)} | {', '.join(sorted(set(about['chosen'])))} |")
+        lines.append(f"| {family.replace('_', ' ')} | {half} | {' | '.join(rates)} | {', '.join(_chosen(about['choices']))} |")
     kinds = [f"- {family.replace('_', ' ')}: {_kind(family)}" for family in found["families"]]
     return "\n".join([_scope(found), "", *lines, "", "The families (AR(1): autoregressive of first order):", "", *kinds])
 
@@ -57,10 +59,33 @@ def _kind(family: str) -> str:
     return (inspect.getdoc(type(GALLERY[family])) or "").partition("\n")[0]
 
 
+def _chosen(choices: Sequence[Findings]) -> list[str]:
+    """The models that the present rule chooses, or the first rule where the present one has judged no seed."""
+    chosen = {rule: sorted({each["chosen"] for each in choices if each["rule"] == rule}) for rule in (PRESENT, FIRST)}
+    return chosen[PRESENT] or [f"{name} (first rule)" for name in chosen[FIRST]]
+
+
 def _scope(found: Findings) -> str:
-    seeds = found["seeds"]
-    which = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
-    return f"False alarms on nominal windows with real noise, thresholds set for 1 % ({which}, budget {found['budget']}):"
+    said = f"False alarms on nominal windows with real noise, thresholds set for 1 % ({_seeds(found['seeds'])}, budget {found['budget']}"
+    fewer = _fewer_seeds(found)
+    return f"{said}; {fewer}):" if fewer else f"{said}):"
+
+
+def _fewer_seeds(found: Findings) -> str:
+    """Which models have fewer seeds than the experiment, and which."""
+    by_model: dict[str, set[int]] = {}
+    for about in found["families"].values():
+        for name, values in about["rungs"].items():
+            by_model.setdefault(name, set()).update(values["seeds"])
+    fewer: dict[str, list[str]] = {}
+    for name, seeds in by_model.items():
+        if seeds != set(found["seeds"]):
+            fewer.setdefault(_seeds(sorted(seeds)), []).append(name)
+    return "; ".join(f"{in_list(names)}: {which} alone" for which, names in fewer.items())
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {in_list([str(seed) for seed in seeds])}"
 
 
 def limits(found: Findings) -> str:
@@ -87,18 +112,29 @@ def limits(found: Findings) -> str:
     lines.append(
         f"- Families on which each model stays within {100 * kept['looked at']['limit']:g} point of the real windows: {', '.join(strict)}."
     )
-    recall, realism, choice = kept["recall"], kept["realism"], kept["choice"]
+    recall, realism = kept["recall"], kept["realism"]
     lines += [
         f"- Recall at the real rate within {100 * recall['limit']:g} points of that after training on real windows: {recall['kept']} of "
         f"{recall['of']} families{_differences(recall['missed'])}.",
         f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows{_losses(recall['lost'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
         f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
-        f"- Excess of the chosen model within {100 * choice['limit']:g} points of that of the best model: {choice['kept']} of {choice['of']} "
-        f"families{_differences(choice['missed'])}. On {_families(choice['none_passes'])}, no model passes the rule, and the smallest departure decides. The "
-        f"{kept['rung']} passes on {choice['learnt_passes']} families.",
+        *(
+            _choice(kept[name], which, kept["rung"])
+            for name, which in (("choice", "present"), ("first_choice", "first"))
+            if kept[name]["of"]
+        ),
     ]
     return "\n".join([*lines, "", *_realism(realism["by_model"])])
+
+
+def _choice(choice: Findings, which: str, learnt: str) -> str:
+    """How far a rule's choice is from the best model."""
+    return (
+        f"- Excess of the model that the {which} rule chooses within {100 * choice['limit']:g} points of that of the best model ({_seeds(choice['seeds'])}): "
+        f"{choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. On {_families(choice['none_passes'])}, no model passes, and the "
+        f"smallest departure decides. The {learnt} passes on {choice['learnt_passes']} families."
+    )
 
 
 def _families(names: Sequence[str]) -> str:
