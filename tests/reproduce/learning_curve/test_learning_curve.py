@@ -41,7 +41,8 @@ def record(num_windows=12, noise=0.2, seed=0):
 
 
 def test_the_rungs_are_those_of_the_ladder():
-    assert {*CHEAP_RUNGS, *NETWORK_RUNGS} == set(command.RUNG_NAMES)
+    untried = {"matched residual windows"}  # in no environment of the curve does the noise depend on the signal
+    assert {*CHEAP_RUNGS, *NETWORK_RUNGS} | untried == set(command.RUNG_NAMES)
 
 
 def test_the_simulator_of_a_record_generates_its_signal_and_its_noise():
