@@ -76,7 +76,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--noise",
         choices=tuple(name.replace(" ", "-") for name in NOISES),
         default="best",
-        help="noise model (default: best, the simplest one that held-out telemetry does not tell from real noise); paper is the GAN of the paper",
+        metavar="MODEL",
+        help=f"noise model: {', '.join(name.replace(' ', '-') for name in NOISES)} (default: best, the simplest one that held-out telemetry does not "
+        "tell from real noise; paper: the GAN of the paper)",
     )
     fit.add_argument(
         "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"

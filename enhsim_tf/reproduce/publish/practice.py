@@ -5,7 +5,7 @@ sentence says so.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from enhsim_tf.reproduce.caption import in_seeds
@@ -23,6 +23,7 @@ LOUD = 0.5
 GOOD_ENOUGH = 0.9
 """Scores of one line are named whose area under the precision-recall curve is at least this share of the best one's."""
 FITTED, RESAMPLED = "simulator + autoregression", "simulator + residual windows"
+ONE_LINE = "moving deviation"
 """Arms of the experiment on the number of real windows."""
 
 
@@ -40,7 +41,11 @@ class Answer:
 
 
 def answers(
-    found: Findings, factorial: Findings | None = None, labelled: Findings | None = None, curve: Findings | None = None
+    found: Findings,
+    factorial: Findings | None = None,
+    labelled: Findings | None = None,
+    curve: Findings | None = None,
+    battery: Findings | None = None,
 ) -> dict[str, Answer]:
     """The five answers by question.
 
@@ -49,9 +54,10 @@ def answers(
         factorial: The findings of the factorial experiment, or None.
         labelled: The findings of the study of real telemetry, or None.
         curve: The findings of the experiment on the number of real windows, or None.
+        battery: The findings of the study of a battery, or None.
     """
     return {
-        "a clean simulator": _clean(found),
+        "a clean simulator": _clean(found, battery),
         "a linear map and resampled residuals": _linear(factorial, curve),
         "a network": _network(found, factorial),
         "generated noise": _noise(factorial, curve),
@@ -69,16 +75,18 @@ def evidence(answered: Mapping[str, Answer]) -> str:
     return "\n".join(f"- *{question.capitalize()}.* {answer.evidence}" for question, answer in answered.items() if answer.evidence)
 
 
-def _clean(found: Findings) -> Answer:
+def _clean(found: Findings, battery: Findings | None) -> Answer:
     coarse, truth, real = (found["arms"][name] for name in ("coarse", "truth", "real"))
     recall = {name: [about["recalls_at_real_rate"][name] for about in (truth, coarse, real)] for name in real["recalls_at_real_rate"]}
     perfect, square = ([name for name, each in recall.items() if each[place] >= each[2] - CLOSE] for place in (0, 1))
     kept = len(coarse["c8"]["kept"]) + len(truth["c8"]["kept"])
+    quiet, of_quiet = _little_noise(battery)
+    flagged = [per_cent(_mean_rate(arm, names)) for arm, names in ((truth, perfect), (coarse, square)) if names]
+    own = f"; with their own thresholds, these flag {in_list(flagged)} of real nominal windows" if flagged else ""
     sentence = (
-        "**A clean simulator suffices** only where thresholds are set on real windows, and then for few detectors: "
-        f"{len(perfect)} of {len(recall)} lose at most {points(CLOSE, 0)} point of recall if they are trained on a perfect but noiseless signal "
-        f"({in_list(perfect) or 'none'}), and {len(square)} if trained on the coarse simulator ({in_list(square) or 'none'}); with thresholds set on their own windows, these "
-        f"detectors flag {interval(truth['false_alarms'])} and {interval(coarse['false_alarms'])} of real nominal windows."
+        f"**A clean simulator suffices** {quiet}only with thresholds set on real windows and only for few detectors: {len(perfect)} of {len(recall)} lose at most "
+        f"{points(CLOSE, 0)} point of recall if they are trained on the perfect signal without noise ({in_list(perfect) or 'none'}), and {len(square)} if trained on the coarse "
+        f"simulator ({in_list(square) or 'none'}){own}."
     )
     shares = "; ".join(f"{name} {in_list([per_cent(share) for share in recall[name]])}" for name in perfect)
     behind = (
@@ -86,9 +94,51 @@ def _clean(found: Findings) -> Answer:
         f"C8 in {kept} of {2 * truth['c8']['of']} pairs of environment and detector. With thresholds set on real windows, detectors trained on the noiseless signal, on "
         f"the coarse simulator and on real telemetry find these shares of the anomalies: {shares + '; ' if shares else ''}all detectors "
         f"{per_cent(truth['recall_at_real_rate'])}, {per_cent(coarse['recall_at_real_rate'])} and "
-        f"{per_cent(real['recall_at_real_rate'])}. Telemetry with little noise was not tested."
+        f"{per_cent(real['recall_at_real_rate'])}. {_one_line(found, real['recalls_at_real_rate'])}{of_quiet}"
     )
     return Answer(sentence, behind)
+
+
+def _mean_rate(arm: Findings, names: Sequence[str]) -> float:
+    """The false-alarm rate at own thresholds, mean over the environments and the named detectors."""
+    rates = [about["detectors"][name] for about in arm["by_environment"].values() for name in names]
+    return sum(rates) / len(rates)
+
+
+def _one_line(found: Findings, real: Mapping[str, float]) -> str:
+    """Which detectors find less than the best score of one line, even after training on real telemetry."""
+    known = {name: about["recall_at_real_rate"] for name, about in found["controls"].items() if "recall_at_real_rate" in about}
+    best = max(known, key=known.__getitem__)
+    less = [name for name, recall in real.items() if recall < known[best]]
+    beyond = f"more than these detectors after training on real telemetry: {in_list(less)}" if less else "less than every detector"
+    return f"The best score of one line ({best}) finds {per_cent(known[best])}, {beyond}."
+
+
+def _little_noise(battery: Findings | None) -> tuple[str, str]:
+    """What a noiseless simulator is worth on telemetry whose noise is small: the beginning of the sentence, and its evidence."""
+    if battery is None:
+        return "", " Telemetry with little noise was not tested."
+    arms = [about["detectors"] for about in battery["regimes"].values()]
+    clean, enhanced, noisy, real = ("fine without noise", "enhanced", "enhanced + residuals drawn again", "real, 120 orbits")
+    shared = [name for name in arms[0][clean] if all(name in each[arm] for each in arms for arm in (clean, enhanced, noisy, real))]
+
+    def means(arm: str, measure: str) -> str:
+        values = [[each[arm][name][measure] for name in shared] for each in arms]
+        values = [[value["mean"] if isinstance(value, Mapping) else value for value in each] for each in values]
+        return in_list([per_cent(sum(each) / len(each)) for each in values])
+
+    alarms = {arm: means(arm, "false_alarms") for arm in (clean, enhanced, noisy, real)}
+    recall = {arm: means(arm, "recall_at_real_rate") for arm in (enhanced, noisy)}
+    said = (
+        f"where the noise is small, as on a battery (trained on a simulator without noise, detectors flag {alarms[clean]} of real nominal windows in two regimes); with the "
+        "four kinds of noise here, "
+    )
+    behind = (
+        f" In the two regimes of the [battery](battery.md) ({len(shared)} detectors), detectors flag {alarms[clean]} after training on the fine "
+        f"simulator without noise, {alarms[enhanced]} on the enhanced signal without noise, {alarms[noisy]} with its residuals added, and {alarms[real]} on 120 "
+        f"real orbits. Recall at the real rate is {recall[noisy]} with added residuals and {recall[enhanced]} without them."
+    )
+    return said, behind
 
 
 def _linear(factorial: Findings | None, curve: Findings | None) -> Answer:
@@ -192,14 +242,29 @@ def _few_windows(curve: Findings | None) -> tuple[str, str]:
     recall = [per_cent(arms[arm]["recall_at_real_rate"][str(least)], 0) for arm in (FITTED, "real")]
     clause = (
         f"where real windows are few and a fitted autoregression describes the noise: with {least} real windows of {first} noise, detectors flag {rates[FITTED]} of "
-        f"nominal windows, against {rates['real']} after training on these {least} windows"
+        f"nominal windows, against {rates['real']} after training on these {least} windows (brackets: 10 % and 90 % quantiles of the seeds)"
     )
     behind = (
         f"The autoregression, which is not a network, pays {where} ({in_seeds(curve['seeds'])}; in brackets the 10 % and 90 % quantiles over seeds; [details](noise.md)). "
         f"With {least} windows of {first} noise, resampled residual windows give {rates[RESAMPLED]}. Recall at a matched false-alarm rate is {in_list(recall)}, so most of "
-        "the gain is a better threshold. On the other noises no simulator pays. "
+        f"the gain is a better threshold.{_simpler(curve['environments'][first], str(least))} On the other noises no simulator pays. "
     )
     return clause, behind
+
+
+def _simpler(about: Findings, least: str) -> str:
+    """What else pays in an environment by the same rule, and what a score of one line finds there."""
+    pays = [arm for arm, numbers in about["pays"].items() if int(least) in numbers and arm != FITTED]
+    pays += [arm for arm, other in about["others_pay"].items() if int(least) in other["pays"]]
+    told = [f"{arm} ({per_cent(about['arms'][arm]['rate'][least])})" for arm in pays]
+    line = about["arms"].get(ONE_LINE)
+    said = f" By the same rule, these pay there, too: {in_list(told)}." if told else ""
+    if line is None:
+        return said
+    return (
+        f"{said} A score of one line ({ONE_LINE}) finds {per_cent(line['recall_at_real_rate'][least], 0)} at the matched rate, but flags "
+        f"{per_cent(line['rate'][least])} at a threshold set on so few windows."
+    )
 
 
 def _with_quantiles(arm: Mapping[str, Any], number: str) -> str:
@@ -244,7 +309,7 @@ def _nothing(labelled: Findings | None) -> Answer:
     )
     return Answer(
         sentence,
-        f"(Means over detectors, channels and {in_seeds(labelled['seeds'])}; fewest with *{quiet}*.){_without_told_apart(labelled, quiet, best)}"
+        f"(Means over detectors, channels and {in_seeds(labelled['seeds'])}; fewest with *{quiet}*.){_without_told_apart(labelled, quiet, best)}{_on_the_past(labelled)}"
         f"{_by_detector(labelled)} The area under the precision-recall curve "
         f"(AUC-PR) of the score of one line ({best}) is {controls[best]['auc_pr']:.2f}.{_residual(labelled)}",
     )
@@ -262,6 +327,19 @@ def _without_told_apart(labelled: Findings, quiet: str, best: str) -> str:
     )
 
 
+def _on_the_past(labelled: Findings) -> str:
+    """What simulated windows without noise are worth if the threshold is set on the real past instead."""
+    clean = [name for name in ("enhanced", "coarse") if "false_alarms_past" in labelled["arms"].get(name, {})]
+    told = [
+        f"*{name}* {per_cent(about['false_alarms_past']['mean'])} and {per_cent(about['found_past']['mean'], 0)}"
+        for name, about in ((name, labelled["arms"][name]) for name in ("real", *clean))
+        if "false_alarms_past" in about
+    ]
+    if not clean:
+        return ""
+    return f" With thresholds set on the real past, also for training windows without noise, false alarms and the share of sequences found are: {', '.join(told)}."
+
+
 def _by_detector(labelled: Findings) -> str:
     """For which detector generated telemetry helps most, and which detectors flag most windows whatever they are trained on."""
     arms = {name: about["by_detector"] for name, about in labelled["arms"].items() if name != DEGRADED_ARM}
@@ -274,7 +352,11 @@ def _by_detector(labelled: Findings) -> str:
     flags = [per_cent(about[most]["false_alarms"]) for about in (generated, real)]
     finds = [per_cent(about[most]["found_by_rate"][0], 0) for about in (generated, real)]
     rest = {name: about[most] for name, about in arms.items() if name not in ("real", GENERATED_ARM)}
-    same = [f"*{name}*" for name, about in rest.items() if about["found_by_rate"][0] >= generated[most]["found_by_rate"][0]]
+    same = [
+        f"*{name}* ({per_cent(about['false_alarms'])} flagged, AUC-PR {about['auc_pr']:.2f})"
+        for name, about in rest.items()
+        if about["found_by_rate"][0] >= generated[most]["found_by_rate"][0]
+    ]
     fewest = min((name for name in rest if " + " in name), key=lambda name: rest[name]["false_alarms"])
     ranked = max(arms, key=lambda name: arms[name][most]["auc_pr"])
     flagged = f" At least half of the windows are flagged with any training data by: {in_list(loud)}." if loud else ""
@@ -282,7 +364,7 @@ def _by_detector(labelled: Findings) -> str:
         f" These means hide two groups: after training on the real past, {nearly_all} of the combinations of detector, channel "
         f"and seed flag at least 99 % of the windows, and {few} at most 1 %."
         f"{flagged} The {most} gains most from generated telemetry (*{GENERATED_ARM}*): it flags {flags[0]} and finds {finds[0]} of the "
-        f"labelled sequences at {at} false alarms, against {flags[1]} and {finds[1]} after training on the real past."
+        f"labelled sequences at {at} false alarms, with an AUC-PR of {generated[most]['auc_pr']:.2f}, against {flags[1]} and {finds[1]} after training on the real past."
         f"{f' It finds as many after training on {in_list(same)}.' if same else ''} It flags fewest "
         f"windows with *{fewest}* ({per_cent(rest[fewest]['false_alarms'])}), and its AUC-PR is highest with *{ranked}* ({arms[ranked][most]['auc_pr']:.2f})."
     )

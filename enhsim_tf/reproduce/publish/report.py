@@ -44,6 +44,7 @@ def render(
     factorial: Findings | None = None,
     curve: Findings | None = None,
     noise: Findings | None = None,
+    battery: Findings | None = None,
     template: str = "report.md.jinja",
 ) -> str:
     """The report, or the file of its tables, as Markdown.
@@ -57,6 +58,7 @@ def render(
         factorial: The findings of the factorial experiment, or None if it was not run.
         curve: The findings of the experiment on the number of real windows, or None if it was not run.
         noise: The findings of the experiment on noise, or None if it was not run.
+        battery: The findings of the study of a battery, or None if it was not run.
         template: One of `PATHS`.
     """
     import jinja2
@@ -81,7 +83,7 @@ def render(
         "mean_of": mean_of,
         "capitalise": lambda text: text[:1].upper() + text[1:],
     }
-    answered = practice.answers(found, factorial, labelled, curve)
+    answered = practice.answers(found, factorial, labelled, curve, battery)
     settings, tried = make_settings(found["budget"]), [_tried(row) for row in tries]
     return environment.get_template(template).render(
         found=found,
@@ -117,7 +119,7 @@ def render_all(root: Path, found: Findings) -> dict[Path, str]:
         root: Folder of the project.
         found: The findings on robustness.
     """
-    others = (findings_of(root, name) for name in ("factorial", "learning_curve", "noise"))
+    others = (findings_of(root, name) for name in ("factorial", "learning_curve", "noise", "battery"))
     stored = findings_of(root, "labelled"), *(designs_of(root / path) for path in TABLES), timing_of(root), *others
     return {path: render(found, *stored, template=template) for template, path in PATHS.items()}
 
@@ -175,12 +177,12 @@ def report(found: Findings, root: Path) -> None:
     from enhsim_tf.reproduce.publish.results import fill_pages
     from enhsim_tf.reproduce.spacecraft import run
 
-    labelled, factorial, curve = (findings_of(root, name) for name in ("labelled", "factorial", "learning_curve"))
+    labelled, factorial, curve, battery = (findings_of(root, name) for name in ("labelled", "factorial", "learning_curve", "battery"))
     for path, text in render_all(root, found).items():
         make_folder(root / path.parent)
         with replace_file(root / path) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    parts = {"practice": practice.short(practice.answers(found, factorial, labelled, curve)), "robustness": table(found)}
+    parts = {"practice": practice.short(practice.answers(found, factorial, labelled, curve, battery)), "robustness": table(found)}
     if labelled is not None:
         parts["labelled"] = run.table(labelled)
         parts["residual"] = residual_table(labelled.get("residual", {}))

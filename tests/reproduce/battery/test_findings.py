@@ -15,7 +15,7 @@ from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
 from enhsim_tf.reproduce.battery.faults import ALL, SEVERITIES, SIZES
 from enhsim_tf.reproduce.battery.figures import FIGURES
 from enhsim_tf.reproduce.battery.findings import KEPT, lines, summarise
-from enhsim_tf.reproduce.battery.page import degraded_configurations, fill_page, parts_of, speed_penalty
+from enhsim_tf.reproduce.battery.page import _mean_errors, clean_signal, degraded_configurations, fill_page, parts_of, speed_penalty
 from enhsim_tf.reproduce.figure import save_all
 
 near = functools.partial(pytest.approx, rel=1e-4)  # tables hold float32
@@ -162,7 +162,7 @@ def test_the_committed_page_belongs_to_the_committed_tables():
     for name, part in parts_of(found).items():
         assert part in page, name
     text = Path("docs/what_holds.md").read_text()
-    assert degraded_configurations(found) in text and speed_penalty(found) in text
+    assert all(said(found) in text for said in (degraded_configurations, speed_penalty, clean_signal))
 
 
 def test_the_sentence_on_claim_c9_counts_cases_and_gives_the_verdict():
@@ -178,3 +178,17 @@ def test_the_sentence_on_claim_c9_counts_cases_and_gives_the_verdict():
 def test_the_sentence_on_claim_c2_compares_with_the_coarse_run():
     text = speed_penalty({"regimes": {"gentle": {"seconds": {"coarse simulator": 0.004, "paper's network": 0.001}}}})
     assert "to 1.25 times in the gentle regime (1.00 ms after 4.0 ms)" in text
+
+
+def test_the_sentence_on_claim_c3_gives_mean_and_range_of_the_detectors():
+    rates = {name: {"false_alarms": {"mean": rate}} for name, rate in (("a", 0.01), ("b", 0.04))}
+    text = clean_signal({"regimes": {"gentle": {"detectors": {"enhanced": rates}}}})
+    assert "flag 2.5 % (1.0 to 4.0 by detector) in the gentle regime, where" in text
+
+
+def test_the_mean_error_on_faults_names_simpler_enhancers_that_are_nearer():
+    names = ("coarse itself", "paper's network", "ridge, voltage", "ridge, voltage and current", "ridge, all columns")
+    errors = {name: [0.5, 0.5] for name in names} | {"ridge, voltage and current": [0.2, 0.1], "chosen": [0.1, 0.3]}
+    text = _mean_errors({"regimes": {"gentle": {"faults": {"a": errors}}}})
+    assert "ridge, voltage 0.5000; ridge, voltage and current 0.1500; ridge, all columns 0.5000; chosen 0.2000." in text
+    assert text.endswith("Nearer than *chosen* by more than 0.0005, of 2 cases: ridge, voltage and current, 1.")

@@ -156,7 +156,10 @@ def _curve(pays):
         name: {"rate": {"5": rate}, "low": {"5": rate / 2}, "high": {"5": 2 * rate}, "recall_at_real_rate": {"5": 0.7}}
         for name, rate in {practice.FITTED: 0.04, practice.RESAMPLED: 0.06, "real": 0.12}.items()
     }
-    return {"numbers": [5, 100], "seeds": [1, 2], "environments": {"white": {"pays": pays, "arms": rates}}}
+    rates["simulator + Gaussian"] = rates["CORAL"] = rates["real"]
+    line = {practice.ONE_LINE: {"rate": {"5": 0.2}, "recall_at_real_rate": {"5": 0.75}}}
+    others = {"CORAL": {"pays": [5]}, practice.ONE_LINE: {"pays": []}}
+    return {"numbers": [5, 100], "seeds": [1, 2], "environments": {"white": {"pays": pays, "others_pay": others, "arms": rates | line}}}
 
 
 def test_generated_noise_pays_where_the_fitted_autoregression_does():
@@ -170,7 +173,46 @@ def test_generated_noise_pays_where_the_fitted_autoregression_does():
         "pays with 5 and 100 windows on white noise (2 seeds; in brackets" in said.evidence
         and "residual windows give 6.0 % (3.0 to 12.0)" in said.evidence
     )
+    assert (
+        "By the same rule, these pay there, too: CORAL (12.0 %). A score of one line (moving deviation) finds 75 % at the matched rate"
+        in said.evidence
+    )
+    assert "but flags 20.0 % at a threshold set on so few windows" in said.evidence
+    both = practice.answers(robustness, curve=_curve({practice.FITTED: [5], "simulator + Gaussian": [5]}))["generated noise"]
+    assert "these pay there, too: simulator + Gaussian (12.0 %) and CORAL (12.0 %)" in both.evidence
     assert "**Generated noise** was not shown to pay" in practice.answers(robustness, curve=_curve({}))["generated noise"].sentence
+
+
+def test_a_clean_simulator_suffices_where_the_noise_is_small():
+    robustness = json.loads((KEPT.parent / "robustness" / "findings.json").read_text(encoding="utf-8"))
+    rates = {"fine without noise": 0.02, "enhanced": 0.03, "enhanced + residuals drawn again": 0.01, "real, 120 orbits": 0.04}
+    arms = {
+        arm: {name: {"false_alarms": {"mean": rate * times}, "recall_at_real_rate": 10 * rate} for name, times in (("a", 1), ("b", 3))}
+        for arm, rate in rates.items()
+    }
+    arms["real, 120 orbits"]["c"] = {"false_alarms": {"mean": 1.0}, "recall_at_real_rate": 1.0}  # not in all arms: left out
+    said = practice.answers(robustness, battery={"regimes": {"gentle": {"detectors": arms}, "hard": {"detectors": arms}}})[
+        "a clean simulator"
+    ]
+    assert (
+        "suffices** where the noise is small, as on a battery (trained on a simulator without noise, detectors flag 4.0 % and 4.0 %"
+        in said.sentence
+    )
+    assert (
+        "(2 detectors)" in said.evidence
+        and "2.0 % and 2.0 % with its residuals added, and 8.0 % and 8.0 % on 120 real orbits" in said.evidence
+    )
+    assert "Recall at the real rate is 10.0 % and 10.0 % with added residuals and 30.0 % and 30.0 % without them." in said.evidence
+    without = practice.answers(robustness)["a clean simulator"]
+    assert (
+        "suffices** only with thresholds set on real windows" in without.sentence
+        and "Telemetry with little noise was not tested." in without.evidence
+    )
+    # the named detectors alone, over the four environments
+    truth = robustness["arms"]["truth"]["by_environment"].values()
+    named = ("PCA residual", "limit check", "nearest neighbours")
+    share = sum(about["detectors"][name] for about in truth for name in named) / 12
+    assert f"with their own thresholds, these flag {100 * share:.1f} % and" in without.sentence
 
 
 def test_generated_noise_pays_nowhere_if_no_noise_model_was_fitted_to_few_windows():
@@ -198,5 +240,7 @@ def test_committed_findings_come_from_the_committed_table(near):
     assert (KEPT / TABLE).stat().st_size < 400_000
     root = KEPT.parents[1]
     assert factorial_text.page_part(kept) in (root / "docs" / "what_holds.md").read_text(encoding="utf-8")
-    robustness, labelled, curve = (report.findings_of(root, name) for name in ("robustness", "labelled", "learning_curve"))
-    assert practice.short(practice.answers(robustness, kept, labelled, curve)) in (root / "README.md").read_text(encoding="utf-8")
+    robustness, labelled, curve, battery = (
+        report.findings_of(root, name) for name in ("robustness", "labelled", "learning_curve", "battery")
+    )
+    assert practice.short(practice.answers(robustness, kept, labelled, curve, battery)) in (root / "README.md").read_text(encoding="utf-8")
