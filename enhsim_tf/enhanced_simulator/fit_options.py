@@ -3,16 +3,16 @@
 import dataclasses
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.noise.rung_names import BY_OPTION
+from enhsim_tf.noise.rung_names import BEST, BY_OPTION
 
 ENHANCERS = ("coarse", "ridge", "ridge and network", "network")  # rungs of `enhancer.ladder` for windows at their own level and gain
-NOISES = ("best", *BY_OPTION)
+NOISES = (BEST, *BY_OPTION)
 FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
 
 
 @dataclasses.dataclass(frozen=True)
 class FitOptions:
-    """Settings for fitting a simulator to a channel.
+    """Settings for fitting a simulator to a channel. The defaults are those of the command `fit`.
 
     Args:
         window: Length of a window in samples. None uses two periods, limited to 64 to 500 samples.
@@ -20,12 +20,12 @@ class FitOptions:
         epochs: Passes of the enhancer over the training windows, with a learning rate that falls to zero.
         num_iterations: Adversarial iterations of the noise networks.
         noise: Model of the noise: one of `NOISES`, or `best`, the simplest that held-out telemetry does not tell from real noise
-            (see `noise_choice`), which the command `fit` uses.
+            (see `noise_choice`).
         held_out: Share of the telemetry, taken from its end, that is reserved for the report. 0 trains and reports on all
             telemetry.
         seed: Random seed of training and report.
         enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than the
-            best one on held-out time, which the command `fit` uses; or one of `ENHANCERS`.
+            best one on held-out time; or one of `ENHANCERS`.
 
     Raises:
         InputError: If a value is out of range.
@@ -35,15 +35,15 @@ class FitOptions:
     num_windows: int = 2_500
     epochs: int = 6
     num_iterations: int = 1_000
-    noise: str = "convolutional"
+    noise: str = BEST
     held_out: float = 0.2
     seed: int = 0
-    enhancer: str = "network"
+    enhancer: str = BEST
 
     def __post_init__(self):
         if not 0 <= self.held_out <= 0.5:
             raise InputError(f"Expected held_out from 0 to 0.5. Received: held_out={self.held_out}.")
-        if self.enhancer not in (*ENHANCERS, "best"):
+        if self.enhancer not in (*ENHANCERS, BEST):
             raise InputError(f"Expected enhancer, one of: best, {', '.join(ENHANCERS)}. Received: enhancer={self.enhancer!r}.")
         if self.noise not in NOISES:
             raise InputError(f"Expected noise, one of: {', '.join(NOISES)}. Received: noise={self.noise!r}.")

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 JUDGED_SHARE = 0.25  # of the time, at its end, on which rungs are judged
 MOST_JUDGED = 1_000  # windows
-BEST = "best"
 _LEAST_JUDGED = 20
 _ENOUGH_PIECES, _LEAST_PIECE = 200, 16  # disjoint pieces that the classifier should see, and their least length in samples
 _DRAW = 73  # number of the random draw

@@ -17,7 +17,6 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts, check_size, is_finite
 from enhsim_tf.enhanced_simulator.choosing import choose_enhancer
 from enhsim_tf.enhanced_simulator.noise_fitting import (
-    BEST,
     JUDGED_SHARE,
     NoiseTraining,
     NoiseWindows,
@@ -30,7 +29,7 @@ from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 from enhsim_tf.noise.extraction import extract_noise
-from enhsim_tf.noise.rung_names import BY_OPTION
+from enhsim_tf.noise.rung_names import BEST, BY_OPTION, FOLLOWERS
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
@@ -97,7 +96,7 @@ class TrainingSettings:
                 f"Expected noise among {BEST}, {', '.join(BY_OPTION)}; extraction to be moving average or enhancer; 0 <= held_out < 1. "
                 f"Received: noise={self.noise!r}, extraction={self.extraction!r}, held_out={self.held_out}."
             )
-        if self.noise in (BEST, "autoregressive network") and self.extraction != "enhancer":
+        if self.noise in (BEST, *FOLLOWERS) and self.extraction != "enhancer":
             raise InputError(
                 f"Expected noise={self.noise!r} with extraction by the enhancer, because it is judged with the enhanced signal. "
                 f"Received: extraction={self.extraction!r}."

@@ -13,6 +13,8 @@ BY_OPTION = {
 """Maps the value of an option to the name of its rung in `ladder.RUNGS`, the simplest first."""
 NETWORKS = ("autoregressive network", "paper", "convolutional")
 """Options whose rungs train networks."""
+BEST = "best"
+"""The option with which held-out telemetry chooses a rung."""
 FOLLOWERS = ("matched residual windows", "autoregressive network")
 """Options whose rungs make noise that can follow the enhanced signal."""
 STREAMS = {

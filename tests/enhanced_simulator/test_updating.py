@@ -17,7 +17,7 @@ from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.series import Telemetry
 
 WINDOW, SD = 64, 0.1
@@ -93,10 +93,11 @@ def test_a_wave_of_another_period_is_not_taken():
     "noise",
     [
         WindowBootstrap(SD * np.random.default_rng(1).standard_normal((50, WINDOW)).astype(np.float32)),
+        MatchedWindowBootstrap(SD * np.random.default_rng(1).standard_normal((50, WINDOW)), np.zeros((50, min(64, WINDOW)))),
         GaussianAutoregression([0.5], SD, WINDOW),
         NoiseGAN(build_generator(WINDOW, 4, 8, seed=0), build_discriminator(WINDOW, 8, seed=0), scale=0.02, seed=0),
     ],
-    ids=["windows", "autoregression", "networks"],
+    ids=["windows", "matched windows", "autoregression", "networks"],
 )
 def test_the_size_of_each_noise_model_is_updated(noise):
     old = known(noise=noise)

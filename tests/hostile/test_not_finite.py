@@ -1,5 +1,6 @@
 """Tests that no channel ends in a model that is not finite, and that such a model is refused wherever it comes from."""
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -19,7 +20,7 @@ from enhsim_tf.noise.linear_noise import linear_noise
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
-TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2)
+TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2, noise="convolutional", enhancer="network")
 PLACES = np.arange(1_500)
 WAVE = np.sin(2 * np.pi * PLACES / 60)
 NOISE = 0.1 * np.random.default_rng(0).standard_normal(1_500)
@@ -71,7 +72,7 @@ def test_an_enhancer_that_diverges_is_trained_again_more_slowly(monkeypatch, fai
         return plain(model, *arguments, **options)
 
     monkeypatch.setattr(training, "fit_windows", fit_windows)
-    simulator = fit_simulator(channel(WAVE + NOISE), FitOptions(window=64, num_windows=40, epochs=1, num_iterations=0), 0)
+    simulator = fit_simulator(channel(WAVE + NOISE), dataclasses.replace(TINY, num_iterations=0), 0)
     assert np.isfinite(simulator.generate(5)).all()
     kind, said = simulator.trained["coarse"]["kind"], simulator.trained["coarse"]["said"]
     assert (kind == "square waves") == is_fitted

@@ -14,7 +14,6 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_parts
 from enhsim_tf.enhanced_simulator.noise_fitting import (
-    BEST,
     JUDGED_SHARE,
     MOST_JUDGED,
     NoiseTraining,
@@ -33,6 +32,7 @@ from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
 from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, Rung, fit_ladder, fit_rung
 from enhsim_tf.enhancer.overlapping import enhance_run
 from enhsim_tf.enhancer.training_pairs import split_end
+from enhsim_tf.noise.rung_names import BEST
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values

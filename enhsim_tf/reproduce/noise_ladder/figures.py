@@ -1,6 +1,6 @@
 """The figure of the experiment on noise, drawn from its findings."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.figure
@@ -37,7 +37,7 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         2.05 + 0.22 * len(families),
         _message(kept["within"], rung),
         f"Mean over {in_words(len(DETECTORS))} detectors whose thresholds are set for 1 % (vertical line); {in_words(seeds)} seed"
-        f"{'s' * (seeds > 1)}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
+        f"{'s' * (seeds > 1)}{_fewer(families, seeds)}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
         f"windows on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the others. "
         f"Families within {100 * kept['looked at']['limit']:.0f} point: {', '.join(strict)}. "
         "Without added noise, detectors flag nearly all windows (not shown).",
@@ -61,6 +61,20 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     axes.set_xlabel("false alarms on nominal windows (%)")
     axes.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(-0.22, 1.0), handletextpad=0.2, columnspacing=1.0)
     return figure
+
+
+def _fewer(families: Sequence[tuple[str, Mapping[str, Any]]], seeds: int) -> str:
+    """Which of the models that are shown have fewer seeds."""
+    counts = {
+        name: min(len(about["rungs"][name]["seeds"]) for _, about in families if name in about["rungs"])
+        for name in _MARKS
+        if any(name in about["rungs"] for _, about in families)
+    }
+    by_count: dict[int, list[str]] = {}
+    for name, count in counts.items():
+        if count < seeds:
+            by_count.setdefault(count, []).append(name)
+    return "".join(f" ({in_list(names)}: {in_words(count)})" for count, names in by_count.items())
 
 
 def _message(within: Mapping[str, Any], learnt: str) -> str:

@@ -100,7 +100,7 @@ def limits(found: Findings) -> str:
         lines.append(
             f"- Excess of false alarms of the {kept['rung']} over real windows, {half} families, at most {100 * own['limit']:g} "
             f"point{'s' * (own['limit'] != 0.01)}: {own['kept']} of {own['of']} families; the largest excess is {100 * own['excess'][worst]:.1f} "
-            f"points ({worst.replace('_', ' ')})."
+            f"points ({worst.replace('_', ' ')}{_range(found['families'][worst]['rungs'][kept['rung']])})."
         )
     for family, excess in kept["revised"].items():
         lines.append(
@@ -130,10 +130,30 @@ def limits(found: Findings) -> str:
 
 def _choice(choice: Findings, which: str, learnt: str) -> str:
     """How far a rule's choice is from the best model."""
+    worst = max(choice["excess"], key=choice["excess"].__getitem__)
     return (
         f"- Excess of the model that the {which} rule chooses within {100 * choice['limit']:g} points of that of the best model ({_seeds(choice['seeds'])}): "
         f"{choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. On {_families(choice['none_passes'])}, no model passes, and the "
-        f"smallest departure decides. The {learnt} passes on {choice['learnt_passes']} families."
+        f"smallest departure decides. The {learnt} passes on {choice['learnt_passes']} families. Detectors trained with the chosen model flag at most "
+        f"{100 * choice['excess'][worst]:.1f} points more windows than after training on real windows ({worst.replace('_', ' ')}){_below_real(choice)}."
+    )
+
+
+def _range(values: Findings) -> str:
+    """The range over seeds, if there are several."""
+    if len(values["seeds"]) < 2:
+        return ""
+    low, high = (100 * value for value in values["excess_range"])
+    return f"; {low:.1f} to {high:.1f} over {len(values['seeds'])} seeds"
+
+
+def _below_real(choice: Findings) -> str:
+    """Where a choice misses the limit although its detectors flag no more than after training on real windows."""
+    quiet = [name.replace("_", " ") for name in choice["missed"] if choice["excess"][name] <= 0]
+    return (
+        f"; where the limit is missed on {in_list(quiet)} noise, they flag fewer, and the best model is one with still fewer alarms than real windows"
+        if quiet
+        else ""
     )
 
 

@@ -114,11 +114,13 @@ def _unseen(noise: Findings | None) -> str:
     }
     if any(len(each) < len(families) for each in excess.values()):
         return f"{said}, without the convolutional GAN so far."
+    counts = sorted({len(about[rung]["seeds"]) for about in families.values() for rung in excess})
+    seeds = in_seeds(noise["seeds"]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
     parts = []
     for rung, each in excess.items():
         worst = max(each, key=each.__getitem__)
         parts.append(f"{points(each[worst])} points with {'' if rung.endswith('s') else 'the '}{rung} ({worst.replace('_', ' ')})")
-    return f"{said}: on {len(families)} of them ({in_seeds(noise['seeds'])}), the largest excess of false alarms over training on real windows is {in_list(parts)}."
+    return f"{said}: on {len(families)} of them ({seeds}), the largest excess of false alarms over training on real windows is {in_list(parts)}."
 
 
 def _missing(factorial: Findings | None, labelled: Findings | None) -> str:

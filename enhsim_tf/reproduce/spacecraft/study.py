@@ -76,7 +76,7 @@ class ChannelStudy:
 
     @functools.cached_property
     def simulator(self) -> "EnhancedSimulator":
-        """The simulator that `python -m enhsim_tf fit --held-out 0 --enhancer network` fits to the train part."""
+        """The simulator that `python -m enhsim_tf fit --held-out 0 --enhancer network --noise convolutional` fits to the train part."""
         depends = (*self._data, self._options)
         folder = self.stages.run(f"fit {self.name}", self._make_simulator, ("enhanced_simulator.fitting",), depends)
         from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -89,7 +89,7 @@ class ChannelStudy:
 
         chosen = self.settings.labelled
         counts = {"num_windows": chosen.num_windows, "epochs": chosen.epochs, "num_iterations": chosen.num_iterations}
-        return FitOptions(**counts, held_out=0.0, seed=self.seed)
+        return FitOptions(**counts, noise="convolutional", held_out=0.0, seed=self.seed, enhancer="network")
 
     def _make_simulator(self, folder: Path) -> None:
         from enhsim_tf.enhanced_simulator.fitting import fit_simulator

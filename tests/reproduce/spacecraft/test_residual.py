@@ -62,6 +62,26 @@ def test_the_summary_is_a_median_over_channels_and_a_mean_over_seeds():
     assert found["found_at_0.01"] == (4 + 2) / 2 and found["sequences"] == 6
 
 
+def test_channels_ahead_are_those_where_both_scores_of_one_line_have_a_smaller_area():
+    areas = {"residual": (0.9, 0.5, 0.7), "largest step": (0.8, 0.6, 0.2), "moving deviation": (0.1, 0.1, 0.8)}
+    rows = [
+        {
+            "seed": 0,
+            "channel": channel,
+            "detector": name,
+            "false_alarms": 0.0,
+            "found_at_0.01": 1,
+            "sequences": 1,
+            "auc_pr": area,
+            "vus_pr": 1,
+        }
+        for name, each in areas.items()
+        for channel, area in zip("abc", each, strict=True)
+    ]
+    found = residual.summarise(pd.DataFrame(rows)).set_index("detector")
+    assert found.loc["residual", "channels_ahead"] == 1 and found.loc["residual", "channels"] == 3
+
+
 def test_the_latest_fit_of_the_channel_and_the_seed_is_read(tmp_path):
     for name, seed in (("fit A-1-aa", 0), ("fit A-1-bb", 1), ("fit A-10-cc", 1)):
         folder = tmp_path / name / "simulator"
