@@ -1,7 +1,7 @@
 """Chooses a noise model from the ladder by held-out noise (an extension of section 2.3).
 
 A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each rung of the
-ladder is therefore judged on held-out noise in two ways: how much better than chance a classifier separates generated from real
+ladder is therefore judged on held-out noise in two ways: how well a classifier separates generated from real
 windows of noise and the signal below them, and how many false alarms two cheap detectors raise on real windows after training on generated ones. The simplest rung
 that passes both is chosen. Rule and tolerances were fixed before the experiment that judges them.
 """
@@ -83,9 +83,10 @@ class NoiseJudge:
         self.rate, self.seed, self._signals = rate, seed, signals
         self._judged = signals[2][: len(held_out)] + held_out
         self._edges = signal_edges(signals[1])
+        self._unit = unit_of(learnt)
         if compared is None:
             compared = [
-                features_of(noise[:number], signal[:number], self._edges)
+                features_of(noise[:number], signal[:number], self._edges, self._unit)
                 for noise, signal in ((learnt, signals[1]), (held_out, signals[2]))
             ]
         learnt_features, self._held_out_features = compared
@@ -112,22 +113,29 @@ class NoiseJudge:
         _check_number(len(generated))
         signal = self._signals[0][: len(generated)]
         if compared is None:
-            compared = features_of(generated, signal, self._edges)[: len(self._held_out_features)]
+            compared = features_of(generated, signal, self._edges, self._unit)[: len(self._held_out_features)]
         auc = boosted_trees(compared, self._held_out_features, self.seed).auc
         return RungJudgement(rung, auc, self.real_auc, self._alarms(signal + generated), self.real_alarms)
 
 
-def features_of(noise: np.ndarray, signal: np.ndarray, edges: np.ndarray) -> np.ndarray:
+def unit_of(noise: np.ndarray) -> float:
+    """The standard deviation of real noise, or 1 if it is 0."""
+    return float(np.std(noise, dtype=np.float64)) or 1.0
+
+
+def features_of(noise: np.ndarray, signal: np.ndarray, edges: np.ndarray, unit: float) -> np.ndarray:
     """What the classifier sees: features of the noise, and of the noise where the signal has different levels and slopes.
 
     Args:
         noise: Windows of noise, shape `(windows, samples)`.
         signal: The signal below them, of the same shape.
         edges: As returned by `window_features.signal_edges`.
+        unit: The unit in which the noise is described, as returned by `unit_of`, so that the unit of the channel has no effect.
 
     Returns:
         float64 array of shape `(windows, 26)`; short windows have fewer frequency bands and therefore fewer columns.
     """
+    noise = np.asarray(noise, np.float64) / unit
     return np.concatenate([window_features(noise), signal_features(noise, signal, edges)], axis=1)
 
 

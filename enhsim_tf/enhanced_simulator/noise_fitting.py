@@ -167,11 +167,11 @@ class HeldOutJudge:
 
     def __init__(self, learnt: NoiseWindows, judged: NoiseWindows, training: NoiseTraining):
         number = min(len(judged), len(learnt), MOST_JUDGED)
-        rows = np.linspace(0, len(learnt) - 1, number).astype(int)
+        rows, last = (np.linspace(0, len(each) - 1, number).astype(int) for each in (learnt, judged))
         self._learnt, self._held_out, self._training, self._clean = learnt, judged, training, learnt.clean[rows]
-        signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[:number])]
+        signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[last])]
         _, *compared = compare(NoiseWindows(learnt.noise[rows], self._clean), learnt, judged)
-        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[:number], signals, seed=training.seed, compared=compared)
+        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[last], signals, seed=training.seed, compared=compared)
 
     def judge(self, option: str, model: Any) -> noise_choice.RungJudgement:
         """Judges a fitted noise model.
@@ -202,8 +202,8 @@ def compare(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows)
     groups = pieces_of(generated, learnt, judged)
     if not len(groups[0]):
         return [np.zeros((0, 0))] * 3
-    edges = signal_edges(groups[1].clean)
-    return [noise_choice.features_of(each.noise, each.clean, edges) for each in groups]
+    edges, unit = signal_edges(groups[1].clean), noise_choice.unit_of(groups[1].noise)
+    return [noise_choice.features_of(each.noise, each.clean, edges, unit) for each in groups]
 
 
 def pieces_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows) -> list[NoiseWindows]:

@@ -17,7 +17,7 @@ class WindowBootstrap:
 
     Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
     and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
-    because two windows that are drawn independently are uncorrelated.
+    because two windows that are drawn independently are uncorrelated. The mean of all windows is not faded.
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
@@ -47,7 +47,8 @@ class WindowBootstrap:
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws a series of any length without seams, float32 of shape `(num_samples,)`. The same seed gives the same series."""
         rng = np.random.default_rng(seed)
-        return _cross_faded(self.windows.shape[1], num_samples, rng, lambda starts: (self.generate(len(starts), rng), 0.0))
+        mean = float(np.mean(self.windows, dtype=np.float64))
+        return _cross_faded(self.windows.shape[1], num_samples, rng, lambda starts: (self.generate(len(starts), rng), mean))
 
 
 class MatchedWindowBootstrap:
@@ -55,8 +56,9 @@ class MatchedWindowBootstrap:
 
     The noise of many sensors depends on what they measure, and residuals contain errors of the enhancer, which do, too. A window of
     noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
-    whose signal is the same. The distance of two signals is that of their means over 64 segments. This is the nearest-neighbour
-    bootstrap of Lall and Sharma (1996), with the number of neighbours that they recommend and equal weights.
+    whose signal is the same. The distance of two signals is that of their means over 64 segments. The idea, and the number of
+    neighbours, are those of the nearest-neighbour bootstrap of Lall and Sharma (1996), which resamples the successors of similar
+    pasts instead. If the signal never repeats, the nearest windows can be few stretches of the record.
 
     In a longer series, the mean of the candidates, which neighbouring windows have in common, is cross-faded with weights that add
     up to one, and the rest as by `WindowBootstrap`.
@@ -160,6 +162,8 @@ def _segment_means(signal_windows: np.ndarray, shape: tuple[int, ...]) -> np.nda
     """Returns the means of signals over segments of nearly equal length, shape `(windows, segments)`."""
     if signal_windows is None or np.shape(signal_windows) != shape:
         raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal_windows)}.")
+    if not np.isfinite(signal_windows).all():
+        raise InputError("Expected a finite enhanced signal, which this noise follows. Received: values that are not finite.")
     edges = np.linspace(0, shape[1], min(_NUM_SEGMENTS, shape[1]) + 1).astype(int)
     return np.add.reduceat(np.asarray(signal_windows, np.float64), edges[:-1], axis=1).astype(np.float32) / np.diff(edges).astype(
         np.float32

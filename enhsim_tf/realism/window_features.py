@@ -7,11 +7,11 @@ import numpy as np
 
 
 def window_features(windows: np.ndarray) -> np.ndarray:
-    """Computes fourteen features of each window.
+    """Computes fourteen features of each window. Values far below 1e-6 have to be given in a larger unit.
 
     The features are the mean, the logarithm of the standard deviation, the excess kurtosis, the maximum, the logarithm of the
     standard deviation of the first differences, the autocorrelation at lag 1, and the logarithm of the power in eight
-    frequency bands that double in width.
+    frequency bands whose edges are spaced evenly on a logarithmic scale. Very short windows have fewer bands.
 
     Args:
         windows: Windows of shape `(windows, samples)`.

@@ -7,6 +7,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhanced_simulator import noise_fitting
 from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, compare, pieces_of, sentence_of
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise import ladder
@@ -115,6 +116,24 @@ def test_noise_that_follows_the_signal_gets_windows_that_match_it():
     for level in (-0.9, 0.0, 0.9):  # the scale is that of the process at each level of the signal
         there = np.abs(windows - level) < 0.1
         assert drawn[there].std() == pytest.approx(0.2 * (1.1 + level), rel=0.15, abs=0.03)
+
+
+def test_the_classifier_sees_the_same_in_any_unit():
+    rng = np.random.default_rng(0)
+    clean = np.sin(np.arange(64) / 5) * np.ones((40, 1))
+    groups = [NoiseWindows(noise, clean, 64 * np.arange(40)) for noise in rng.standard_normal((3, 40, 64))]
+    small = [NoiseWindows(1e-9 * each.noise, 1e-9 * each.clean, each.starts) for each in groups]
+    np.testing.assert_allclose(compare(*small), compare(*groups), rtol=1e-6, atol=1e-9)
+
+
+def test_detectors_are_judged_on_the_whole_of_the_held_out_time(monkeypatch):
+    monkeypatch.setattr(noise_fitting, "MOST_JUDGED", 400)
+    rng = np.random.default_rng(0)
+    quiet = NoiseWindows(rng.standard_normal((400, 64)), np.zeros((400, 64)), 64 * np.arange(400))
+    loud = np.repeat([1.0, 9.0], 400)[:, None] * rng.standard_normal((800, 64))  # the second half is louder
+    later = NoiseWindows(loud, np.zeros((800, 64)), 64 * np.arange(800))
+    judge = noise_fitting.HeldOutJudge(quiet, later, NoiseTraining(1, 0, lambda clean: clean))
+    assert 0.45 < judge._judge.real_alarms < 0.55
 
 
 @pytest.mark.usefixtures("no_networks")

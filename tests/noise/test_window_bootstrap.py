@@ -35,6 +35,10 @@ def test_a_series_has_no_steps_at_seams():
     assert np.abs(np.diff(series)).max() < 0.7 and series.std() == pytest.approx(1, abs=0.1)
 
 
+def test_a_mean_stays_constant_across_seams():
+    np.testing.assert_allclose(WindowBootstrap(np.full((5, 400), 3.0)).generate_series(2_000, 0), 3.0, rtol=1e-6)
+
+
 def test_neighbouring_samples_are_correlated_as_in_the_windows():
     series = WindowBootstrap(ar1(500, 200)).generate_series(100_000, 1)
     assert np.corrcoef(series[1:], series[:-1])[0, 1] == pytest.approx(0.9, abs=0.01)
@@ -124,6 +128,7 @@ def test_a_signal_of_another_shape_is_refused(refused):
         lambda: noise.generate_series(90, 0, np.zeros(80)),
         lambda: MatchedWindowBootstrap.fit(ar1(30, 40), None),
         lambda: MatchedWindowBootstrap(ar1(30, 40), np.zeros((29, 40))),
+        lambda: noise.generate(30, 0, np.full((30, 40), np.nan)),
     ):
         with refused("signal"):
             draw()

@@ -79,7 +79,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
                 },
             }
         choices = [
-            _choice(choice[(choice["family"] == family) & (choice["seed"] == seed)], _by_rung(own[own["seed"] == seed]))
+            _choice(choice[(choice["family"] == family) & (choice["seed"] == seed)], *_by_rung(own[own["seed"] == seed]))
             for seed in sorted(set(choice[choice["family"] == family]["seed"]))
         ]
         families[family] = {
@@ -97,21 +97,24 @@ def _by_seed(rows: "pd.DataFrame") -> "pd.DataFrame":
     return rows.assign(rate=rows["alarms"] / rows["windows"]).groupby("seed")[["rate", "recall", "recall_at_real_rate"]].mean()
 
 
-def _by_rung(rows: "pd.DataFrame") -> dict[str, float]:
-    """The false-alarm rate of each rung, mean over the detectors, of one family and seed."""
-    return rows.assign(rate=rows["alarms"] / rows["windows"]).groupby("rung")["rate"].mean().to_dict()
+def _by_rung(rows: "pd.DataFrame") -> tuple[dict[str, float], dict[str, float]]:
+    """The false-alarm rate and the recall at own thresholds of each rung, means over the detectors, of one family and seed."""
+    means = rows.assign(rate=rows["alarms"] / rows["windows"]).groupby("rung")[["rate", "recall"]].mean()
+    return means["rate"].to_dict(), means["recall"].to_dict()
 
 
-def _choice(rows: "pd.DataFrame", rates: Mapping[str, float]) -> dict[str, Any]:
+def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[str, float]) -> dict[str, Any]:
     """What the rule chooses for one family and seed.
 
     Args:
         rows: The judgements.
         rates: The false-alarm rate of each rung.
+        recalls: The recall of each rung at its own thresholds.
 
     Returns:
-        The seed, the rule, the chosen rung, those that pass the rule (none: the smallest departure decides), the best rung, and by how much
-        more the detectors of the chosen rung alarm than those of the best one, and than those of real windows.
+        The seed, the rule, the number of rungs that it judged, the chosen rung, those that pass the rule (none: the smallest departure decides), the best rung, and by how much
+        more the detectors of the chosen rung alarm than those of the best one, and than those of real windows, and
+        how much recall they lose against real windows.
     """
     judged = _judgements(rows)
     chosen, best = choose(judged), min((each.rung for each in judged), key=rates.__getitem__)
@@ -122,7 +125,9 @@ def _choice(rows: "pd.DataFrame", rates: Mapping[str, float]) -> dict[str, Any]:
         "passing": [each.rung for each in judged if each.passes],
         "best": best,
         "regret": rates[chosen] - rates[best],
+        "judged": len(judged),
         "excess": rates[chosen] - rates[REAL],
+        "lost": recalls[REAL] - recalls[chosen],
     }
 
 
@@ -162,6 +167,14 @@ def _limits(families: dict[str, Any], rung: str = "autoregressive network") -> d
         # few false alarms are no success where thresholds are so high that anomalies are missed
         "lost": {name: loss for name, about in learnt.items() if (loss := -about["recall_change"]) > MAX_RECALL_DIFFERENCE},
         "of": len(learnt),
+        "lost_by_model": {
+            name: {
+                family: -about["rungs"][name]["recall_change"]
+                for family, about in families.items()
+                if name in about["rungs"] and -about["rungs"][name]["recall_change"] > MAX_RECALL_DIFFERENCE
+            }
+            for name in RUNGS
+        },
     }
     found["realism"] = {
         "limit": MAX_REALISM_RATIO,
@@ -185,7 +198,9 @@ def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
         "of": len(judged),
         "seeds": sorted({each["seed"] for choices in judged.values() for each in choices}),
         "missed": {name: regret for name, regret in regrets.items() if regret > MAX_REGRET},
+        "judged": sorted({each["judged"] for choices in judged.values() for each in choices}),
         "excess": {name: float(np.mean([each["excess"] for each in choices])) for name, choices in judged.items()},
+        "lost": {name: float(np.mean([each["lost"] for each in choices])) for name, choices in judged.items()},
         "none_passes": [name for name, choices in judged.items() if not all(each["passing"] for each in choices)],
         "learnt_passes": sum(all(rung in each["passing"] for each in choices) for choices in judged.values()),
     }

@@ -115,8 +115,9 @@ def limits(found: Findings) -> str:
     recall, realism = kept["recall"], kept["realism"]
     lines += [
         f"- Recall at the real rate within {100 * recall['limit']:g} points of that after training on real windows: {recall['kept']} of "
-        f"{recall['of']} families{_differences(recall['missed'])}.",
-        f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows{_losses(recall['lost'])}.",
+        f"{recall['of']} families{_differences(recall['missed'], 2)}.",
+        f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows{_losses(recall['lost'])}"
+        f"{_other_losses(recall['lost_by_model'], kept['rung'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
         f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
         *(
@@ -130,12 +131,15 @@ def limits(found: Findings) -> str:
 
 def _choice(choice: Findings, which: str, learnt: str) -> str:
     """How far a rule's choice is from the best model."""
-    worst = max(choice["excess"], key=choice["excess"].__getitem__)
+    worst, least = (max(choice[measure], key=choice[measure].__getitem__) for measure in ("excess", "lost"))
+    models = " or ".join(map(str, choice["judged"]))
     return (
-        f"- Excess of the model that the {which} rule chooses within {100 * choice['limit']:g} points of that of the best model ({_seeds(choice['seeds'])}): "
-        f"{choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. On {_families(choice['none_passes'])}, no model passes, and the "
-        f"smallest departure decides. The {learnt} passes on {choice['learnt_passes']} families. Detectors trained with the chosen model flag at most "
-        f"{100 * choice['excess'][worst]:.1f} points more windows than after training on real windows ({worst.replace('_', ' ')}){_below_real(choice)}."
+        f"- Excess of the model that the {which} rule chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
+        f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. On "
+        f"{_families(choice['none_passes'])}, no model passes, and the smallest departure decides. The {learnt} passes on {choice['learnt_passes']} "
+        f"families. Detectors trained with the chosen model flag at most {100 * choice['excess'][worst]:.1f} points more windows than after training on real "
+        f"windows ({worst.replace('_', ' ')}), and lose at most {100 * choice['lost'][least]:.1f} points of recall ({least.replace('_', ' ')})."
+        f"{_below_real(choice)}"
     )
 
 
@@ -151,7 +155,7 @@ def _below_real(choice: Findings) -> str:
     """Where a choice misses the limit although its detectors flag no more than after training on real windows."""
     quiet = [name.replace("_", " ") for name in choice["missed"] if choice["excess"][name] <= 0]
     return (
-        f"; where the limit is missed on {in_list(quiet)} noise, they flag fewer, and the best model is one with still fewer alarms than real windows"
+        f" On {in_list(quiet)} noise, the chosen model raises fewer false alarms than real windows, and the best model fewer still."
         if quiet
         else ""
     )
@@ -161,11 +165,11 @@ def _families(names: Sequence[str]) -> str:
     return in_list([name.replace("_", " ") for name in names]) + " noise" if names else "no family"
 
 
-def _differences(missed: Findings) -> str:
+def _differences(missed: Findings, digits: int = 1) -> str:
     """The families that miss a limit, with their differences in points."""
     if not missed:
         return ""
-    return "; not on " + in_list([f"{name.replace('_', ' ')} ({100 * value:+.1f} points)" for name, value in missed.items()])
+    return "; not on " + in_list([f"{name.replace('_', ' ')} ({100 * value:+.{digits}f} points)" for name, value in missed.items()])
 
 
 def _losses(lost: Findings) -> str:
@@ -173,6 +177,12 @@ def _losses(lost: Findings) -> str:
     if not lost:
         return ": none"
     return ": " + in_list([f"{name.replace('_', ' ')} ({100 * value:.1f} points)" for name, value in lost.items()])
+
+
+def _other_losses(lost: Mapping[str, Findings], learnt: str) -> str:
+    """The same for the other models."""
+    told = [f"{name}{_losses(families)}" for name, families in lost.items() if families and name != learnt]
+    return f"; with the other models: {'; '.join(told)}" if told else ""
 
 
 def _realism(models: Findings) -> list[str]:
@@ -183,10 +193,12 @@ def _realism(models: Findings) -> list[str]:
         for name, about in models.items()
         if about["of"]
     ]
+    tested = [name for name in models if name != REAL and models[name]["of"]]
+    most = max(models[name]["families_with_all"] for name in tested)
     is_within_reach = real["families_with_all"] >= _ENOUGH * real["of"]
     return [
         f"With fifteen measures, {'the limit on realism is strict' if is_within_reach else 'two thirds are beyond reach'}: fresh real noise itself keeps the "
-        f"limit on {real['families_with_all']} of {real['of']} families. The same count for every model:",
+        f"limit on {real['families_with_all']} of {real['of']} families, and no model on more than {most}. The same count for every model:",
         "",
         "| noise | families with every measure within three times its floor | measures within it, mean |",
         "|---|---|---|",
