@@ -377,18 +377,21 @@ def _residual(labelled: Findings) -> str:
         return ""
     return (
         " The simulator can also be used as a model instead of a source of data: the residual of the simulator that is aligned with each window "
-        f"(`score --detector residual`) flags {per_cent(row['mean_false_alarms'])}, with an AUC-PR of {row['auc_pr']:.2f}{_ahead(row)}{_discord(labelled)}. "
+        f"(`score --detector residual`) flags {per_cent(row['mean_false_alarms'])}, with an AUC-PR of {row['auc_pr']:.2f} ({_ahead(row)}){_ridge_residual(labelled)}{_discord(labelled)}. "
         "With so few channels this difference is not "
         "established, and two bounds of this detector were set after results of one seed had been seen."
     )
 
 
 def _ahead(row: Mapping[str, Any]) -> str:
-    return (
-        f" (higher than that of the scores of one line on {row['channels_ahead']} of {row['channels']} channels)"
-        if "channels_ahead" in row
-        else ""
-    )
+    return f"higher than that of the scores of one line on {row['channels_ahead']} of {row['channels']} channels"
+
+
+def _ridge_residual(labelled: Findings) -> str:
+    row = labelled["residual"].get("ridge residual, scale followed")
+    if row is None:
+        return ""
+    return f"; with ridge regression in place of the network, it flags {per_cent(row['mean_false_alarms'])} ({row['auc_pr']:.2f}, {_ahead(row)})"
 
 
 def _discord(labelled: Findings) -> str:

@@ -1,8 +1,9 @@
 """`python -m enhsim_tf.reproduce.spacecraft.residual --data FOLDER`: the residual detector on the labelled channels.
 
-It is compared with the one-line controls and with left discord at equal data: each learns from all of the `train` part. The test part is
-judged as in the study of `run`: false alarms at the threshold for 1 %, finds at matched false-alarm rates, and the area under the
-precision-recall curve. The scores of the detectors are computed here; nothing is read from the study except fitted simulators.
+At equal data, it is compared with the same detector whose enhancer is ridge regression, with the one-line controls and with left discord:
+each learns from all of the `train` part. The test part is judged as in the study of `run`: false alarms at the threshold for 1 %, finds at
+matched false-alarm rates, and the area under the precision-recall curve. The scores of the detectors are computed here; nothing is read
+from the study except fitted simulators.
 """
 
 import argparse
@@ -27,21 +28,40 @@ if TYPE_CHECKING:
 
 TABLE = "residual.csv"
 """Name of the table, in the folder of the study."""
-RESIDUAL, FOLLOWING = "residual", "residual, scale followed"
-RESIDUALS = {RESIDUAL: 1.0, FOLLOWING: 1.5}
-"""Residual detectors with the bounds of their scale."""
+NETWORK, RIDGE = "residual", "ridge residual"
+"""Residual detectors by their enhancer: the network of the study, and ridge regression."""
+BOUNDS = {"": 1.0, ", scale followed": 1.5}
+"""Endings of their names with the bounds of their scale."""
+RESIDUALS = tuple(name + ending for name in (NETWORK, RIDGE) for ending in BOUNDS)
 DISCORD = "left discord"
 CONTROLS = ("largest step", "moving deviation", "limit check")
 ONE_LINE = CONTROLS[:2]
 _SERIES = 1_000  # length in windows of the generated series that sets the threshold, as in `score`
 
 
-def judge_channel(channel: LabelledChannel, simulator: "EnhancedSimulator", settings: Settings) -> "list[dict[str, Any]]":
+def ridge_simulator(channel: LabelledChannel, settings: Settings) -> "EnhancedSimulator":
+    """Fits a simulator without a network to the train part of a channel: ridge regression, and whole windows of its residuals.
+
+    Args:
+        channel: The channel.
+        settings: Settings of the study; `labelled` and `seed` are used.
+    """
+    from enhsim_tf.enhanced_simulator.fit_options import FitOptions
+    from enhsim_tf.enhanced_simulator.fitting import fit_simulator
+
+    options = FitOptions(
+        num_windows=settings.labelled.num_windows, noise="residual windows", held_out=0.0, seed=settings.seed, enhancer="ridge"
+    )
+    return fit_simulator([channel.train], options, 0)
+
+
+def judge_channel(channel: LabelledChannel, simulators: "Mapping[str, EnhancedSimulator]", settings: Settings) -> "list[dict[str, Any]]":
     """Judges all detectors on one channel.
 
     Args:
         channel: The channel with its labels.
-        simulator: The simulator that was fitted to its `train` part.
+        simulators: Simulators that were fitted to its `train` part, with the same coarse simulator and window, by the name of their
+            residual detector.
         settings: Settings of the study; `labelled` and `seed` are used.
 
     Returns:
@@ -58,6 +78,7 @@ def judge_channel(channel: LabelledChannel, simulator: "EnhancedSimulator", sett
     from enhsim_tf.reproduce.spacecraft.rates import rates_of
     from enhsim_tf.telemetry.windows import cut_windows
 
+    simulator = next(iter(simulators.values()))
     window, seed, chosen = simulator.window, settings.seed, settings.labelled
     stride = max(1, window // 8)
     period = max(wave.period_s for wave in simulator.coarse.waves) / channel.train.interval_s
@@ -65,13 +86,14 @@ def judge_channel(channel: LabelledChannel, simulator: "EnhancedSimulator", sett
     starts = np.arange(0, len(channel.train) - window + 1, stride)
     past = cut_windows(channel.train.values, starts, window)
 
-    series = simulator.generate_series(_SERIES * window, seed=seed + 1)
-    generated = cut_windows(series, np.arange(0, len(series) - window + 1, stride), window)
-    aligned = AlignedResidual(simulator).fit(simulator.generate(chosen.num_arm_windows, seed=seed))
-    sizes = {part: aligned.sizes(windows) for part, windows in (("test", judge.windows), ("own", generated), ("past", past))}
-    for name, bound in RESIDUALS.items():
-        detector = ResidualSize(bound).fit_sizes(aligned.size.typical * np.ones(1))
-        judge.add("simulator", name, *map(detector.score_sizes, sizes.values()))
+    for name, fitted in simulators.items():
+        series = fitted.generate_series(_SERIES * window, seed=seed + 1)
+        generated = cut_windows(series, np.arange(0, len(series) - window + 1, stride), window)
+        aligned = AlignedResidual(fitted).fit(fitted.generate(chosen.num_arm_windows, seed=seed))
+        sizes = {part: aligned.sizes(windows) for part, windows in (("test", judge.windows), ("own", generated), ("past", past))}
+        for ending, bound in BOUNDS.items():
+            detector = ResidualSize(bound).fit_sizes(aligned.size.typical * np.ones(1))
+            judge.add("simulator", name + ending, *map(detector.score_sizes, sizes.values()))
     for name in CONTROLS:
         make = MADE.get(name) or DETECTORS[name]
         scores = cross_fitted_scores(lambda make=make: make(seed), past, starts, chosen.num_folds)
@@ -151,7 +173,7 @@ def residual_table(rows: "Mapping[str, Mapping[str, Any]]") -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, row in sorted(rows.items(), key=lambda item: -item[1]["auc_pr"]):
-        finds = " | ".join(f"{row[f'found_at_{rate}']:g}" for rate in (0.01, 0.05, 0.1))
+        finds = " | ".join(f"{row[f'found_at_{rate}']:.2g}" for rate in (0.01, 0.05, 0.1))
         ahead = "" if name in ONE_LINE else f"{row['channels_ahead']} of {row['channels']}"
         lines.append(
             f"| {name} | {row['median_false_alarms']:.1%} | {row['mean_false_alarms']:.1%} | {finds} | {row['auc_pr']:.2f} | {ahead} |"
@@ -217,7 +239,7 @@ def run(
             try:
                 saved = saved_simulator(fits, name, seed)
                 simulator = EnhancedSimulator.load(saved) if saved else ChannelStudy(channel, chosen, Stages(cache, False, tell)).simulator
-                rows += judge_channel(channel, simulator, chosen)
+                rows += judge_channel(channel, {NETWORK: simulator, RIDGE: ridge_simulator(channel, chosen)}, chosen)
             except InputError as error:
                 tell(f"{name}, seed {seed}: left out: {error}")
                 continue

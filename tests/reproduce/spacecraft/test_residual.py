@@ -11,6 +11,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimula
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.reproduce.spacecraft import residual
 from enhsim_tf.telemetry.series import Telemetry
@@ -32,13 +33,18 @@ def rows():
     channel = LabelledChannel(Labels("W-1", ((2_000, 2_200),), ("point",)), Telemetry(train), Telemetry(test), none, none)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(residual, "_SERIES", 100)
-        return residual.judge_channel(channel, simulator, dataclasses.replace(make_settings("smoke"), seed=4))
+        return residual.judge_channel(
+            channel, {residual.NETWORK: simulator, residual.RIDGE: simulator}, dataclasses.replace(make_settings("smoke"), seed=4)
+        )
 
 
 def test_each_detector_has_a_row_and_the_residual_finds_the_fault(rows):
     table = pd.DataFrame(rows).set_index("detector")
     assert set(table.index) == {*residual.RESIDUALS, *residual.CONTROLS, residual.DISCORD}
     assert (table["seed"] == 4).all() and (table["sequences"] == 1).all()
+    for ending in residual.BOUNDS:  # both residuals are those of one simulator here
+        alike = table.drop(columns=["seed", "channel"])
+        pd.testing.assert_series_equal(alike.loc[residual.NETWORK + ending], alike.loc[residual.RIDGE + ending], check_names=False)
     for name in residual.RESIDUALS:
         assert table.loc[name, "found_at_0.01"] == 1 and table.loc[name, "false_alarms"] < 0.15 and table.loc[name, "auc_pr"] > 0.8
     assert (table["found_at_0.01"] <= table["found_at_0.05"]).all() and (table["found_at_0.05"] <= table["found_at_0.1"]).all()
@@ -96,3 +102,12 @@ def test_options_that_cannot_be_used_are_refused_in_one_line(capsys, tmp_path):
         assert residual.main([*words, "--out", str(tmp_path / "out")]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert expected in line
+
+
+def test_the_simulator_without_a_network_is_fitted_by_ridge_regression():
+    values = np.sin(2 * np.pi * np.arange(2_000) / 50) + 0.1 * np.random.default_rng(0).standard_normal(2_000)
+    none = np.zeros((0, 0), np.float32)
+    channel = LabelledChannel(Labels("W-1", (), ()), Telemetry(values.astype(np.float32)), Telemetry(values.astype(np.float32)), none, none)
+    simulator = residual.ridge_simulator(channel, make_settings("smoke"))
+    assert simulator.trained["enhancer"] == "ridge" and type(simulator.noise) is WindowBootstrap
+    assert simulator.noise_sd == pytest.approx(0.1, rel=0.2)
