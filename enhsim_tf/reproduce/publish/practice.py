@@ -377,7 +377,8 @@ def _residual(labelled: Findings) -> str:
         return ""
     return (
         " The simulator can also be used as a model instead of a source of data: the residual of the simulator that is aligned with each window "
-        f"(`score --detector residual`) flags {per_cent(row['mean_false_alarms'])}, with an AUC-PR of {row['auc_pr']:.2f} ({_ahead(row)}){_ridge_residual(labelled)}{_discord(labelled)}. "
+        f"(`score --detector residual`) flags {per_cent(row['mean_false_alarms'])}, with an AUC-PR of {row['auc_pr']:.2f} ({_ahead(row)})"
+        f"{_ridge_residual(labelled)}{_discord(labelled)}. "
         "With so few channels this difference is not "
         "established, and two bounds of this detector were set after results of one seed had been seen."
     )
