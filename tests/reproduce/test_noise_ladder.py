@@ -53,6 +53,13 @@ def test_noise_of_the_right_scale_passes_and_noise_of_half_the_scale_does_not():
     assert wrong.auc > 0.95 and wrong.alarms > 0.5 and not wrong.passes
 
 
+def test_detectors_are_not_silent_where_few_windows_set_their_thresholds():
+    rng = np.random.default_rng(5)
+    learnt, held_out, quiet = (rng.normal(0, scale, (60, 60)) for scale in (1, 1, 0.5))
+    judge = NoiseJudge(learnt, held_out, [np.zeros((60, 60))] * 3)  # 30 windows for a rate of 1 %
+    assert judge.real_alarms < 0.15 and judge.judge("quiet", quiet).alarms > 0.5
+
+
 def test_the_summary_counts_what_a_table_says():
     def rows(family, rung, alarms):
         return {
