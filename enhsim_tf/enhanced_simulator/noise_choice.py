@@ -1,9 +1,9 @@
 """Chooses a noise model from the ladder by held-out noise (an extension of section 2.3).
 
 A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each rung of the
-ladder is therefore judged on held-out noise in two ways: how well a classifier separates generated from real
-windows of noise and the signal below them, and how many false alarms two cheap detectors raise on real windows after training on generated ones. The simplest rung
-that passes both is chosen. Rule and tolerances were fixed before the experiment that judges them.
+ladder is therefore judged on held-out noise in two ways: how well a classifier separates generated from real windows of noise and
+the signal below them, and how many false alarms two cheap detectors raise on real windows after training on generated ones. The
+simplest rung that passes both is chosen. Rule and tolerances were fixed before the experiment that judges them.
 """
 
 import dataclasses

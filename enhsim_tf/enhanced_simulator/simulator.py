@@ -19,6 +19,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import add_changed, complete_batch, complete_labelled_batch
 from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of, is_finite
+from enhsim_tf.enhanced_simulator.noise_fitting import noise_windows
 from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
 from enhsim_tf.enhanced_simulator.saving import noise_file, read_noise, read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
@@ -196,8 +197,7 @@ class EnhancedSimulator(NoisyOutput):
         """
         parts = check_parts(telemetry)
         check_counts(num_windows=(num_windows, 0))
-        pairs = self.pairs(parts, random_window_starts(parts, self.window, num_windows, rng))
-        return pairs.target - self.follow(pairs)
+        return noise_windows(self, parts, random_window_starts(parts, self.window, num_windows, rng)).noise
 
     def pairs(self, telemetry: Telemetry | Sequence[Telemetry], starts: np.ndarray) -> Pairs:
         """Cuts windows of telemetry together with the coarse windows of the same times.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
-from enhsim_tf.reproduce.battery.detectors import ARMS, COARSE, REAL_15, REAL_60, REAL_120, RESAMPLED, RESIDUALS
+from enhsim_tf.reproduce.battery.detectors import ARMS, COARSE, ENHANCED, REAL_15, REAL_60, REAL_120, RESAMPLED, RESIDUALS
 from enhsim_tf.reproduce.battery.errors import ENHANCERS, FLOOR
 from enhsim_tf.reproduce.battery.findings import C9_RATIO, LARGEST_GAP, LARGEST_SHARE, LEAST_DETECTORS, LEAST_SPEED, TRUSTED
 from enhsim_tf.reproduce.battery.labelled import DIFFERENCE
@@ -77,7 +77,7 @@ def clean_signal(found: Findings) -> str:
     """What the study says about claim C3: false alarms of detectors that were trained on the enhanced signal without noise."""
     told = []
     for regime, about in found["regimes"].items():
-        rates = [each["false_alarms"]["mean"] for each in about["detectors"]["enhanced"].values()]
+        rates = [each["false_alarms"]["mean"] for each in about["detectors"][ENHANCED].values()]
         told.append(f"{100 * np.mean(rates):.1f} % ({100 * min(rates):.1f} to {100 * max(rates):.1f} by detector) in the {regime} regime")
     return (
         "Claim C3 depends on how large the noise is. The noise of the battery's sensor is small, and detectors trained on the enhanced signal without noise flag "

@@ -40,7 +40,7 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         f"{'s' * (seeds > 1)}{_fewer(families, seeds)}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
         f"windows on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the others. "
         f"Families within {100 * kept['looked at']['limit']:.0f} point: {', '.join(strict)}. "
-        "Without added noise, detectors flag nearly all windows (not shown).",
+        "Not shown: without noise, detectors flag nearly all windows.",
     )
     axes = panels(figure, down + 0.45, 1, 1)[0, 0]
     place = axes.get_position()

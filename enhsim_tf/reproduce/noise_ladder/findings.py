@@ -112,9 +112,9 @@ def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[s
         recalls: The recall of each rung at its own thresholds.
 
     Returns:
-        The seed, the rule, the number of rungs that it judged, the chosen rung, those that pass the rule (none: the smallest departure decides), the best rung, and by how much
-        more the detectors of the chosen rung alarm than those of the best one, and than those of real windows, and
-        how much recall they lose against real windows.
+        The seed, the rule, the number of rungs that it judged, the chosen rung, those that pass the rule (none: the smallest departure
+        decides), the best rung, by how much more the detectors of the chosen rung alarm than those of the best one and than those of
+        real windows, and how much recall they lose against real windows.
     """
     judged = _judgements(rows)
     chosen, best = choose(judged), min((each.rung for each in judged), key=rates.__getitem__)

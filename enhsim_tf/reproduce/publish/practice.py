@@ -118,8 +118,10 @@ def _little_noise(battery: Findings | None) -> tuple[str, str]:
     """What a noiseless simulator is worth on telemetry whose noise is small: the beginning of the sentence, and its evidence."""
     if battery is None:
         return "", " Telemetry with little noise was not tested."
+    from enhsim_tf.reproduce.battery.detectors import CLEAN, ENHANCED, REAL_120, RESAMPLED  # imported here, because it imports TensorFlow
+
     arms = [about["detectors"] for about in battery["regimes"].values()]
-    clean, enhanced, noisy, real = ("fine without noise", "enhanced", "enhanced + residuals drawn again", "real, 120 orbits")
+    clean, enhanced, noisy, real = CLEAN, ENHANCED, RESAMPLED, REAL_120
     shared = [name for name in arms[0][clean] if all(name in each[arm] for each in arms for arm in (clean, enhanced, noisy, real))]
 
     def means(arm: str, measure: str) -> str:
