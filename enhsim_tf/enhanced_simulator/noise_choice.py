@@ -1,9 +1,10 @@
 """Chooses a noise model from the ladder by held-out noise (an extension of section 2.3).
 
 A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each rung of the
-ladder is therefore judged on held-out noise in two ways: how well a classifier separates generated from real windows of noise and
-the signal below them, and how many false alarms two cheap detectors raise on real windows after training on generated ones. The
-simplest rung that passes both is chosen. Rule and tolerances were fixed before the experiment that judges them.
+ladder is therefore judged on held-out noise in three ways: how well a classifier separates generated from real windows of noise and
+the signal below them, how many false alarms two cheap detectors raise on real windows after training on generated ones, and how many
+injected anomalies they find: few false alarms are no success where thresholds are so high that anomalies are missed. The simplest rung
+that passes all three is chosen. Rule and tolerances were fixed before the experiment that judges them.
 """
 
 import dataclasses
@@ -12,16 +13,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection import metrics
+from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.realism.two_sample import boosted_trees
-from enhsim_tf.realism.window_features import signal_edges, signal_features, window_features
+from enhsim_tf.realism.window_features import signal_features, window_features
 
 MAX_AUC_EXCESS = 0.05  # by which the AUC of a rung may exceed that of real windows against other real windows
 MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows
+MAX_RECALL_LOSS = 0.03  # by which its mean recall may be below that of detectors trained on real windows, at their own thresholds
 TOLD_APART = 0.8  # AUC above which generated noise must not be used without a warning
 _CHEAP = ("PCA residual", "isolation forest")
 _LEAST_WINDOWS = 20
+_NUM_ANOMALOUS = 60  # windows with anomalies, for each kind and severity
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +37,8 @@ class RungJudgement:
         real_auc: The same for real against other real windows: the floor.
         alarms: False-alarm rate on held-out real windows, mean over the cheap detectors, trained on generated windows.
         real_alarms: The same for detectors trained on real windows.
+        recall: Share of injected anomalies that the same detectors find, mean over kinds, severities and detectors.
+        real_recall: The same for detectors trained on real windows.
     """
 
     rung: str
@@ -41,16 +46,24 @@ class RungJudgement:
     real_auc: float
     alarms: float
     real_alarms: float
+    recall: float
+    real_recall: float
+
+    @property
+    def _excesses(self) -> tuple[float, float, float]:
+        """By how much the AUC and the false alarms are above those of real windows, and the recall is below."""
+        return self.auc - max(self.real_auc, 0.5), self.alarms - self.real_alarms, self.real_recall - self.recall
 
     @property
     def passes(self) -> bool:
         """Whether neither the classifier nor the detectors tell generated from real windows, within the tolerances."""
-        return self.auc - max(self.real_auc, 0.5) <= MAX_AUC_EXCESS and self.alarms - self.real_alarms <= MAX_ALARM_EXCESS
+        limits = (MAX_AUC_EXCESS, MAX_ALARM_EXCESS, MAX_RECALL_LOSS)
+        return all(excess <= limit for excess, limit in zip(self._excesses, limits, strict=True))
 
     @property
     def departure(self) -> float:
-        """Sum of both excesses, by which rungs are compared if none passes."""
-        return max(self.auc - max(self.real_auc, 0.5), 0) + max(self.alarms - self.real_alarms, 0)
+        """Sum of the three excesses, by which rungs are compared if none passes."""
+        return sum(max(excess, 0) for excess in self._excesses)
 
 
 class NoiseJudge:
@@ -60,10 +73,10 @@ class NoiseJudge:
         learnt: Real noise windows from which the rungs were fitted, shape `(windows, samples)`.
         held_out: Real noise windows that they were not fitted to, as many.
         signals: Three arrays of clean signal windows, to which generated, learnt and held-out noise are added.
+        compared: What the classifier sees of learnt and held-out noise (see `features_of`). It must not come from windows that
+            overlap: the classifier recognises single windows of real noise, whatever the noise is like.
         rate: False-alarm rate for which thresholds are set.
-        seed: Seed of the classifier and the detectors.
-        compared: What the classifier sees of learnt and held-out noise (see `features_of`), if it differs from the windows above: if
-            windows overlap, the classifier recognises single windows of real noise, whatever the noise is like.
+        seed: Seed of the classifier, the detectors and the positions of the anomalies.
 
     Raises:
         InputError: If there are fewer than 20 windows of a kind.
@@ -74,48 +87,40 @@ class NoiseJudge:
         learnt: np.ndarray,
         held_out: np.ndarray,
         signals: Sequence[np.ndarray],
+        compared: Sequence[np.ndarray],
         rate: float = 0.01,
         seed: int = 0,
-        compared: Sequence[np.ndarray] | None = None,
     ):
-        number = min(len(learnt), len(held_out))
-        _check_number(number)
+        _check_number(min(len(learnt), len(held_out)))
         self.rate, self.seed, self._signals = rate, seed, signals
-        self._judged = signals[2][: len(held_out)] + held_out
-        self._edges = signal_edges(signals[1])
-        self._unit = unit_of(learnt)
-        if compared is None:
-            compared = [
-                features_of(noise[:number], signal[:number], self._edges, self._unit)
-                for noise, signal in ((learnt, signals[1]), (held_out, signals[2]))
-            ]
+        nominal = signals[2][: len(held_out)] + held_out
+        self._trial = evaluation.make_trial(nominal, nominal, None, unit_of(learnt), seed, _NUM_ANOMALOUS)
         learnt_features, self._held_out_features = compared
         self.real_auc = boosted_trees(learnt_features, self._held_out_features, seed).auc
-        self.real_alarms = self._alarms(signals[1][: len(learnt)] + learnt)
+        self.real_alarms, self.real_recall = self._detected(signals[1][: len(learnt)] + learnt)
 
-    def _alarms(self, training: np.ndarray) -> float:
-        """False-alarm rate on held-out real windows, mean over the cheap detectors; half of the windows set the thresholds."""
-        half, rates = len(training) // 2, []
+    def _detected(self, training: np.ndarray) -> tuple[float, float]:
+        """False-alarm rate and recall on held-out real windows, means over the cheap detectors; half of the windows set the thresholds."""
+        half, rates, recalls = len(training) // 2, [], []
         for name in _CHEAP:
             detector = DETECTORS[name](self.seed).fit(training[:half])
             threshold, _ = metrics.finite_threshold(detector.score(training[half:]), self.rate)  # an infinite one would silence all rungs
-            rates.append(metrics.false_alarm_rate(detector.score(self._judged), threshold))
-        return float(np.mean(rates))
+            rates.append(metrics.false_alarm_rate(detector.score(self._trial.nominal), threshold))
+            recalls += [metrics.recall(detector.score(windows), threshold) for windows in self._trial.anomalous.values()]
+        return float(np.mean(rates)), float(np.mean(recalls))
 
-    def judge(self, rung: str, generated: np.ndarray, compared: np.ndarray | None = None) -> RungJudgement:
+    def judge(self, rung: str, generated: np.ndarray, compared: np.ndarray) -> RungJudgement:
         """Judges the noise of a rung.
 
         Args:
             rung: Name of the rung.
             generated: Generated noise windows, as many as real ones; half train the detectors, and half set their thresholds.
-            compared: What the classifier sees of generated noise, if that of real noise was given.
+            compared: What the classifier sees of generated noise.
         """
         _check_number(len(generated))
-        signal = self._signals[0][: len(generated)]
-        if compared is None:
-            compared = features_of(generated, signal, self._edges, self._unit)[: len(self._held_out_features)]
         auc = boosted_trees(compared, self._held_out_features, self.seed).auc
-        return RungJudgement(rung, auc, self.real_auc, self._alarms(signal + generated), self.real_alarms)
+        alarms, recall = self._detected(self._signals[0][: len(generated)] + generated)
+        return RungJudgement(rung, auc, self.real_auc, alarms, self.real_alarms, recall, self.real_recall)
 
 
 def unit_of(noise: np.ndarray) -> float:

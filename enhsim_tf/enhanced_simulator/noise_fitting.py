@@ -171,7 +171,7 @@ class HeldOutJudge:
         self._learnt, self._held_out, self._training, self._clean = learnt, judged, training, learnt.clean[rows]
         signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[last])]
         _, *compared = compare(NoiseWindows(learnt.noise[rows], self._clean), learnt, judged)
-        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[last], signals, seed=training.seed, compared=compared)
+        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[last], signals, compared, seed=training.seed)
 
     def judge(self, option: str, model: Any) -> noise_choice.RungJudgement:
         """Judges a fitted noise model.
@@ -259,12 +259,13 @@ def sentence_of(rows: Sequence[Mapping[str, Any]], used: str) -> str:
     """
     if not rows:
         return f"Noise model: {used}."
-    judged = [f"{each['name']} {each['auc']:.2f} and {each['alarms']:.1%}" for each in rows]
+    judged = [f"{each['name']} {each['auc']:.2f}, {each['alarms']:.1%} and {each['recall']:.0%}" for each in rows]
     (chosen,) = [each for each in rows if each["is_chosen"]]
     why = "the simplest that passes" if chosen["passes"] else "none passes, and it departs least"
     return (
-        "Noise models on held-out time, by the AUC of a classifier against real noise and the false alarms of two detectors: "
-        f"{', '.join(judged)}; real noise {chosen['real_auc']:.2f} and {chosen['real_alarms']:.1%}. Used: {chosen['name']}, {why}."
+        "Noise models on held-out time, by the AUC of a classifier against real noise, and the false alarms and the recall of two detectors: "
+        f"{'; '.join(judged)}; real noise {chosen['real_auc']:.2f}, {chosen['real_alarms']:.1%} and {chosen['real_recall']:.0%}. "
+        f"Used: {chosen['name']}, {why}."
     )
 
 

@@ -10,10 +10,11 @@ held-out windows measures how well the network fits.
 References:
     Bishop, "Mixture density networks", 1994.
     van den Oord et al., "WaveNet: a generative model for raw audio", 2016.
+    Loshchilov and Hutter, "Decoupled weight decay regularization", 2019.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from enhsim_tf.keras_tools.training import seeded_initialiser
 from enhsim_tf.telemetry.quantisation import Levels
 
 NUM_LAGS = 64  # samples that the network sees one by one
+TAILS = "logarithm"  # what is trained of the degrees of freedom
 _CLIP = 6.0  # largest magnitude, in standard deviations, with which a sample enters the non-linear part
 _TINY = 1e-3  # added to magnitudes before their logarithm is taken
 _LOG_SCALES = (-6.0, 3.0)  # limits of the logarithm of a component's scale, in standard deviations
@@ -30,6 +32,10 @@ _NUM_NODES = 5  # at which the density over a step is evaluated (Gauss-Legendre 
 _LEAST_SCALE = 0.25  # of a component of quantised noise, in steps: a narrower one lies between the nodes
 _LEAST_DEGREES = 2.1  # degrees of freedom of a component; at 2 its variance is infinite
 _LIMIT = 2.0  # generated samples stay within this multiple of the largest magnitude of the training windows
+_WEIGHT_DECAY = 0.3  # of the layers that see the past, so that they follow it no more than the telemetry shows
+_LOG_DEGREES = (2.0, 7.0)  # initial logarithms of the degrees of freedom above the least: of the two components with tails, of the others
+_MAX_LOG_DEGREES = 8.0  # no telemetry tells more degrees of freedom from a normal distribution
+_LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimiser moves them by powers of ten, not by parts of one
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
 
 
@@ -90,17 +96,15 @@ class AutoregressiveNetwork:
 
     def _build(self) -> keras.Model:
         """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
-
-        def kernel(number: int, name: str = "he_uniform") -> keras.Initializer:
-            return seeded_initialiser(name, self.seed * 1000 + number)
-
         num_linear = len(self.lags) + len(self.octaves)
         features = keras.Input((num_linear + len(self.octaves) + 2 + len(_SIGNAL_LAGS) * self.follows_signal,))
         linear = keras.layers.Dense(1, kernel_initializer="zeros", name="linear")(features[:, :num_linear])
         hidden = keras.ops.clip(features, -_CLIP, _CLIP)
         for name, number in (("first", 600), ("second", 601)):
-            hidden = keras.layers.Dense(self.units, "swish", kernel_initializer=kernel(number), name=name)(hidden)
-        hidden = keras.layers.Dense(3 * self.num_components, kernel_initializer=kernel(602, "glorot_uniform"), name="last")(hidden)
+            kernel = seeded_initialiser("he_uniform", self.seed * 1000 + number)
+            hidden = keras.layers.Dense(self.units, "swish", kernel_initializer=kernel, name=name)(hidden)
+        small = keras.initializers.VarianceScaling(0.01, "fan_avg", "uniform", seed=self.seed * 1000 + 602)  # nearly Gaussian at first
+        hidden = keras.layers.Dense(3 * self.num_components, kernel_initializer=small, name="last")(hidden)
         logits, shifts, log_scales = keras.ops.split(hidden, 3, axis=1)
         logits = logits + self.start_logits
         degrees = _Degrees(self.num_components, name="degrees")
@@ -120,10 +124,11 @@ class AutoregressiveNetwork:
         averaging: float = 0.99,
         on_iteration: Callable[[int], None] | None = None,
     ) -> "AutoregressiveNetwork":
-        """Trains the network by maximum likelihood with Adam, and keeps the weights that are best on the held-out windows.
+        """Trains the network by maximum likelihood, and keeps the weights that are best on the held-out windows.
 
-        The weights are averaged over the iterations with exponentially falling weights, and the learning rate falls along a
-        cosine. The averaged weights are compared on the last windows every hundred iterations.
+        The optimiser is Adam with decoupled weight decay (Loshchilov and Hutter 2019). The weights are averaged over the iterations with
+        exponentially falling weights, and the learning rate falls along a cosine. The averaged weights are compared on the last windows
+        every hundred iterations.
 
         Args:
             noise_windows: Noise of shape `(windows, samples)`, in the unit of the telemetry and in the order of time.
@@ -147,7 +152,8 @@ class AutoregressiveNetwork:
         judged = (tf.constant(values[last][:500]), tf.constant(signal[last][:500]))
         judged_positions = tf.constant(np.linspace(0, self.window - 1, min(100, self.window)).astype(np.int32))
         schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
-        optimizer = keras.optimizers.Adam(schedule, global_clipnorm=1.0)
+        optimizer = keras.optimizers.AdamW(schedule, weight_decay=_WEIGHT_DECAY, global_clipnorm=1.0)
+        optimizer.exclude_from_weight_decay(var_names=["bias", "degrees", "linear"])
         optimizer.build(self.network.trainable_variables)
         averages = [tf.Variable(each) for each in self.network.trainable_variables]
         number = len(values[first])
@@ -234,13 +240,9 @@ class AutoregressiveNetwork:
     def _log_density(targets: tf.Tensor, means: tf.Tensor, log_scales: tf.Tensor, degrees: tf.Tensor) -> tf.Tensor:
         """Computes the logarithm of the density of each component, shape `(samples, components)`."""
         standardised = (targets - means) * tf.exp(-log_scales)
-        return (
-            tf.math.lgamma((degrees + 1) / 2)
-            - tf.math.lgamma(degrees / 2)
-            - 0.5 * tf.math.log(math.pi * degrees)
-            - log_scales
-            - (degrees + 1) / 2 * tf.math.log1p(standardised**2 / degrees)
-        )
+        own = tf.cast(degrees[:1], tf.float64)  # the same for all samples; the difference below loses four digits
+        constant = tf.math.lgamma((own + 1) / 2) - tf.math.lgamma(own / 2) - 0.5 * tf.math.log(math.pi * own)
+        return tf.cast(constant, tf.float32) - log_scales - (degrees + 1) / 2 * tf.math.log1p(standardised**2 / degrees)
 
     def generate(self, num_windows: int, seed: int | np.random.Generator, signal_windows: np.ndarray | None = None) -> np.ndarray:
         """Generates windows of noise. The same seed gives the same noise.
@@ -319,25 +321,46 @@ class AutoregressiveNetwork:
         names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "units", "seed")
         return {name: getattr(self, name) for name in names}
 
+    def set_weights(self, weights: Sequence[np.ndarray], tails: str = TAILS) -> None:
+        """Sets the weights of the network, as `network.get_weights` returned them.
+
+        Args:
+            weights: The weights.
+            tails: What the weights of the degrees of freedom are: `TAILS`, or `softplus` in models that were saved before.
+
+        Raises:
+            ValueError: If the shapes or `tails` do not belong to this network.
+        """
+        if tails not in (TAILS, "softplus"):
+            raise ValueError(f"unknown tails {tails[:40]!r}")
+        self.network.set_weights(weights)
+        if tails == "softplus":
+            (degrees,) = self.network.get_layer("degrees").get_weights()
+            self.network.get_layer("degrees").set_weights([np.log(np.logaddexp(0, degrees.astype(np.float64))) / _LOG_UNIT])
+
 
 @keras.saving.register_keras_serializable("enhsim_tf")
 class _Degrees(keras.layers.Layer):
-    """Degrees of freedom of each component: trainable, the same for all samples."""
+    """Degrees of freedom of each component: trainable, the same for all samples.
+
+    The weight is the logarithm of what they are above the least, in units of `_LOG_UNIT`: one step of the optimiser changes few and many
+    degrees by the same factor.
+    """
 
     def __init__(self, num_components: int, **settings: object):
         super().__init__(**settings)
         self.num_components = num_components
 
     def build(self, input_shape: tuple) -> None:
-        start = np.where(np.arange(self.num_components) < 2, 1.0, 1000.0)
+        start = np.where(np.arange(self.num_components) < 2, *_LOG_DEGREES) / _LOG_UNIT
         self.degrees = self.add_weight(
             name="degrees", shape=(self.num_components,), initializer=lambda shape, dtype: start.astype("float32")
         )
 
     def call(self, logits: keras.KerasTensor) -> keras.KerasTensor:
-        return _LEAST_DEGREES + keras.ops.softplus(self.degrees) + 0 * logits
+        return _LEAST_DEGREES + keras.ops.exp(keras.ops.minimum(_LOG_UNIT * self.degrees, _MAX_LOG_DEGREES)) + 0 * logits
 
 
 def _degrees(weights: np.ndarray) -> np.ndarray:
     """Returns the degrees of freedom for the weights of `_Degrees`."""
-    return _LEAST_DEGREES + np.logaddexp(0, weights.astype(np.float64))
+    return _LEAST_DEGREES + np.exp(np.minimum(_LOG_UNIT * weights.astype(np.float64), _MAX_LOG_DEGREES))

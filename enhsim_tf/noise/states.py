@@ -68,13 +68,12 @@ def state_of(model: Any) -> NoiseState:
         return NoiseState({"kind": kind}, arrays={"windows": model.windows})
     if kind == "matched residual windows":
         return NoiseState({"kind": kind}, arrays={"windows": model.windows, "signals": model.signals})
-    from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
+    from enhsim_tf.noise.autoregressive_network import TAILS, AutoregressiveNetwork
     from enhsim_tf.noise.gan import NoiseGAN
 
     if isinstance(model, AutoregressiveNetwork):
-        names = ("window", "scale", "limit", "step", "follows_signal", "num_components", "units", "seed")
         weights = {f"weight_{number:02}": weight for number, weight in enumerate(model.network.get_weights())}
-        return NoiseState({"kind": _AUTOREGRESSIVE_NETWORK} | {name: getattr(model, name) for name in names}, arrays=weights)
+        return NoiseState({"kind": _AUTOREGRESSIVE_NETWORK, "tails": TAILS} | model.get_config(), arrays=weights)
     if isinstance(model, NoiseGAN):
         return NoiseState({"kind": _GAN} | model.get_config(), {"generator": model.generator, "discriminator": model.discriminator})
     raise TypeError(f"Expected a noise model of the ladder. Received: {type(model).__name__}.")
@@ -112,8 +111,9 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         _positive(values["scale"])
         if not (2 <= values["window"] <= 1_000_000 and 0 < values["num_components"] * values["units"] <= 1_000_000):
             raise ValueError("a noise network of an impossible size")
+        tails = str(values.pop("tails", "softplus"))  # models that were saved before do not say
         model = AutoregressiveNetwork(**values)
-        model.network.set_weights([arrays[name] for name in sorted(arrays)])
+        model.set_weights([arrays[name] for name in sorted(arrays)], tails)
         return model
     if kind == _GAN:
         from enhsim_tf.noise.gan import NoiseGAN

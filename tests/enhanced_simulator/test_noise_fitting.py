@@ -152,13 +152,33 @@ def test_too_little_telemetry_gets_residual_windows_and_a_note():
 
 def test_the_sentence_names_all_rungs_and_why_one_is_used():
     rows = [
-        {"name": "gaussian", "auc": 0.9, "real_auc": 0.52, "alarms": 0.5, "real_alarms": 0.01, "passes": False, "is_chosen": False},
-        {"name": "paper", "auc": 0.7, "real_auc": 0.52, "alarms": 0.02, "real_alarms": 0.01, "passes": False, "is_chosen": True},
+        {
+            "name": "gaussian",
+            "auc": 0.9,
+            "real_auc": 0.52,
+            "alarms": 0.5,
+            "real_alarms": 0.01,
+            "recall": 0.9,
+            "real_recall": 0.6,
+            "passes": False,
+            "is_chosen": False,
+        },
+        {
+            "name": "paper",
+            "auc": 0.7,
+            "real_auc": 0.52,
+            "alarms": 0.02,
+            "real_alarms": 0.01,
+            "recall": 0.58,
+            "real_recall": 0.6,
+            "passes": False,
+            "is_chosen": True,
+        },
     ]
     said = sentence_of(json.loads(json.dumps(rows)), "best")
     assert (
-        "gaussian 0.90 and 50.0%" in said
-        and "real noise 0.52 and 1.0%" in said
+        "gaussian 0.90, 50.0% and 90%; paper 0.70, 2.0% and 58%" in said
+        and "real noise 0.52, 1.0% and 60%" in said
         and said.endswith("Used: paper, none passes, and it departs least.")
     )
     assert sentence_of([], "paper") == "Noise model: paper."

@@ -78,6 +78,21 @@ def test_numpy_draws_from_the_density_that_training_maximises():
         assert np.mean(drawn <= value) == pytest.approx(expected, abs=0.012)  # three standard errors of a share of 20,000
 
 
+def test_the_density_is_that_of_students_distribution_for_few_and_many_degrees_of_freedom():
+    values, degrees = np.linspace(-4, 4, 9, dtype=np.float32)[:, None], np.array([2.2, 5.0, 80.0, 2_983.0])
+    rows = np.repeat(degrees[None].astype(np.float32), 9, axis=0)
+    found = AutoregressiveNetwork._log_density(values, 0.5, np.float32(np.log(0.7)), rows)
+    assert_allclose(found, t.logpdf((values - 0.5) / 0.7, degrees) - np.log(0.7), atol=3e-5, rtol=1e-5)
+
+
+def test_the_largest_samples_are_as_large_as_those_of_the_process():
+    """Independent Laplace samples: the quantile of the magnitude in closed form, far beyond where most of the samples are."""
+    noise = np.random.default_rng(2).laplace(size=(4_000, 32))
+    generated = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 400).generate(20_000, 1)
+    for share in (1e-2, 1e-3, 1e-4):  # of 640,000 samples
+        assert np.quantile(np.abs(generated), 1 - share) == pytest.approx(-np.log(share), rel=0.1)
+
+
 def test_noise_whose_scale_follows_the_signal_is_learnt():
     rng = np.random.default_rng(4)
     signal = rng.uniform(-1, 1, (1_000, 1)) * np.ones((1, 30))

@@ -29,6 +29,28 @@ def test_models_saved_under_the_old_name_are_read():
     np.testing.assert_array_equal(model.windows, WINDOWS)
 
 
+def test_a_network_saved_with_degrees_of_freedom_under_a_softplus_draws_the_same_noise():
+    network = AutoregressiveNetwork.untrained(WINDOWS, seed=4).fit(WINDOWS, 5)
+    state = state_of(network)
+    settings = {name: value for name, value in state.settings.items() if name != "tails"}
+    (place,) = [name for name, weight in state.arrays.items() if weight.shape == (network.num_components,)]
+    degrees = np.exp(
+        10 * state.arrays[place].astype(np.float64)
+    )  # above the least; the inverse of a softplus gives the weights of that time
+    before = np.where(degrees > 30, degrees, np.log(np.expm1(np.minimum(degrees, 30)))).astype(np.float32)
+    again = model_from(settings, {}, dict(state.arrays) | {place: before})
+    np.testing.assert_allclose(again.generate(50, 1), network.generate(50, 1), rtol=1e-3, atol=1e-5)
+    with pytest.raises(ValueError, match="unknown tails 'cauchy'"):
+        model_from(dict(state.settings) | {"tails": "cauchy"}, {}, state.arrays)
+
+
+def test_the_levels_of_quantised_noise_are_saved():
+    noise = 0.1 + 0.25 * np.rint(WINDOWS / 0.25)
+    state = state_of(AutoregressiveNetwork.untrained(noise).fit(noise, 2))
+    levels = (model_from(state.settings, {}, state.arrays).generate(5, 1) - 0.1) / 0.25
+    np.testing.assert_allclose(levels, np.rint(levels), atol=1e-4)
+
+
 @pytest.mark.parametrize(
     ("settings", "arrays", "words"),
     [

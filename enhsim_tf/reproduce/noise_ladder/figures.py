@@ -1,6 +1,6 @@
 """The figure of the experiment on noise, drawn from its findings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import matplotlib.figure
@@ -10,6 +10,7 @@ from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.reproduce.figure import Figure
+from enhsim_tf.reproduce.noise_ladder.findings import fewer_seeds
 from enhsim_tf.reproduce.publish.wording import in_list
 
 BASELINE = "residual windows"
@@ -30,14 +31,16 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     """False alarms on nominal windows for each rung of the noise ladder, one row for each family of noise."""
     families = sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at")
     kept, rung = found["limits"], found["limits"]["rung"]
-    seeds = max(len(about["seeds"]) for _, about in families)
+    seeds = len(found["seeds"])
+    shown = {had: [name for name in names if name in _MARKS] for had, names in fewer_seeds(found).items()}
+    fewer = "".join(f" ({in_list(names)}: {in_words(len(had))})" for had, names in shown.items() if names)
     strict = [f"{name} {about['kept']}" for name, about in kept["within_strict"].items() if about["of"] and name in _MARKS]
     figure, down = new_sheet(
         DOUBLE,
         2.05 + 0.22 * len(families),
         _message(kept["within"], rung),
         f"Mean over {in_words(len(DETECTORS))} detectors whose thresholds are set for 1 % (vertical line); {in_words(seeds)} seed"
-        f"{'s' * (seeds > 1)}{_fewer(families, seeds)}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
+        f"{'s' * (seeds > 1)}{fewer}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
         f"windows on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the others. "
         f"Families within {100 * kept['looked at']['limit']:.0f} point: {', '.join(strict)}. "
         "Not shown: without noise, detectors flag nearly all windows.",
@@ -61,20 +64,6 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     axes.set_xlabel("false alarms on nominal windows (%)")
     axes.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(-0.22, 1.0), handletextpad=0.2, columnspacing=1.0)
     return figure
-
-
-def _fewer(families: Sequence[tuple[str, Mapping[str, Any]]], seeds: int) -> str:
-    """Which of the models that are shown have fewer seeds."""
-    counts = {
-        name: min(len(about["rungs"][name]["seeds"]) for _, about in families if name in about["rungs"])
-        for name in _MARKS
-        if any(name in about["rungs"] for _, about in families)
-    }
-    by_count: dict[int, list[str]] = {}
-    for name, count in counts.items():
-        if count < seeds:
-            by_count.setdefault(count, []).append(name)
-    return "".join(f" ({in_list(names)}: {in_words(count)})" for count, names in by_count.items())
 
 
 def _message(within: Mapping[str, Any], learnt: str) -> str:

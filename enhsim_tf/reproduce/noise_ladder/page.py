@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
-from enhsim_tf.noise.ladder import RUNGS
 from enhsim_tf.reproduce.noise_gallery import GALLERY
-from enhsim_tf.reproduce.noise_ladder.findings import FIRST, PRESENT, REAL
+from enhsim_tf.reproduce.noise_ladder.findings import ARMS, MAX_RECALL_DIFFERENCE, PRESENT, REAL, fewer_seeds
 from enhsim_tf.reproduce.publish.results import fill_parts
 from enhsim_tf.reproduce.publish.wording import in_list
 
@@ -44,7 +43,7 @@ def fill_page(path: Path, noise: Findings | None = None, curve: Findings | None 
 def families(found: Findings) -> str:
     """The table of false-alarm rates, a row for each family and a column for each noise model, and what the families are."""
     used = {name for about in found["families"].values() for name in about["rungs"]}
-    names = [name for name in (REAL, *RUNGS) if name in used]
+    names = [name for name in (REAL, *ARMS) if name in used]
     lines = [f"| family | half | {' | '.join(names)} | chosen by the rule |", "|---" * (len(names) + 3) + "|"]
     for family, about in sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at"):
         half = f"{about['half']} (see above)" if about["half"] == "revised" else about["half"]
@@ -60,28 +59,15 @@ def _kind(family: str) -> str:
 
 
 def _chosen(choices: Sequence[Findings]) -> list[str]:
-    """The models that the present rule chooses, or the first rule where the present one has judged no seed."""
-    chosen = {rule: sorted({each["chosen"] for each in choices if each["rule"] == rule}) for rule in (PRESENT, FIRST)}
-    return chosen[PRESENT] or [f"{name} (first rule)" for name in chosen[FIRST]]
+    """The models that the present rule chooses, or the former rules where the present one has judged no seed."""
+    by_present = sorted({each["chosen"] for each in choices if each["rule"] == PRESENT})
+    return by_present or sorted({f"{each['chosen']} ({each['rule']} rule)" for each in choices})
 
 
 def _scope(found: Findings) -> str:
     said = f"False alarms on nominal windows with real noise, thresholds set for 1 % ({_seeds(found['seeds'])}, budget {found['budget']}"
-    fewer = _fewer_seeds(found)
+    fewer = "; ".join(f"{in_list(names)}: {_seeds(seeds)} alone" for seeds, names in fewer_seeds(found).items())
     return f"{said}; {fewer}):" if fewer else f"{said}):"
-
-
-def _fewer_seeds(found: Findings) -> str:
-    """Which models have fewer seeds than the experiment, and which."""
-    by_model: dict[str, set[int]] = {}
-    for about in found["families"].values():
-        for name, values in about["rungs"].items():
-            by_model.setdefault(name, set()).update(values["seeds"])
-    fewer: dict[str, list[str]] = {}
-    for name, seeds in by_model.items():
-        if seeds != set(found["seeds"]):
-            fewer.setdefault(_seeds(sorted(seeds)), []).append(name)
-    return "; ".join(f"{in_list(names)}: {which} alone" for which, names in fewer.items())
 
 
 def _seeds(seeds: Sequence[int]) -> str:
@@ -116,15 +102,11 @@ def limits(found: Findings) -> str:
     lines += [
         f"- Recall at the real rate within {100 * recall['limit']:g} points of that after training on real windows: {recall['kept']} of "
         f"{recall['of']} families{_differences(recall['missed'], 2)}.",
-        f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows{_losses(recall['lost'])}"
-        f"{_other_losses(recall['lost_by_model'], kept['rung'])}.",
+        f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows"
+        f"{_losses(recall['lost_by_model'][kept['rung']])}{_other_losses(recall['lost_by_model'], kept['rung'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
         f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
-        *(
-            _choice(kept[name], which, kept["rung"])
-            for name, which in (("choice", "present"), ("first_choice", "first"))
-            if kept[name]["of"]
-        ),
+        *(_choice(choice, rule, kept["rung"]) for rule, choice in kept["choice"].items() if choice["of"]),
     ]
     return "\n".join([*lines, "", *_realism(realism["by_model"])])
 
@@ -135,7 +117,9 @@ def _choice(choice: Findings, which: str, learnt: str) -> str:
     models = " or ".join(map(str, choice["judged"]))
     return (
         f"- Excess of the model that the {which} rule chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
-        f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. On "
+        f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
+        f"Among the models that lose at most {100 * MAX_RECALL_DIFFERENCE:g} points of recall, and if the chosen one loses no more either: "
+        f"{choice['kept_that_finds']} of {choice['of']} families{_differences(choice['missed_that_finds'])}. On "
         f"{_families(choice['none_passes'])}, no model passes, and the smallest departure decides. The {learnt} passes on {choice['learnt_passes']} "
         f"families. Detectors trained with the chosen model flag at most {100 * choice['excess'][worst]:.1f} points more windows than after training on real "
         f"windows ({worst.replace('_', ' ')}), and lose at most {100 * choice['lost'][least]:.1f} points of recall ({least.replace('_', ' ')})."

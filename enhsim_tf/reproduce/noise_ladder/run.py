@@ -54,7 +54,5 @@ def lines(found: dict[str, Any]) -> list[str]:
         name: ", ".join(f"{rung} {values['alarms']:.1%}" for rung, values in about["rungs"].items())
         for name, about in found["families"].items()
     }
-    return [
-        f"{name:18} ({about['half']}) chosen: {', '.join(about['chosen'])}; false alarms: {rates[name]}"
-        for name, about in found["families"].items()
-    ]
+    chosen = {name: ", ".join(dict.fromkeys(each["chosen"] for each in about["choices"])) for name, about in found["families"].items()}
+    return [f"{name:18} ({about['half']}) chosen: {chosen[name]}; false alarms: {rates[name]}" for name, about in found["families"].items()]
