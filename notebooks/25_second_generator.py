@@ -153,6 +153,7 @@ np.testing.assert_allclose(*padded, atol=0.02)  # the package uses Burg's method
 
 # %%
 import tensorflow as tf
+from scipy.special import gammaln
 
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
@@ -185,8 +186,9 @@ def build_density(num_features, num_linear):
 def negative_log_likelihood(network, degrees, past, sample):
     shares, means, log_scales = network(past)
     z = (sample[:, None] - means) / tf.exp(log_scales)
-    bell = tf.math.lgamma((degrees + 1) / 2) - tf.math.lgamma(degrees / 2) - tf.math.log(np.pi * degrees) / 2
-    bell = bell - (degrees + 1) / 2 * tf.math.log1p(z**2 / degrees) - log_scales
+    # the height of each bell curve, a small difference of large numbers: in double precision
+    height = gammaln((degrees + 1) / 2) - gammaln(degrees / 2) - np.log(np.pi * degrees) / 2
+    bell = height.astype("float32") - (degrees + 1) / 2 * tf.math.log1p(z**2 / degrees) - log_scales
     return -tf.reduce_mean(tf.reduce_logsumexp(tf.nn.log_softmax(shares) + bell, axis=1))
 
 
@@ -201,7 +203,7 @@ first_input = past_of(example[:1, :40], 0, 40)
 network = build_density(first_input.shape[1], len(tiny.network.get_layer("linear").get_weights()[0]))
 for name in names:
     network.get_layer(name).set_weights(tiny.network.get_layer(name).get_weights())
-degrees = 2.1 + np.logaddexp(0, tiny.network.get_layer("degrees").get_weights()[0])
+degrees = tiny.degrees
 values = (example[:100, :40] / tiny.scale).astype("float32")
 positions = (0, 1, 7, 30)
 mine = [

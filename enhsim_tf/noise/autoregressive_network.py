@@ -274,11 +274,9 @@ class AutoregressiveNetwork:
 
     def _draw(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Draws rows sample by sample, with the network's layers in NumPy: a call of a model takes longer than its products."""
-        layers = ("linear", "first", "second", "last", "degrees")
-        (linear, linear_bias), first_layer, second_layer, last_layer, (degrees,) = (
-            self.network.get_layer(name).get_weights() for name in layers
-        )
-        degrees = _degrees(degrees)
+        layers = ("linear", "first", "second", "last")
+        (linear, linear_bias), first_layer, second_layer, last_layer = (self.network.get_layer(name).get_weights() for name in layers)
+        degrees = self.degrees
         num_lags, num_linear, parts = len(self.lags), len(linear), self.num_components
         series = np.zeros((num_rows, num_lags + num_samples), np.float32)
         sums = np.zeros((2, num_rows, num_samples + 1))
@@ -315,6 +313,12 @@ class AutoregressiveNetwork:
         if not self.step:
             return values
         return (self.origin + self.step * np.rint((values * self.scale - self.origin) / self.step)) / self.scale
+
+    @property
+    def degrees(self) -> np.ndarray:
+        """Degrees of freedom of the components, shape `(components,)`; many of them are a normal distribution."""
+        (weights,) = self.network.get_layer("degrees").get_weights()
+        return _LEAST_DEGREES + np.exp(np.minimum(_LOG_UNIT * weights.astype(np.float64), _MAX_LOG_DEGREES))
 
     def get_config(self) -> dict:
         """Returns the settings that rebuild the network, as JSON types."""
@@ -359,8 +363,3 @@ class _Degrees(keras.layers.Layer):
 
     def call(self, logits: keras.KerasTensor) -> keras.KerasTensor:
         return _LEAST_DEGREES + keras.ops.exp(keras.ops.minimum(_LOG_UNIT * self.degrees, _MAX_LOG_DEGREES)) + 0 * logits
-
-
-def _degrees(weights: np.ndarray) -> np.ndarray:
-    """Returns the degrees of freedom for the weights of `_Degrees`."""
-    return _LEAST_DEGREES + np.exp(np.minimum(_LOG_UNIT * weights.astype(np.float64), _MAX_LOG_DEGREES))

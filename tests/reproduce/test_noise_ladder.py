@@ -120,6 +120,7 @@ def test_the_summary_counts_what_a_table_says():
             "family": row["family"],
             "seed": 1,
             "rung": row["rung"],
+            "rule": "present",
             "auc": 0.5,
             "real_auc": 0.5,
             "alarms": row["alarms"] / 1_000,
@@ -253,7 +254,8 @@ def test_models_are_compared_with_real_windows_of_their_own_seeds():
     ]
     realism = [{"family": "bursts", "seed": seed, "rung": rung, "measure": "m", "value": 0.0, "ratio": 1.0} for rung, seed in rates]
     judged = {"auc": 0.5, "real_auc": 0.5, "alarms": 0.01, "real_alarms": 0.01}
-    choice = [{"family": "bursts", "seed": seed, "rung": rung} | judged for rung, seed in rates if rung != "real"]
+    rules = {3000: "first", 3001: "second"}
+    choice = [{"family": "bursts", "seed": seed, "rung": rung, "rule": rules[seed]} | judged for rung, seed in rates if rung != "real"]
     found = findings.summarise(
         {name: pd.DataFrame(table) for name, table in zip(findings.KEPT.names, (detectors, realism, choice), strict=True)}
     )

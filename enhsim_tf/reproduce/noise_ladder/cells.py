@@ -17,7 +17,7 @@ from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseTraining, NoiseWindows
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import BY_OPTION, STREAMS
-from enhsim_tf.reproduce.noise_ladder.findings import REAL
+from enhsim_tf.reproduce.noise_ladder.findings import PRESENT, REAL
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
@@ -95,7 +95,8 @@ class Cell:
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
             generated = ladder.generate(model, len(held_out), draws, more)
-            choice = [dataclasses.asdict(dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung))]
+            judgement = dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung)
+            choice = [{"rule": PRESENT} | dataclasses.asdict(judgement)]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
         rates = evaluation.false_alarm_rates(judged["alarms"])
         detectors = [

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 KEPT = KeptTables(
     names=("detectors", "realism", "choice"),
-    labels=("family", "rung", "detector", "measure"),
+    labels=("family", "rung", "detector", "measure", "rule"),
     digits=4,
     kind="experiment",
     command="python -m enhsim_tf.reproduce --experiment noise",
@@ -29,9 +29,9 @@ MAX_RECALL_DIFFERENCE = 0.03
 MAX_REALISM_RATIO = 3.0
 MAX_REGRET = 0.005  # by which the excess of the chosen rung may be above that of the best rung
 PRESENT = "present"
-FORMER_RULES = {3_000: "first", 3_001: "second"}
-"""The rules of the choice before the present one, by the seed that each judged. The classifier of the first rule saw the noise alone, in
-windows that overlap. Neither rule knew the recall."""
+FORMER_RULES = ("second", "first")
+"""The rules of the choice before the present one, which judged the published seeds 3001 and 3000. The classifier of the first rule saw the
+noise alone, in windows that overlap. Neither rule knew the recall."""
 FORMER = "autoregressive network, first form"
 """Rows of the autoregressive network on the seeds of the former rules, before its tails were changed."""
 _NETWORK = "autoregressive network"
@@ -145,10 +145,9 @@ def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[s
     names, lost = [each.rung for each in judged], {each.rung: recalls[REAL] - recalls[each.rung] for each in judged}
     finding = [name for name in names if lost[name] <= MAX_RECALL_DIFFERENCE] or names
     chosen, best, best_that_finds = choose(judged), *(min(some, key=rates.__getitem__) for some in (names, finding))
-    seed = int(rows["seed"].iloc[0])
     return {
-        "seed": seed,
-        "rule": FORMER_RULES.get(seed, PRESENT),
+        "seed": int(rows["seed"].iloc[0]),
+        "rule": str(rows["rule"].iloc[0]),
         "chosen": chosen,
         "passing": [each.rung for each in judged if each.passes],
         "best": best,
@@ -214,7 +213,7 @@ def _limits(families: dict[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
         "of": len(learnt),
         "by_model": {name: _realism_of(name, families) for name in (REAL, *ARMS)},
     }
-    found["choice"] = {rule: _choices(families, rule, rung) for rule in (PRESENT, *FORMER_RULES.values())}
+    found["choice"] = {rule: _choices(families, rule, rung) for rule in (PRESENT, *FORMER_RULES)}
     return found
 
 
