@@ -119,9 +119,8 @@ def fit_noise(option: str, windows: NoiseWindows, training: NoiseTraining, notes
     count = training.progress.loop(name, number) if option in NETWORKS else None
     watch = ladder.Watch(None if training.verbose == "auto" else bool(training.verbose), count, notes.append)
     signal = training.to_unit(windows.clean) if option in FOLLOWERS else None
-    if option == "paper":
-        return ladder.fit_paper_gan(windows.noise, number, training.seed, training.unit, watch)
-    return ladder.RUNGS[BY_OPTION[option]](windows.noise, signal, number, training.seed, watch)
+    task = ladder.FitTask(windows.noise, signal, number, training.seed, windows.starts, watch)
+    return ladder.fit_paper_gan(task, training.unit) if option == "paper" else ladder.RUNGS[BY_OPTION[option]](task)
 
 
 def choose_noise(
@@ -183,8 +182,8 @@ class HeldOutJudge:
         training, clean = self._training, self._clean
         rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
         noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
-        if training.quantisation is not None:
-            noise = training.quantisation.round(clean + noise) - clean
+        generated = clean + noise  # 32-bit numbers: the noise that is judged has the rounding errors of the real one
+        noise = (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
         return self._judge.judge(option, noise, compare(NoiseWindows(noise, clean), self._learnt, self._held_out)[0])
 
 

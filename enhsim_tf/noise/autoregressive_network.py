@@ -3,9 +3,13 @@
 The probability density of a window is the product of the densities of its samples, each given all samples before it. A network
 that predicts these conditional densities can represent any stationary noise, up to its capacity: no correlation time, no period
 and no pulse is built into the network. The network receives the last samples one by one, and the whole past of the window as
-averages of the value and of its magnitude over the last 2, 4, 8, ... samples. The density of a sample is a mixture of Student's t
-distributions, so that it can have several modes, a skew and heavy tails. Training maximises the likelihood. The likelihood of
-held-out windows measures how well the network fits.
+averages of the value and of its magnitude over the last 2, 4, 8, ... samples, and as linear predictions of both, which are fitted in
+closed form (`linear_prediction`). The density of a sample is a mixture of Student's t distributions around the linear prediction, so
+that it can have several modes, a skew and heavy tails.
+
+Training maximises the likelihood. A network with thousands of weights finds a little structure in any noise, even in white noise,
+whose samples then get heavier tails than they have. What the density takes from the past is therefore shrunk after training, as far
+as the likelihood of held-out windows asks for it (`shrinkage`).
 
 References:
     Bishop, "Mixture density networks", 1994.
@@ -21,6 +25,8 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.keras_tools.backend import keras, tf
 from enhsim_tf.keras_tools.training import seeded_initialiser
+from enhsim_tf.noise.linear_prediction import LinearPrediction
+from enhsim_tf.noise.shrinkage import shrink
 from enhsim_tf.telemetry.quantisation import Levels
 
 NUM_LAGS = 64  # samples that the network sees one by one
@@ -36,6 +42,11 @@ _WEIGHT_DECAY = 0.3  # of the layers that see the past, so that they follow it n
 _LOG_DEGREES = (2.0, 7.0)  # initial logarithms of the degrees of freedom above the least: of the two components with tails, of the others
 _MAX_LOG_DEGREES = 8.0  # no telemetry tells more degrees of freedom from a normal distribution
 _LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimiser moves them by powers of ten, not by parts of one
+_PREDICTED = (0, 1, 2, 4, 8, 16, 32)  # samples before the present one whose linear prediction the network sees
+_EARLY = (25, 50, 75)  # iterations after which the weights are also compared on held-out windows: few windows are soon learnt by heart
+# Every third position is drawn early in the window: the first samples decide how loud the whole window is, and where periods begin.
+_EARLY_SHARE, _EARLINESS = 3, 4
+_MOST_SHRUNK = 400_000  # samples that the shrinkage learns from
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
 
 
@@ -51,6 +62,7 @@ class AutoregressiveNetwork:
         follows_signal: Whether the density depends on the enhanced signal, too.
         num_components: Number of components of the mixture.
         units: Number of units of both hidden layers.
+        sees_predictions: Whether the density starts from linear predictions. Networks that were saved before do not.
         seed: Seed for the initial weights and for all random numbers in training.
     """
 
@@ -64,6 +76,7 @@ class AutoregressiveNetwork:
         follows_signal: bool = False,
         num_components: int = 8,
         units: int = 64,
+        sees_predictions: bool = True,
         seed: int = 0,
     ):
         self.window, self.scale, self.limit, self.seed = int(window), float(scale), float(limit), int(seed)
@@ -73,6 +86,8 @@ class AutoregressiveNetwork:
         self.follows_signal, self.num_components, self.units = bool(follows_signal), int(num_components), int(units)
         self.lags = np.arange(1, min(NUM_LAGS, window) + 1)
         self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
+        self.sees_predictions = bool(sees_predictions)
+        self.prediction = LinearPrediction.of_white_noise(self.window) if self.sees_predictions else None
         self.start_logits = np.where(np.arange(self.num_components) < 2, -6.0, 0.0).astype(np.float32)
         self.network = self._build()
 
@@ -97,7 +112,8 @@ class AutoregressiveNetwork:
     def _build(self) -> keras.Model:
         """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
         num_linear = len(self.lags) + len(self.octaves)
-        features = keras.Input((num_linear + len(self.octaves) + 2 + len(_SIGNAL_LAGS) * self.follows_signal,))
+        num_predicted = (len(_PREDICTED) + 1) * self.sees_predictions
+        features = keras.Input((num_linear + len(self.octaves) + 2 + num_predicted + len(_SIGNAL_LAGS) * self.follows_signal,))
         linear = keras.layers.Dense(1, kernel_initializer="zeros", name="linear")(features[:, :num_linear])
         hidden = keras.ops.clip(features, -_CLIP, _CLIP)
         for name, number in (("first", 600), ("second", 601)):
@@ -117,6 +133,7 @@ class AutoregressiveNetwork:
         noise_windows: np.ndarray,
         num_iterations: int = 3_000,
         signal_windows: np.ndarray | None = None,
+        starts: np.ndarray | None = None,
         batch_size: int = 200,
         positions: int = 50,
         learning_rate: float = 3e-3,
@@ -128,12 +145,13 @@ class AutoregressiveNetwork:
 
         The optimiser is Adam with decoupled weight decay (Loshchilov and Hutter 2019). The weights are averaged over the iterations with
         exponentially falling weights, and the learning rate falls along a cosine. The averaged weights are compared on the last windows
-        every hundred iterations.
+        every hundred iterations, and after some of the first hundred.
 
         Args:
-            noise_windows: Noise of shape `(windows, samples)`, in the unit of the telemetry and in the order of time.
+            noise_windows: Noise of shape `(windows, samples)`, in the unit of the telemetry.
             num_iterations: Number of iterations.
             signal_windows: Enhanced signal of the same shape, for a network that follows the signal.
+            starts: Start of each window in samples, shape `(windows,)`. None: no two windows overlap, and they are in the order of time.
             batch_size: Windows of an iteration.
             positions: Positions of an iteration, the same in all of its windows.
             learning_rate: Initial learning rate.
@@ -141,29 +159,30 @@ class AutoregressiveNetwork:
             averaging: Decay of the weighted average of the weights.
             on_iteration: Called after each iteration with the number of completed iterations.
         """
-        noise = np.asarray(noise_windows, np.float64)
+        values = (np.asarray(noise_windows, np.float64) / self.scale).astype(np.float32)
         rng = np.random.default_rng([self.seed, 61])
-        values = (noise / self.scale).astype(np.float32)
         signal = self._signal(signal_windows, values.shape)
-        num_kept = max(1, round(held_out * len(values)))
-        last = slice(len(values) - num_kept, None) if len(values) > num_kept else slice(None)
-        first = slice(0, max(1, len(values) - num_kept))
-        training = (tf.constant(values[first]), tf.constant(signal[first]))
-        judged = (tf.constant(values[last][:500]), tf.constant(signal[last][:500]))
+        first, last = _split(starts, len(values), self.window, held_out)
+        if self.sees_predictions:
+            self.prediction = LinearPrediction.fit(values[first], values[last])
+        data = (values, signal, self._predict(values))
+        training, judged = (tuple(tf.constant(each[rows]) for each in data) for rows in (first, last[:500]))
         judged_positions = tf.constant(np.linspace(0, self.window - 1, min(100, self.window)).astype(np.int32))
         schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
         optimizer = keras.optimizers.AdamW(schedule, weight_decay=_WEIGHT_DECAY, global_clipnorm=1.0)
         optimizer.exclude_from_weight_decay(var_names=["bias", "degrees", "linear"])
         optimizer.build(self.network.trainable_variables)
         averages = [tf.Variable(each) for each in self.network.trainable_variables]
-        number = len(values[first])
+        number = len(first)
 
         @tf.function
         def iterate(seed: tf.Tensor) -> tf.Tensor:
             rows = tf.random.stateless_uniform((min(batch_size, number),), seed, 0, number, tf.int32)
-            where = tf.random.stateless_uniform((min(positions, self.window),), seed + 1, 0, self.window, tf.int32)
+            share = tf.random.stateless_uniform((min(positions, self.window),), seed + 1)
+            share = tf.where(tf.range(len(share)) % _EARLY_SHARE == 0, share**_EARLINESS, share)
+            where = tf.minimum(tf.cast(share * self.window, tf.int32), self.window - 1)
             with tf.GradientTape() as tape:
-                loss = self._loss(tf.gather(training[0], rows), tf.gather(training[1], rows), where)
+                loss = self._loss(*(tf.gather(each, rows) for each in training), where)
             variables = self.network.trainable_variables
             optimizer.apply_gradients(zip(tape.gradient(loss, variables), variables, strict=True))
             for average, variable in zip(averages, variables, strict=True):
@@ -174,7 +193,7 @@ class AutoregressiveNetwork:
         best, kept, self.losses = np.inf, None, []
         for iteration in range(1, num_iterations + 1):
             loss = iterate(tf.constant(rng.integers(0, 2**30, 2), tf.int32))
-            if iteration % 100 == 0 or iteration == num_iterations:
+            if iteration % 100 == 0 or iteration in (*_EARLY, num_iterations):
                 current = [each.numpy() for each in self.network.trainable_variables]
                 self._assign([each.numpy() for each in averages])
                 held = float(evaluate())
@@ -186,7 +205,51 @@ class AutoregressiveNetwork:
                 on_iteration(iteration)
         if kept is not None:
             self._assign(kept)
+        self._shrink(training, judged)
+        self.held_out_loss = float(evaluate())
         return self
+
+    def _shrink(self, training: tuple[tf.Tensor, ...], judged: tuple[tf.Tensor, ...]) -> None:
+        """Shrinks what the density takes from the past, and fits what does not depend on it again; see `shrinkage`."""
+        parts, (degrees,) = self.num_components, self.network.get_layer("degrees").get_weights()
+        sizes = (1, parts, parts, parts)  # of the linear layer, and of the logits, shifts and scales of the last layer
+        layers = [self.network.get_layer(name) for name in ("linear", "last")]
+        outputs = keras.Model(self.network.input, keras.ops.concatenate([each.output for each in layers], axis=1))
+
+        def seen(data: tuple[tf.Tensor, ...]) -> tuple[tf.Tensor, tf.Tensor]:
+            each = max(1, min(self.window, _MOST_SHRUNK // len(data[0])))
+            where = tf.constant(np.linspace(0, self.window - 1, each).astype(np.int32))
+
+            @tf.function
+            def compute(rows: tuple[tf.Tensor, ...]) -> tuple[tf.Tensor, tf.Tensor]:
+                features, targets = self._features(*rows, where)
+                return outputs(features), targets
+
+            found = [compute(tuple(part[begin : begin + 200] for part in data)) for begin in range(0, len(data[0]), 200)]
+            return tuple(tf.concat(parts, 0) for parts in zip(*found, strict=True))
+
+        def loss(targets: tf.Tensor, outputs: tf.Tensor, weights: tf.Tensor) -> tf.Tensor:
+            linear, logits, shifts, log_scales = tf.split(outputs, sizes, axis=1)
+            log_scales = tf.clip_by_value(log_scales, *self.log_scales)
+            return self._negative_log_likelihood(targets, logits + self.start_logits, linear + shifts, log_scales, _degrees(weights)[None])
+
+        found = shrink(loss, seen(training), seen(judged), sizes, degrees)
+        begin = 0
+        for layer in layers:
+            kernel, bias = layer.get_weights()
+            own = slice(begin, begin + len(bias))
+            layer.set_weights([kernel * found.trust[own], found.trust[own] * bias + found.offset[own]])
+            begin += len(bias)
+        self.network.get_layer("degrees").set_weights([found.weights])
+
+    def _predict(self, values: np.ndarray) -> np.ndarray:
+        """Returns the linear predictions of value and logarithm of the magnitude, or nothing if the network does not see them."""
+        return np.zeros((*values.shape, 0), np.float32) if self.prediction is None else self.prediction.predict(values)
+
+    @property
+    def _errors(self) -> np.ndarray:
+        """Standard deviation around the linear prediction at each place of a window: the unit of the density."""
+        return np.ones(self.window, np.float32) if self.prediction is None else self.prediction.errors
 
     def _assign(self, weights: list[np.ndarray]) -> None:
         for variable, value in zip(self.network.trainable_variables, weights, strict=True):
@@ -202,10 +265,17 @@ class AutoregressiveNetwork:
             )
         return np.asarray(signal_windows, np.float32)
 
-    def _loss(self, values: tf.Tensor, signal: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
-        """Computes the mean negative log-likelihood of the samples at the given positions of each window.
+    def _loss(self, values: tf.Tensor, signal: tf.Tensor, predicted: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
+        """Computes the mean negative log-likelihood of the samples at the given positions of each window."""
+        features, targets = self._features(values, signal, predicted, where)
+        return self._negative_log_likelihood(targets, *self.network(features))
 
-        The likelihood of a level of quantised noise is the mean density over its step.
+    def _features(self, values: tf.Tensor, signal: tf.Tensor, predicted: tf.Tensor, where: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor]:
+        """Computes what the network sees before the samples at the given positions of each window, and what it is to predict.
+
+        Returns:
+            The features, a row for each sample; and each sample minus its linear prediction, in units of the error of this prediction
+            at this position, which is the second column.
         """
         num_lags, num_rows = len(self.lags), tf.shape(values)[0]
         padded = tf.pad(values, [[0, 0], [num_lags, 0]])
@@ -219,14 +289,29 @@ class AutoregressiveNetwork:
         place = tf.cast(where, tf.float32)[:, None]
         ages = tf.concat([place / self.window, 1 / tf.sqrt(1 + place)], 1)
         parts = [lags, means, tf.math.log(magnitudes + _TINY), tf.repeat(ages[None], num_rows, axis=0)]
+        targets = tf.gather(values, where, axis=1)
+        errors = tf.repeat(tf.gather(tf.constant(self._errors), where)[None], num_rows, axis=0)
+        if self.sees_predictions:
+            before = where[:, None] - tf.constant(_PREDICTED, tf.int32)[None, :]
+            earlier = tf.gather(predicted[:, :, 0], tf.maximum(before, 0), axis=1) * tf.cast(before >= 0, tf.float32)
+            parts += [earlier, tf.gather(predicted[:, :, 1], where, axis=1)[:, :, None]]
+            targets = (targets - earlier[:, :, 0]) / errors
         if self.follows_signal:
             around = tf.clip_by_value(where[:, None] + tf.constant(_SIGNAL_LAGS, tf.int32)[None, :], 0, self.window - 1)
             parts.append(tf.gather(signal, around, axis=1))
         features = tf.concat(parts, 2)
-        targets = tf.reshape(tf.gather(values, where, axis=1), (-1, 1))
-        logits, means, log_scales, degrees = self.network(tf.reshape(features, (-1, features.shape[2])))
+        return tf.reshape(features, (-1, features.shape[2])), tf.reshape(tf.stack([targets, errors], axis=2), (-1, 2))
+
+    def _negative_log_likelihood(
+        self, targets: tf.Tensor, logits: tf.Tensor, means: tf.Tensor, log_scales: tf.Tensor, degrees: tf.Tensor
+    ) -> tf.Tensor:
+        """Computes the mean negative log-likelihood of targets as returned by `_features`.
+
+        The likelihood of a level of quantised noise is the mean density over its step.
+        """
+        targets, errors = targets[:, :1], targets[:, 1:]
         if self.step:  # a level stands for all values that are rounded to it
-            half = self.step / self.scale / 2
+            half = self.step / self.scale / 2 / errors
             terms = [
                 math.log(weight / 2) + self._log_density(targets + half * node, means, log_scales, degrees)
                 for node, weight in zip(*np.polynomial.legendre.leggauss(_NUM_NODES), strict=True)
@@ -234,7 +319,7 @@ class AutoregressiveNetwork:
             log_density = tf.reduce_logsumexp(tf.stack(terms), axis=0)
         else:
             log_density = self._log_density(targets, means, log_scales, degrees)
-        return -tf.reduce_mean(tf.reduce_logsumexp(tf.nn.log_softmax(logits) + log_density, axis=1))
+        return -tf.reduce_mean(tf.reduce_logsumexp(tf.nn.log_softmax(logits) + log_density - tf.math.log(errors), axis=1))
 
     @staticmethod
     def _log_density(targets: tf.Tensor, means: tf.Tensor, log_scales: tf.Tensor, degrees: tf.Tensor) -> tf.Tensor:
@@ -276,22 +361,27 @@ class AutoregressiveNetwork:
         """Draws rows sample by sample, with the network's layers in NumPy: a call of a model takes longer than its products."""
         layers = ("linear", "first", "second", "last")
         (linear, linear_bias), first_layer, second_layer, last_layer = (self.network.get_layer(name).get_weights() for name in layers)
-        degrees = self.degrees
+        degrees, prediction, errors = self.degrees, self.prediction, self._errors
         num_lags, num_linear, parts = len(self.lags), len(linear), self.num_components
-        series = np.zeros((num_rows, num_lags + num_samples), np.float32)
+        reach = max(self.window - 1, num_lags)
+        series, loudness = np.zeros((2, num_rows, reach + num_samples), np.float32)
+        predicted = np.zeros((num_rows, _PREDICTED[-1] + num_samples), np.float32)
         sums = np.zeros((2, num_rows, num_samples + 1))
         features = np.zeros((num_rows, len(first_layer[0])), np.float32)
         rows = np.arange(num_rows)
         for place in range(num_samples):
-            begin = np.maximum(place - self.octaves, 0)
+            begin, now = np.maximum(place - self.octaves, 0), reach + place
             means, magnitudes = (sums[:, :, place, None] - sums[:, :, begin]) / np.maximum(place - begin, 1)
-            features[:, :num_lags] = series[:, place : place + num_lags][:, ::-1]
-            features[:, num_lags:num_linear] = means
-            features[:, num_linear : num_linear + len(begin)] = np.log(magnitudes + _TINY)
             age = min(place, self.window - 1)
-            features[:, num_linear + len(begin) : num_linear + len(begin) + 2] = age / self.window, 1 / math.sqrt(1 + age)
+            parts_seen = [self._last(series, now, num_lags), means, np.log(magnitudes + _TINY)]
+            parts_seen.append(np.full((num_rows, 2), (age / self.window, 1 / math.sqrt(1 + age))))
+            if prediction is not None:
+                latest = _PREDICTED[-1] + place
+                predicted[:, latest], loud = prediction.next(series[:, place:now], loudness[:, place:now], place)
+                parts_seen += [predicted[:, latest - np.array(_PREDICTED)], loud[:, None]]
             if self.follows_signal:
-                features[:, -len(_SIGNAL_LAGS) :] = signal[:, np.clip(place + np.array(_SIGNAL_LAGS), 0, num_samples - 1)]
+                parts_seen.append(signal[:, np.clip(place + np.array(_SIGNAL_LAGS), 0, num_samples - 1)])
+            np.concatenate(parts_seen, axis=1, out=features)
             hidden = np.clip(features, -_CLIP, _CLIP)
             for layer, bias in (first_layer, second_layer):
                 hidden = hidden @ layer + bias
@@ -303,10 +393,19 @@ class AutoregressiveNetwork:
             centre = features[:, :num_linear] @ linear[:, 0] + linear_bias[0] + shifts[rows, chosen]
             draw = rng.standard_normal(num_rows) / np.sqrt(2 * rng.standard_gamma(degrees[chosen] / 2) / degrees[chosen])
             value = centre + np.exp(np.clip(log_scales[rows, chosen], *self.log_scales)) * draw
+            if prediction is not None:
+                value = predicted[:, latest] + errors[age] * value
+                loudness[:, now] = -prediction.mean_magnitude
             value = self._to_level(np.clip(value, -self.limit, self.limit))
-            series[:, num_lags + place] = value
+            series[:, now] = value
+            loudness[:, now] += np.abs(value)
             sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
-        return series[:, num_lags:] * np.float32(self.scale)
+        return series[:, reach:] * np.float32(self.scale)
+
+    @staticmethod
+    def _last(series: np.ndarray, now: int, number: int) -> np.ndarray:
+        """The last samples of each row before a place, the latest first."""
+        return series[:, now - number : now][:, ::-1]
 
     def _to_level(self, values: np.ndarray) -> np.ndarray:
         """Rounds values, in units of the scale, to the levels of quantised noise; other noise stays as it is."""
@@ -318,11 +417,11 @@ class AutoregressiveNetwork:
     def degrees(self) -> np.ndarray:
         """Degrees of freedom of the components, shape `(components,)`; many of them are a normal distribution."""
         (weights,) = self.network.get_layer("degrees").get_weights()
-        return _LEAST_DEGREES + np.exp(np.minimum(_LOG_UNIT * weights.astype(np.float64), _MAX_LOG_DEGREES))
+        return np.asarray(_degrees(weights.astype(np.float64)))
 
     def get_config(self) -> dict:
         """Returns the settings that rebuild the network, as JSON types."""
-        names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "units", "seed")
+        names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "units", "sees_predictions", "seed")
         return {name: getattr(self, name) for name in names}
 
     def set_weights(self, weights: Sequence[np.ndarray], tails: str = TAILS) -> None:
@@ -362,4 +461,22 @@ class _Degrees(keras.layers.Layer):
         )
 
     def call(self, logits: keras.KerasTensor) -> keras.KerasTensor:
-        return _LEAST_DEGREES + keras.ops.exp(keras.ops.minimum(_LOG_UNIT * self.degrees, _MAX_LOG_DEGREES)) + 0 * logits
+        return _degrees(self.degrees) + 0 * logits
+
+
+def _degrees(weights: tf.Tensor | np.ndarray) -> tf.Tensor:
+    """Returns the degrees of freedom for the weights of `_Degrees`."""
+    return _LEAST_DEGREES + keras.ops.exp(keras.ops.minimum(_LOG_UNIT * weights, _MAX_LOG_DEGREES))
+
+
+def _split(starts: np.ndarray | None, number: int, window: int, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the rows that train the network, and the rows of the last windows, which share no sample with them.
+
+    If there are too few windows, both are all rows.
+    """
+    order = np.arange(number) if starts is None else np.argsort(starts, kind="stable")
+    num_kept = max(1, round(share * number))
+    first, last = order[: number - num_kept], order[number - num_kept :]
+    if starts is not None:
+        first = first[np.asarray(starts)[first] + window <= np.min(np.asarray(starts)[last])]
+    return (first, last) if len(first) else (order, order)

@@ -27,58 +27,79 @@ class Watch:
 
 
 NOBODY = Watch()
-Fit = Callable[..., Any]
 
 
-def _none(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    from enhsim_tf.noise.surrogates import GaussianNoise
-
-    return GaussianNoise(0.0, noise.shape[1])
-
-
-def _gaussian(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    from enhsim_tf.noise.surrogates import GaussianNoise
-
-    return GaussianNoise.fit(noise)
-
-
-def _autoregression(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    from enhsim_tf.noise.surrogates import GaussianAutoregression
-
-    return GaussianAutoregression.fit(noise, min(200, noise.shape[1] - 1))
-
-
-def _residual_windows(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    from enhsim_tf.noise.window_bootstrap import WindowBootstrap
-
-    return WindowBootstrap.fit(noise)
-
-
-def _matched_windows(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap
-
-    return MatchedWindowBootstrap.fit(noise, signal)
-
-
-def _network(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
-
-    return AutoregressiveNetwork.untrained(noise, signal, seed).fit(noise, num_iterations, signal, on_iteration=watch.on_iteration)
-
-
-def _paper_gan(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
-    return fit_paper_gan(noise, num_iterations, seed, None, watch)
-
-
-def fit_paper_gan(noise: np.ndarray, num_iterations: int, seed: int, unit: float | None = None, watch: Watch = NOBODY) -> Any:
-    """Trains the paper's GAN.
+@dataclasses.dataclass(frozen=True)
+class FitTask:
+    """What a rung is fitted to, and how.
 
     Args:
         noise: Noise windows of shape `(windows, samples)`.
-        num_iterations: Number of iterations.
+        signal: The signal below them, of the same shape, for noise that may follow it; or None.
+        num_iterations: Number of iterations of a network.
         seed: Seed of the weights and the training.
-        unit: Unit of the noise in the networks. None: that in which the noise has the amplitude of the paper's noise.
+        starts: Start of each window in samples, shape `(windows,)`. None: no two windows overlap, and they are in the order of time.
         watch: Who watches the training.
+    """
+
+    noise: np.ndarray
+    signal: np.ndarray | None
+    num_iterations: int
+    seed: int
+    starts: np.ndarray | None = None
+    watch: Watch = NOBODY
+
+
+Fit = Callable[[FitTask], Any]
+
+
+def _none(task: FitTask) -> Any:
+    from enhsim_tf.noise.surrogates import GaussianNoise
+
+    return GaussianNoise(0.0, task.noise.shape[1])
+
+
+def _gaussian(task: FitTask) -> Any:
+    from enhsim_tf.noise.surrogates import GaussianNoise
+
+    return GaussianNoise.fit(task.noise)
+
+
+def _autoregression(task: FitTask) -> Any:
+    from enhsim_tf.noise.surrogates import GaussianAutoregression
+
+    return GaussianAutoregression.fit(task.noise, min(200, task.noise.shape[1] - 1))
+
+
+def _residual_windows(task: FitTask) -> Any:
+    from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+
+    return WindowBootstrap.fit(task.noise)
+
+
+def _matched_windows(task: FitTask) -> Any:
+    from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap
+
+    return MatchedWindowBootstrap.fit(task.noise, task.signal)
+
+
+def _network(task: FitTask) -> Any:
+    from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
+
+    network = AutoregressiveNetwork.untrained(task.noise, task.signal, task.seed)
+    return network.fit(task.noise, task.num_iterations, task.signal, task.starts, on_iteration=task.watch.on_iteration)
+
+
+def _paper_gan(task: FitTask) -> Any:
+    return fit_paper_gan(task)
+
+
+def fit_paper_gan(task: FitTask, unit: float | None = None) -> Any:
+    """Trains the paper's GAN.
+
+    Args:
+        task: What it is fitted to, and how.
+        unit: Unit of the noise in the networks. None: that in which the noise has the amplitude of the paper's noise.
 
     Returns:
         The noise networks, or Gaussian noise in their form if the training diverges (see `guarded_training`).
@@ -87,23 +108,25 @@ def fit_paper_gan(noise: np.ndarray, num_iterations: int, seed: int, unit: float
     from enhsim_tf.noise.extraction import noise_unit
     from enhsim_tf.noise.gan import NoiseGAN
     from enhsim_tf.noise.generator import build_generator
-    from enhsim_tf.noise.guarded_training import train_guarded
 
     def build() -> NoiseGAN:
-        networks = [make(noise.shape[1], seed=seed) for make in (build_generator, build_discriminator)]
-        return NoiseGAN(*networks, scale=noise_unit(noise) if unit is None else unit, seed=seed)
+        networks = [make(task.noise.shape[1], seed=task.seed) for make in (build_generator, build_discriminator)]
+        return NoiseGAN(*networks, scale=noise_unit(task.noise) if unit is None else unit, seed=task.seed)
 
-    return train_guarded(build, noise, num_iterations, watch.verbose, watch.on_iteration, watch.note)
+    return _train(build, task)
 
 
-def _convolutional_gan(noise: np.ndarray, signal: np.ndarray | None, num_iterations: int, seed: int, watch: Watch = NOBODY) -> Any:
+def _convolutional_gan(task: FitTask) -> Any:
     from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+
+    return _train(lambda: convolutional_noise_gan(task.noise, task.num_iterations, task.seed), task)
+
+
+def _train(build: Callable[[], Any], task: FitTask) -> Any:
     from enhsim_tf.noise.guarded_training import train_guarded
 
-    def build() -> Any:
-        return convolutional_noise_gan(noise, num_iterations, seed)
-
-    return train_guarded(build, noise, num_iterations, watch.verbose, watch.on_iteration, watch.note)
+    watch = task.watch
+    return train_guarded(build, task.noise, task.num_iterations, watch.verbose, watch.on_iteration, watch.note)
 
 
 RUNGS: dict[str, Fit] = {
@@ -116,8 +139,7 @@ RUNGS: dict[str, Fit] = {
     "GAN of the paper": _paper_gan,
     "convolutional GAN": _convolutional_gan,
 }
-"""Maps the name of a rung to a function of noise windows, signal windows or None, number of iterations, seed and `Watch`, which fits it.
-The simplest comes first."""
+"""Maps the name of a rung to a function that fits it. The simplest comes first."""
 
 
 def generate(model: Any, num_windows: int, seed: int | np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:

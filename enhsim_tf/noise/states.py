@@ -24,6 +24,7 @@ _KINDS = {
     MatchedWindowBootstrap: "matched residual windows",
 }
 _AUTOREGRESSIVE_NETWORK = "autoregressive network"
+_WEIGHT, _PREDICTION = "weight_", "prediction_"  # beginnings of the names of its arrays
 _OLD_NAMES = {"resampled": "residual windows"}  # of models that were saved before
 
 
@@ -72,8 +73,10 @@ def state_of(model: Any) -> NoiseState:
     from enhsim_tf.noise.gan import NoiseGAN
 
     if isinstance(model, AutoregressiveNetwork):
-        weights = {f"weight_{number:02}": weight for number, weight in enumerate(model.network.get_weights())}
-        return NoiseState({"kind": _AUTOREGRESSIVE_NETWORK, "tails": TAILS} | model.get_config(), arrays=weights)
+        arrays = {f"{_WEIGHT}{number:02}": weight for number, weight in enumerate(model.network.get_weights())}
+        if model.prediction is not None:
+            arrays |= {_PREDICTION + name: values for name, values in model.prediction.arrays.items()}
+        return NoiseState({"kind": _AUTOREGRESSIVE_NETWORK, "tails": TAILS} | model.get_config(), arrays=arrays)
     if isinstance(model, NoiseGAN):
         return NoiseState({"kind": _GAN} | model.get_config(), {"generator": model.generator, "discriminator": model.discriminator})
     raise TypeError(f"Expected a noise model of the ladder. Received: {type(model).__name__}.")
@@ -107,13 +110,17 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         return MatchedWindowBootstrap(arrays["windows"], arrays["signals"])
     if kind == _AUTOREGRESSIVE_NETWORK:
         from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
+        from enhsim_tf.noise.linear_prediction import LinearPrediction
 
         _positive(values["scale"])
         if not (2 <= values["window"] <= 1_000_000 and 0 < values["num_components"] * values["units"] <= 1_000_000):
             raise ValueError("a noise network of an impossible size")
         tails = str(values.pop("tails", "softplus"))  # models that were saved before do not say
-        model = AutoregressiveNetwork(**values)
-        model.set_weights([arrays[name] for name in sorted(arrays)], tails)
+        model = AutoregressiveNetwork(**{"sees_predictions": False} | values)
+        model.set_weights([arrays[name] for name in sorted(arrays) if name.startswith(_WEIGHT)], tails)
+        if model.sees_predictions:
+            saved = {name.removeprefix(_PREDICTION): each for name, each in arrays.items() if name.startswith(_PREDICTION)}
+            model.prediction = LinearPrediction.from_arrays(saved, model.window)
         return model
     if kind == _GAN:
         from enhsim_tf.noise.gan import NoiseGAN

@@ -6,6 +6,8 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
+_NEARLY_LEAST = 2e-4  # relative excess of the held-out error up to which a smaller order is as good
+
 
 class GaussianNoise:
     """White Gaussian noise with the standard deviation of the real noise, the simplest baseline.
@@ -38,8 +40,8 @@ class GaussianNoise:
 class GaussianAutoregression:
     """Gaussian autoregressive noise with the spectrum of the real noise.
 
-    The order is chosen by the Akaike information criterion (AIC). The model reproduces the second-order properties of the
-    noise, that is its spectrum and autocorrelation, and no others.
+    The order is chosen by the Akaike information criterion (AIC), or by held-out windows. The model reproduces the second-order
+    properties of the noise, that is its spectrum and autocorrelation, and no others.
 
     Args:
         coefficients: Autoregressive coefficients, from lag 1 upwards. An empty sequence gives white noise.
@@ -55,34 +57,72 @@ class GaussianAutoregression:
         self._start = _lower_orders(self.coefficients, self.innovation_sd)
 
     @classmethod
-    def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
+    def fit(cls, windows: np.ndarray, max_order: int = 40, held_out: np.ndarray | None = None) -> "GaussianAutoregression":
         """Fits the model to noise windows by Burg's method (1975), with the prediction errors pooled over the windows.
 
         Burg's method minimises the squared forward and backward prediction errors. It always gives a stationary process.
 
+        AIC counts all samples as different ones. Where windows overlap, it chooses orders that are too high, and held-out windows
+        choose better: the smallest order whose squared error there is within 0.02 % of the least one.
+
         Args:
             windows: Noise windows of shape `(windows, samples)`.
-            max_order: The largest order that AIC may choose.
+            max_order: The largest order that may be chosen.
+            held_out: Noise windows of the same length that share no sample with the others, or None for AIC.
 
         Raises:
             InputError: If the windows are not longer than `max_order`, or if they are constant.
         """
         if windows.shape[1] <= max_order:
             raise InputError(f"Expected windows of more samples than max_order={max_order}. Received: {windows.shape[1]} samples.")
-        forward = backward = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
+        mean = np.mean(windows, dtype=np.float64)
+        forward = backward = np.asarray(windows, np.float64) - mean
+        ahead = behind = forward[:0] if held_out is None else np.asarray(held_out, np.float64) - mean
         variance, coefficients = np.mean(forward**2), np.zeros(0)
         if not variance > 0:
             raise InputError("Expected noise that varies. Received: windows of one value.")
-        fits = [(windows.size * np.log(variance), coefficients, variance)]
+        orders, criteria, errors = [(coefficients, variance)], [windows.size * np.log(variance)], [np.sum(ahead[:, max_order:] ** 2)]
         for order in range(1, max_order + 1):
-            forward, backward = forward[:, 1:], backward[:, :-1]
-            reflection = 2 * np.sum(forward * backward) / (np.sum(forward**2) + np.sum(backward**2))
+            forward, backward, ahead, behind = forward[:, 1:], backward[:, :-1], ahead[:, 1:], behind[:, :-1]
+            power = np.sum(forward**2) + np.sum(backward**2)
+            if not power > 0:  # the noise is predicted without an error
+                break
+            reflection = 2 * np.sum(forward * backward) / power
             forward, backward = forward - reflection * backward, backward - reflection * forward
+            ahead, behind = ahead - reflection * behind, behind - reflection * ahead
             coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
             variance *= 1 - reflection**2
-            fits.append((windows.size * np.log(variance) + 2 * order, coefficients, variance))
-        _, coefficients, variance = min(fits, key=lambda fit: fit[0])
+            orders.append((coefficients, variance))
+            criteria.append(windows.size * np.log(variance) + 2 * order)
+            errors.append(np.sum(ahead[:, max_order - order :] ** 2))  # the same samples for all orders
+        if held_out is None:
+            chosen = int(np.argmin(criteria))
+        else:
+            chosen = int(np.argmax(np.array(errors) <= (1 + _NEARLY_LEAST) * min(errors)))
+        coefficients, variance = orders[chosen]
         return cls(coefficients, np.sqrt(variance), windows.shape[1])
+
+    def at(self, place: int) -> tuple[np.ndarray, float]:
+        """Returns the best linear prediction of a sample from all samples before it.
+
+        Args:
+            place: Number of samples before it.
+
+        Returns:
+            The coefficients, from lag 1 upwards, and the standard deviation of the error.
+        """
+        return self._start[place] if place < len(self._start) else (self.coefficients, self.innovation_sd)
+
+    def predict(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the best linear prediction of each sample of a window from all samples before it, float64 of the same shape."""
+        from scipy.signal import lfilter
+
+        values = np.asarray(windows, np.float64)
+        predicted = lfilter(np.concatenate([[0.0], self.coefficients]), [1.0], values, axis=1)
+        for place in range(min(len(self._start), values.shape[1])):
+            coefficients, _ = self._start[place]
+            predicted[:, place] = values[:, :place] @ coefficients[::-1]
+        return predicted
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise.
@@ -102,7 +142,7 @@ class GaussianAutoregression:
         innovations, whitening = self.innovation_sd * draws, np.concatenate([[1.0], -self.coefficients])
         start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
         for place in range(start.shape[1]):  # each of the first samples is predicted from all earlier ones
-            past, sd = self._start[place]
+            past, sd = self.at(place)
             start[:, place] = start[:, :place][:, ::-1] @ past + sd * draws[:, place]
         if start.size:  # the innovations for which the filter returns these first samples
             innovations[:, : start.shape[1]] = lfilter(whitening, [1.0], start, axis=1)

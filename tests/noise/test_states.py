@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
-from enhsim_tf.noise.ladder import RUNGS, generate, generate_series
+from enhsim_tf.noise.ladder import RUNGS, FitTask, generate, generate_series
 from enhsim_tf.noise.states import NoiseState, model_from, state_of
 
 WINDOWS = np.random.default_rng(0).standard_normal((30, 40)).astype(np.float32)
@@ -15,7 +15,7 @@ CLEAN = np.sin(np.arange(40) / 5).astype(np.float32) * np.ones((30, 1), np.float
 
 @pytest.mark.parametrize("rung", RUNGS)
 def test_a_saved_noise_model_generates_the_same_noise(rung):
-    model = RUNGS[rung](WINDOWS, CLEAN, 2, 5)
+    model = RUNGS[rung](FitTask(WINDOWS, CLEAN, 2, 5))
     state = state_of(model)
     assert state.is_finite and bool(state.networks) != bool(state.arrays)
     again = model_from(json.loads(json.dumps(dict(state.settings))), state.networks, state.arrays)

@@ -95,7 +95,7 @@ class Record:
         """The noise model of a rung, fitted to the residuals."""
         number = self.gan_iterations if "GAN" in rung else self.num_iterations
         noise, signal = self.residuals
-        return ladder.RUNGS[rung](noise, signal, number, self.seed)
+        return ladder.RUNGS[rung](ladder.FitTask(noise, signal, number, self.seed, self.starts))
 
     def generate(self, rung: str, num_windows: int, purpose: int) -> np.ndarray:
         """Generates windows of the simulator with noise of a rung.

@@ -12,6 +12,7 @@ from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, FOOT,
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.learning_curve.arms import ADVERSARIAL, CLASSIFIER_ON_REAL, CORAL, SIMULATOR, THRESHOLD_ON_REAL
 from enhsim_tf.reproduce.learning_curve.arms import REAL as REAL_ARM
+from enhsim_tf.reproduce.learning_curve.findings import most_seeds
 from enhsim_tf.reproduce.publish.wording import in_list
 
 _CURVES = {
@@ -107,7 +108,7 @@ def _classifiers(found: Mapping[str, Any]) -> str:
         said = " The classifiers learn injected anomalies, the domain-adversarial one from windows of the simulator."
     fewer: dict[int, list[str]] = {}
     for arm, (label, *_) in _CURVES.items():
-        number = max(arms[arm]["seeds"].values(), default=0) if arm in arms else 0
+        number = most_seeds(arms[arm]) if arm in arms else 0
         if 0 < number < len(found["seeds"]):
             fewer.setdefault(number, []).append(label)
     return said + "".join(

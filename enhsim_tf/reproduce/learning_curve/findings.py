@@ -5,6 +5,7 @@ false-alarm rate above the one that thresholds were set for. Recall is compared 
 windows.
 """
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,7 +61,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         arms = {arm: _curves(own[own["arm"] == arm], numbers) for arm in dict.fromkeys(own["arm"])}
         real = arms[REAL]
         # noise networks may have fewer seeds than the other arms: they decide nothing, and are compared on their own seeds
-        simulators = [arm for arm in arms if arm.startswith(SIMULATOR) and _most_seeds(arms[arm]) == _most_seeds(real)]
+        simulators = [arm for arm in arms if arm.startswith(SIMULATOR) and most_seeds(arms[arm]) == most_seeds(real)]
         others = [arm for arm in arms if arm in OTHERS or (arm.startswith(SIMULATOR) and arm not in simulators)]
         pays = {arm: [number for number in numbers if _pays(arms[arm], real, number)] for arm in simulators}
         suffices = [number for number in numbers if all(real["excess"][str(n)] <= SUFFICES for n in numbers if n >= number)]
@@ -82,12 +83,17 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         if {CLASSIFIER, CLASSIFIER_ON_REAL} <= set(arms):
             gains = {arm: _gain(own, arm, numbers) for arm in (CLASSIFIER, ADVERSARIAL) if arm in arms}
             environments[environment]["classifiers"] = gains
-        if few := [arm for arm in arms if _most_seeds(arms[arm]) < _most_seeds(real)]:
+        if few := [arm for arm in arms if most_seeds(arms[arm]) < most_seeds(real)]:
             environments[environment]["few_seeds"] = _few_seeds(own, few, [REAL, *simulators], numbers)
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
 
-def _most_seeds(curve: dict[str, Any]) -> int:
+def most_seeds(curve: Mapping[str, Any]) -> int:
+    """Returns the largest number of seeds that an arm has at any number of real windows.
+
+    Args:
+        curve: The curves of the arm.
+    """
     return max(curve["seeds"].values(), default=0)
 
 
@@ -102,7 +108,7 @@ def _other(rows: "pd.DataFrame", arm: str, numbers: list[int]) -> dict[str, Any]
         "pays": pays,
         "tried": tried,
         "cannot": [number for number in tried if compared["excess"][str(number)] <= SUFFICES],
-        "seeds": _most_seeds(curve),
+        "seeds": most_seeds(curve),
         "recall": {str(number): [curve["recall"][str(number)], compared["recall"][str(number)]] for number in pays},
     }
 
@@ -131,6 +137,7 @@ def _few_seeds(rows: "pd.DataFrame", few: list[str], others: list[str], numbers:
     recall = same[same["arm"] == REAL].groupby(["num_real", "detector"])["recall_at_real_rate"].mean()
     best = {int(number): recall.loc[number].idxmax() for number in sorted(its["num_real"].unique())}
     return {
+        "names": few,
         "seeds": sorted(int(seed) for seed in its["seed"].unique()),
         "arms": {arm: _curves(same[same["arm"] == arm], numbers) for arm in (*others, *few)},
         "best_detector": {

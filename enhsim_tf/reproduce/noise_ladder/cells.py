@@ -17,7 +17,7 @@ from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseTraining, NoiseWindows
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import BY_OPTION, STREAMS
-from enhsim_tf.reproduce.noise_ladder.findings import PRESENT, REAL
+from enhsim_tf.reproduce.noise_ladder.names import PRESENT, REAL
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
@@ -89,12 +89,14 @@ class Cell:
             choice = []
         else:
             number_of_iterations = chosen.ladder.gan_iterations if "GAN" in rung else chosen.ladder.num_iterations
-            model = ladder.RUNGS[rung](self.learnt["noise"], self.learnt["truth"], number_of_iterations, seed)
+            task = ladder.FitTask(self.learnt["noise"], self.learnt["truth"], number_of_iterations, seed, self.learnt["start"])
+            model = ladder.RUNGS[rung](task)
             draws = np.random.default_rng([seed, STREAMS[OPTIONS[rung]], 71])
             waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
-            generated = ladder.generate(model, len(held_out), draws, more)
+            # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
+            generated = more + ladder.generate(model, len(held_out), draws, more) - more
             judgement = dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung)
             choice = [{"rule": PRESENT} | dataclasses.asdict(judgement)]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)

@@ -235,12 +235,7 @@ def learning_curve(found: Findings) -> str:
 
 def _of_few_seeds(about: Findings) -> list[str]:
     """The arms of an environment that have fewer seeds than the others."""
-    most = max(_seeds_of(curve) for curve in about["arms"].values())
-    return [arm for arm, curve in about["arms"].items() if _seeds_of(curve) < most]
-
-
-def _seeds_of(curve: Findings) -> int:
-    return max(curve["seeds"].values())
+    return about["few_seeds"]["names"] if "few_seeds" in about else []
 
 
 def _counted(number: int, what: str) -> str:

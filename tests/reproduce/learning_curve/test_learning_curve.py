@@ -187,6 +187,7 @@ def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seed
     )  # on seed 1 the real windows have excesses of 10 and 2 points
     assert other["cannot"] == []
     few = white["few_seeds"]
+    assert few["names"] == [SIMULATOR + "autoregressive network"]
     assert few["seeds"] == [1] and list(few["arms"]) == [REAL, SIMULATOR + "Gaussian", SIMULATOR + "autoregressive network"]
     assert few["arms"][REAL]["rate"] == {"5": 0.11, "20": 0.03} and white["arms"][REAL]["rate"] == near({"5": 0.06, "20": 0.02})
     assert few["best_detector"]["20"] == {"name": "a", "recall_at_real_rate": 0.6}

@@ -1,0 +1,105 @@
+"""Linear predictions of noise and of its magnitude from the whole past of a window (an alternative to the GAN of section 2.3).
+
+Long correlations, periods and slow changes of loudness are to a large part linear: the next sample, or its magnitude, is near a
+weighted sum of those before it. The weights are fitted in closed form, for all lags of up to half a window. The autoregressive network
+starts from these predictions.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from enhsim_tf.noise.surrogates import GaussianAutoregression
+
+_MAX_ORDER = 400  # samples
+_LEAST_ERROR = 1e-3  # of a prediction, in standard deviations: predictions are float32 numbers
+_LEAST_MAGNITUDE = 0.02  # of a predicted magnitude, in standard deviations
+
+
+class LinearPrediction:
+    """Predicts each sample of a window, and its magnitude, from the samples before it.
+
+    Args:
+        values: Autoregression of the noise, which is in units of its standard deviation.
+        magnitudes: Autoregression of its magnitude minus `mean_magnitude`.
+        mean_magnitude: Mean magnitude of the noise.
+    """
+
+    def __init__(self, values: GaussianAutoregression, magnitudes: GaussianAutoregression, mean_magnitude: float):
+        self.values, self.magnitudes, self.mean_magnitude = values, magnitudes, float(mean_magnitude)
+        errors = [values.at(place)[1] for place in range(values.window)]
+        self.errors = np.maximum(errors, _LEAST_ERROR).astype(np.float32)
+        """Standard deviation of the error of the predicted value at each place of a window, shape `(samples,)`."""
+
+    @classmethod
+    def of_white_noise(cls, window: int) -> "LinearPrediction":
+        """The predictions of white Gaussian noise, which are constant."""
+        return cls(GaussianAutoregression([], 1.0, window), GaussianAutoregression([], 1.0, window), np.sqrt(2 / np.pi))
+
+    @classmethod
+    def fit(cls, windows: np.ndarray, held_out: np.ndarray) -> "LinearPrediction":
+        """Fits both autoregressions by Burg's method.
+
+        Args:
+            windows: Noise windows in units of their standard deviation, shape `(windows, samples)`.
+            held_out: Other noise windows, which choose the orders.
+        """
+        order = min(_MAX_ORDER, windows.shape[1] // 2)
+        mean_magnitude = float(np.mean(np.abs(windows), dtype=np.float64))
+        values = GaussianAutoregression.fit(windows, order, held_out)
+        loud, held_out_loud = (np.abs(each) - mean_magnitude for each in (windows, held_out))
+        if np.ptp(loud) > 0:
+            magnitudes = GaussianAutoregression.fit(loud, order, held_out_loud)
+        else:  # two values of equal magnitude
+            magnitudes = GaussianAutoregression([], 1.0, windows.shape[1])
+        return cls(values, magnitudes, mean_magnitude)
+
+    def predict(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the predicted value, and the logarithm of the predicted magnitude, of each sample.
+
+        Args:
+            windows: Noise windows, float32 of shape `(windows, samples)`.
+
+        Returns:
+            float32 array of shape `(windows, samples, 2)`.
+        """
+        magnitudes = self.magnitudes.predict(np.abs(windows) - self.mean_magnitude)
+        return np.stack([self.values.predict(windows), self._log(magnitudes)], axis=2).astype(np.float32)
+
+    def next(self, past: np.ndarray, loudness: np.ndarray, place: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the same for the sample that follows.
+
+        Args:
+            past: The last samples, at least as many as a window has but one, zero before the first one; shape `(rows, samples)`.
+            loudness: Their magnitudes minus `mean_magnitude`, in the same form.
+            place: Number of samples before the one that is predicted.
+
+        Returns:
+            Two arrays of shape `(rows,)`.
+        """
+        found = []
+        for model, values in ((self.values, past), (self.magnitudes, loudness)):
+            coefficients, _ = model.at(place)
+            found.append(values[:, values.shape[1] - len(coefficients) :] @ coefficients[::-1].astype(np.float32))
+        return found[0], self._log(found[1])
+
+    def _log(self, magnitudes: np.ndarray) -> np.ndarray:
+        return np.log(np.maximum(magnitudes + self.mean_magnitude, _LEAST_MAGNITUDE))
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What is saved."""
+        numbers = [self.values.innovation_sd, self.magnitudes.innovation_sd, self.mean_magnitude]
+        return {"values": self.values.coefficients, "magnitudes": self.magnitudes.coefficients, "numbers": np.array(numbers)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray], window: int) -> "LinearPrediction":
+        """Makes the predictions again from `arrays`.
+
+        Raises:
+            ValueError: If the arrays do not belong to predictions within a window.
+        """
+        values, magnitudes, numbers = (np.asarray(arrays[name], np.float64) for name in ("values", "magnitudes", "numbers"))
+        if numbers.shape != (3,) or not (numbers >= 0).all() or any(each.ndim != 1 or len(each) >= window for each in (values, magnitudes)):
+            raise ValueError("linear predictions of an impossible form")
+        return cls(*(GaussianAutoregression(*each, window) for each in ((values, numbers[0]), (magnitudes, numbers[1]))), numbers[2])

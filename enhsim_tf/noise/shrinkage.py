@@ -1,0 +1,86 @@
+"""Shrinkage of a trained network's outputs towards constants, as far as held-out data ask for it (after section 2.3).
+
+A network that is trained by maximum likelihood follows chance a little. Each group of its outputs, for example the scales of the
+components of a mixture, is therefore replaced by a constant plus its deviation from its mean times a number from 0 to 1, its *trust*.
+These few numbers maximise the likelihood of held-out data, and the constants that of the training data. White noise gets trusts near
+0, and structure that also shows in held-out data gets trusts near 1.
+
+References:
+    James and Stein, "Estimation with quadratic loss", 1961.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from enhsim_tf.keras_tools.backend import tf
+
+_ROUNDS = 2  # trusts and constants in turn
+_STOP = {"ftol": 1e-9, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
+_MAX_STEPS = 40
+
+Data = tuple[tf.Tensor, tf.Tensor]
+Loss = Callable[[tf.Tensor, tf.Tensor, tf.Tensor], tf.Tensor]
+
+
+@dataclasses.dataclass(frozen=True)
+class Shrunk:
+    """How outputs are shrunk: to `offset + trust * output`.
+
+    Args:
+        trust: Trust of each output, shape `(outputs,)`.
+        offset: Constant of each output, shape `(outputs,)`.
+        weights: The other numbers that the constants were fitted with.
+    """
+
+    trust: np.ndarray
+    offset: np.ndarray
+    weights: np.ndarray
+
+
+def shrink(loss: Loss, learnt: Data, held_out: Data, sizes: Sequence[int], weights: np.ndarray) -> Shrunk:
+    """Finds the trust of each group of outputs, and their constants.
+
+    Args:
+        loss: Mean loss, given targets, outputs and `weights`.
+        learnt: Outputs of shape `(samples, outputs)` and targets of the training data.
+        held_out: The same for held-out data.
+        sizes: Numbers of outputs of each group.
+        weights: Other numbers that depend on no input and are fitted together with the constants.
+
+    Returns:
+        How the outputs are shrunk. Where constants fitted to the training data raise the loss on held-out data, they keep their values.
+    """
+    from scipy.optimize import minimize
+
+    spread = np.repeat(np.eye(len(sizes), dtype=np.float32), sizes, axis=1)  # from the trusts of groups to those of outputs
+    centre, number = np.mean(learnt[0], axis=0), spread.shape[1]
+    trust, constants = np.ones(len(sizes), np.float32), np.concatenate([centre, weights]).astype(np.float32)
+
+    @tf.function
+    def both(trust: tf.Tensor, constants: tf.Tensor, outputs: tf.Tensor, targets: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor, tf.Tensor]:
+        with tf.GradientTape() as tape:
+            tape.watch([trust, constants])
+            shrunk = constants[None, :number] + (trust[None] @ spread) * (outputs - centre)
+            value = loss(targets, shrunk, constants[number:])
+        return value, *tape.gradient(value, [trust, constants])
+
+    def evaluate(trust: np.ndarray, constants: np.ndarray, data: Data) -> list[np.ndarray]:
+        found = both(tf.constant(trust, tf.float32), tf.constant(constants, tf.float32), *data)
+        return [np.asarray(each, np.float64) for each in found]
+
+    def of_trust(numbers: np.ndarray, constants: np.ndarray) -> list[np.ndarray]:
+        return evaluate(numbers, constants, held_out)[:2]
+
+    def of_constants(numbers: np.ndarray, trust: np.ndarray) -> list[np.ndarray]:
+        return evaluate(trust, numbers, learnt)[::2]
+
+    limits, steps = [(0, 1)] * len(trust), _STOP | {"maxiter": _MAX_STEPS}
+    for _ in range(_ROUNDS):
+        trust = minimize(of_trust, trust, (constants,), "L-BFGS-B", jac=True, bounds=limits, options=_STOP).x
+        tried = minimize(of_constants, constants, (trust,), "L-BFGS-B", jac=True, options=steps).x
+        if of_trust(trust, tried)[0] <= of_trust(trust, constants)[0]:
+            constants = tried
+    each = (trust @ spread).astype(np.float32)
+    return Shrunk(each, (constants[:number] - each * centre).astype(np.float32), constants[number:].astype(np.float32))

@@ -1,0 +1,98 @@
+"""Linear predictions recover known autoregressions, for whole windows as for single samples."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import solve_toeplitz
+
+from enhsim_tf.noise.linear_prediction import LinearPrediction
+from enhsim_tf.noise.surrogates import GaussianAutoregression
+from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise
+
+SAMPLES = 40
+
+
+@pytest.fixture(scope="module")
+def loud():
+    """White noise whose loudness alternates every five samples between 0.2 and 1: its magnitude has a period of ten samples."""
+    rng = np.random.default_rng(3)
+    phase = rng.integers(0, 10, (4_000, 1))
+    windows = rng.standard_normal((4_000, SAMPLES)) * np.where((np.arange(SAMPLES) + phase) % 10 < 5, 0.2, 1.0)
+    return (windows / windows.std()).astype(np.float32)
+
+
+def test_the_predictions_of_each_order_solve_the_normal_equations():
+    model = GaussianAutoregression([0.5, -0.3, 0.2], 1.0, SAMPLES)
+    impulse = np.zeros(4_000)
+    for lag in range(4_000):  # the response to one innovation, by the recursion
+        impulse[lag] = (lag == 0) + sum(c * impulse[lag - k] for k, c in enumerate((0.5, -0.3, 0.2), 1) if lag >= k)
+    covariance = np.array([impulse[: 4_000 - lag] @ impulse[lag:] for lag in range(5)])
+    for place in (1, 2, 3):
+        coefficients, error = model.at(place)
+        expected = solve_toeplitz(covariance[:place], covariance[1 : place + 1])
+        assert_allclose(coefficients, expected, rtol=1e-8)
+        assert error**2 == pytest.approx(covariance[0] - expected @ covariance[1 : place + 1])
+    assert model.at(0)[1] ** 2 == pytest.approx(covariance[0])
+
+
+def test_held_out_windows_choose_the_order_where_windows_overlap():
+    series = AutoregressiveNoise(0.7, 1.0).draw(2_400, np.random.default_rng(1))
+    windows = np.lib.stride_tricks.sliding_window_view(series[:1_600], SAMPLES)
+    held_out = np.lib.stride_tricks.sliding_window_view(series[1_600:], SAMPLES)
+    assert len(GaussianAutoregression.fit(windows, 20).coefficients) > 10  # each sample counts forty times
+    chosen = GaussianAutoregression.fit(windows, 20, held_out)
+    assert len(chosen.coefficients) <= 3
+    assert chosen.coefficients[0] == pytest.approx(0.7, abs=0.06)
+
+
+def test_the_error_falls_from_that_of_the_process_to_that_of_the_innovations():
+    noise = AutoregressiveNoise(0.7, 1.0).draw(40_000, np.random.default_rng(1)).reshape(-1, SAMPLES).astype(np.float32)
+    found = LinearPrediction.fit(noise[:900], noise[900:])
+    assert found.errors[0] == pytest.approx(1.0, rel=0.05)
+    assert_allclose(found.errors[1:], np.sqrt(1 - 0.7**2), rtol=0.03)
+    predicted = found.predict(noise[900:])
+    assert predicted.shape == (100, SAMPLES, 2) and predicted.dtype == np.float32
+    assert_allclose(predicted[:, 1:, 0], 0.7 * noise[900:, :-1], atol=0.15)
+    assert (predicted[:, 0, 0] == 0).all()
+
+
+def test_a_periodic_loudness_is_predicted(loud):
+    found = LinearPrediction.fit(loud[:3_000], loud[3_000:])
+    assert len(found.values.coefficients) == 0  # no sample tells the next one
+    predicted = np.exp(found.predict(loud[3_000:])[:, 20:, 1])
+    is_loud = np.abs(predicted) > found.mean_magnitude
+    quiet, loud_ones = (np.std(loud[3_000:, 20:][each]) for each in (~is_loud, is_loud))
+    assert loud_ones > 3 * quiet
+
+
+def test_single_steps_give_the_predictions_of_whole_windows(loud):
+    found = LinearPrediction.fit(loud[:3_000], loud[3_000:])
+    rows, whole = loud[:6], found.predict(loud[:6])
+    past = np.pad(rows, ((0, 0), (SAMPLES - 1, 0)))
+    loudness = np.pad(np.abs(rows) - np.float32(found.mean_magnitude), ((0, 0), (SAMPLES - 1, 0)))
+    for place in range(SAMPLES):
+        value, magnitude = found.next(past[:, place : place + SAMPLES - 1], loudness[:, place : place + SAMPLES - 1], place)
+        assert_allclose(value, whole[:, place, 0], atol=1e-5)
+        assert_allclose(magnitude, whole[:, place, 1], atol=1e-4)
+
+
+def test_saved_predictions_are_made_again_and_impossible_ones_are_refused(loud):
+    found = LinearPrediction.fit(loud[:3_000], loud[3_000:])
+    again = LinearPrediction.from_arrays(found.arrays, SAMPLES)
+    np.testing.assert_array_equal(again.predict(loud[:5]), found.predict(loud[:5]))
+    for name, values in (
+        ("numbers", np.ones(2)),
+        ("numbers", -np.ones(3)),
+        ("values", np.zeros(SAMPLES)),
+        ("magnitudes", np.zeros((2, 2))),
+    ):
+        with pytest.raises(ValueError, match="impossible form"):
+            LinearPrediction.from_arrays(found.arrays | {name: values}, SAMPLES)
+    with pytest.raises(ValueError, match="stationary"):
+        LinearPrediction.from_arrays(found.arrays | {"values": np.array([1.5])}, SAMPLES)
+
+
+def test_noise_of_one_magnitude_has_a_constant_loudness():
+    signs = np.where(np.random.default_rng(0).random((300, 20)) < 0.5, -1, 1).astype(np.float32)
+    found = LinearPrediction.fit(signs[:200], signs[200:])
+    assert_allclose(found.predict(signs)[:, :, 1], 0, atol=1e-6)

@@ -1,0 +1,47 @@
+"""Outputs that follow chance are shrunk to a constant, and outputs that follow the truth are kept."""
+
+import numpy as np
+import pytest
+
+from enhsim_tf.keras_tools.backend import tf
+from enhsim_tf.noise.shrinkage import shrink
+
+NUMBER = 4_000
+
+
+def squares(targets, outputs, weights):
+    """Half the squared error of the sum of both outputs; the weight adds a constant of its own, which costs something."""
+    return tf.reduce_mean((targets[:, 0] - tf.reduce_sum(outputs, axis=1)) ** 2) / 2 + tf.reduce_sum((weights - 3) ** 2)
+
+
+def data(trusted, seed):
+    """Targets, and two outputs: the first tells a share of what the target varies, the second is chance."""
+    rng = np.random.default_rng(seed)
+    told, chance = rng.standard_normal((2, NUMBER))
+    targets = 5 + trusted * told + 0.5 * rng.standard_normal(NUMBER)
+    return tf.constant(np.stack([told, chance], axis=1), tf.float32), tf.constant(targets[:, None], tf.float32)
+
+
+@pytest.mark.parametrize("trusted", [0.25, 0.8])
+def test_the_trust_is_the_regression_coefficient_of_held_out_data(trusted):
+    learnt, held_out = data(1.0, 1), data(trusted, 2)
+    found = shrink(squares, learnt, held_out, (1, 1), np.zeros(1, np.float32))
+    outputs = held_out[0].numpy()
+    design = np.column_stack([outputs, np.ones(NUMBER)])
+    expected = np.linalg.lstsq(design, held_out[1].numpy()[:, 0], rcond=None)[0][:2]
+    assert found.trust[0] == pytest.approx(expected[0], abs=0.02)
+    assert found.trust[1] == pytest.approx(max(expected[1], 0), abs=0.02)
+    # the constants are those of the training data: with them, the mean of the targets is met
+    assert np.mean(outputs @ found.trust) + found.offset.sum() == pytest.approx(5, abs=0.05)
+    assert found.weights[0] == pytest.approx(3, abs=0.01)
+
+
+def test_constants_that_held_out_data_contradict_are_left():
+    learnt, held_out = data(1.0, 1), data(1.0, 2)
+    moved = (held_out[0], held_out[1] - 5)  # the outputs fit the held-out data as they are
+    found = shrink(squares, learnt, moved, (1, 1), np.full(1, 3, np.float32))
+    assert found.offset.sum() == pytest.approx(float(np.mean(learnt[0]) * (1 - found.trust[0])), abs=0.02)
+
+
+def test_a_trust_is_never_beyond_one():
+    assert shrink(squares, data(1.0, 1), data(1.6, 2), (1, 1), np.zeros(1, np.float32)).trust[0] == 1
