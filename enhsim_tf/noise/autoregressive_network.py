@@ -9,7 +9,8 @@ that it can have several modes, a skew and heavy tails.
 
 Training maximises the likelihood. A network with thousands of weights finds a little structure in any noise, even in white noise,
 whose samples then get heavier tails than they have. What the density takes from the past is therefore shrunk after training, as far
-as the likelihood of held-out windows asks for it (`shrinkage`).
+as the likelihood of held-out windows asks for it (`shrinkage`). If one normal distribution around the linear prediction is as likely, the
+density becomes that.
 
 References:
     Bishop, "Mixture density networks", 1994.
@@ -92,13 +93,16 @@ class AutoregressiveNetwork:
         self.network = self._build()
 
     @classmethod
-    def untrained(cls, noise_windows: np.ndarray, signal_windows: np.ndarray | None = None, seed: int = 0) -> "AutoregressiveNetwork":
+    def untrained(
+        cls, noise_windows: np.ndarray, signal_windows: np.ndarray | None = None, seed: int = 0, sees_predictions: bool = True
+    ) -> "AutoregressiveNetwork":
         """Creates an untrained network for noise windows of shape `(windows, samples)`, with their scale, limit and step.
 
         Args:
             noise_windows: Noise of mean zero, in the unit of the telemetry.
             signal_windows: Enhanced signal of the same shape, if the noise may depend on it.
             seed: Seed for the initial weights and for all random numbers in training.
+            sees_predictions: Whether the density starts from linear predictions.
         """
         noise = np.asarray(noise_windows, np.float64)
         scale = float(np.std(noise))
@@ -107,7 +111,7 @@ class AutoregressiveNetwork:
         limit = _LIMIT * float(np.max(np.abs(noise))) / scale
         levels = Levels.find(noise)
         step, origin = (0.0, 0.0) if levels is None else (levels.step, levels.origin)
-        return cls(noise.shape[1], scale, limit, step, origin, signal_windows is not None, seed=seed)
+        return cls(noise.shape[1], scale, limit, step, origin, signal_windows is not None, sees_predictions=sees_predictions, seed=seed)
 
     def _build(self) -> keras.Model:
         """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
@@ -233,7 +237,13 @@ class AutoregressiveNetwork:
             log_scales = tf.clip_by_value(log_scales, *self.log_scales)
             return self._negative_log_likelihood(targets, logits + self.start_logits, linear + shifts, log_scales, _degrees(weights)[None])
 
-        found = shrink(loss, seen(training), seen(judged), sizes, degrees)
+        learnt, held_out = seen(training), seen(judged)
+        targets = learnt[1][:, 0].numpy().astype(np.float64)
+        level = np.repeat([np.mean(targets), 0.0, 0.0, np.log(np.std(targets) + _TINY)], sizes)
+        normal = np.concatenate(
+            [level, np.full(parts, _MAX_LOG_DEGREES / _LOG_UNIT)]
+        )  # one normal distribution around the linear prediction
+        found = shrink(loss, learnt, held_out, sizes, degrees, normal)
         begin = 0
         for layer in layers:
             kernel, bias = layer.get_weights()

@@ -47,6 +47,8 @@ class LinearPrediction:
         order = min(_MAX_ORDER, windows.shape[1] // 2)
         mean_magnitude = float(np.mean(np.abs(windows), dtype=np.float64))
         values = GaussianAutoregression.fit(windows, order, held_out)
+        if values.innovation_sd < _LEAST_ERROR:  # a prediction without an error leaves nothing to learn, and cannot be computed exactly
+            values = GaussianAutoregression([], 1.0, windows.shape[1])
         loud, held_out_loud = (np.abs(each) - mean_magnitude for each in (windows, held_out))
         if np.ptp(loud) > 0:
             magnitudes = GaussianAutoregression.fit(loud, order, held_out_loud)

@@ -3,7 +3,7 @@
 A network that is trained by maximum likelihood follows chance a little. Each group of its outputs, for example the scales of the
 components of a mixture, is therefore replaced by a constant plus its deviation from its mean times a number from 0 to 1, its *trust*.
 These few numbers maximise the likelihood of held-out data, and the constants that of the training data. White noise gets trusts near
-0, and structure that also shows in held-out data gets trusts near 1.
+0, and structure that also shows in held-out data gets trusts near 1. Where constants alone are as good, they are used.
 
 References:
     James and Stein, "Estimation with quadratic loss", 1961.
@@ -16,6 +16,7 @@ import numpy as np
 
 from enhsim_tf.keras_tools.backend import tf
 
+_NEARLY_LEAST = 1e-4  # held-out loss above the least one up to which constants are as good
 _ROUNDS = 2  # trusts and constants in turn
 _STOP = {"ftol": 1e-9, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
 _MAX_STEPS = 40
@@ -39,8 +40,13 @@ class Shrunk:
     weights: np.ndarray
 
 
-def shrink(loss: Loss, learnt: Data, held_out: Data, sizes: Sequence[int], weights: np.ndarray) -> Shrunk:
+def shrink(
+    loss: Loss, learnt: Data, held_out: Data, sizes: Sequence[int], weights: np.ndarray, simplest: np.ndarray | None = None
+) -> Shrunk:
     """Finds the trust of each group of outputs, and their constants.
+
+    The result is the first of the following whose held-out loss is nearly the least: the simplest constants, constants that are fitted,
+    and outputs that are shrunk.
 
     Args:
         loss: Mean loss, given targets, outputs and `weights`.
@@ -48,6 +54,7 @@ def shrink(loss: Loss, learnt: Data, held_out: Data, sizes: Sequence[int], weigh
         held_out: The same for held-out data.
         sizes: Numbers of outputs of each group.
         weights: Other numbers that depend on no input and are fitted together with the constants.
+        simplest: Constants and weights that would be preferred, or None.
 
     Returns:
         How the outputs are shrunk. Where constants fitted to the training data raise the loss on held-out data, they keep their values.
@@ -82,5 +89,11 @@ def shrink(loss: Loss, learnt: Data, held_out: Data, sizes: Sequence[int], weigh
         tried = minimize(of_constants, constants, (trust,), "L-BFGS-B", jac=True, options=steps).x
         if of_trust(trust, tried)[0] <= of_trust(trust, constants)[0]:
             constants = tried
-    each = (trust @ spread).astype(np.float32)
-    return Shrunk(each, (constants[:number] - each * centre).astype(np.float32), constants[number:].astype(np.float32))
+    none = np.zeros_like(trust)
+    fitted = minimize(of_constants, constants, (none,), "L-BFGS-B", jac=True, options=steps).x
+    tried = [(none, fitted), (trust, constants)] if simplest is None else [(none, simplest), (none, fitted), (trust, constants)]
+    losses = [of_trust(*each)[0] for each in tried]
+    trust, constants = next(each for each, found in zip(tried, losses, strict=True) if found <= min(losses) + _NEARLY_LEAST)
+    print("SHRINK", losses, trust)
+    each, constants = (trust @ spread).astype(np.float32), np.asarray(constants, np.float32)
+    return Shrunk(each, constants[:number] - each * centre, constants[number:])

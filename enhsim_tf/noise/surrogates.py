@@ -6,7 +6,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-_NEARLY_LEAST = 2e-4  # relative excess of the held-out error up to which a smaller order is as good
+_NEARLY_LEAST = 5e-4  # relative excess of the held-out error up to which a larger order is as good
 
 
 class GaussianNoise:
@@ -62,8 +62,9 @@ class GaussianAutoregression:
 
         Burg's method minimises the squared forward and backward prediction errors. It always gives a stationary process.
 
-        AIC counts all samples as different ones. Where windows overlap, it chooses orders that are too high, and held-out windows
-        choose better: the smallest order whose squared error there is within 0.02 % of the least one.
+        AIC counts all samples as different ones, and chooses orders that are too high where windows of a short record overlap. Held-out
+        windows choose the largest order whose squared error there is within 0.05 % of the least one: what a high order adds hardly helps
+        to predict the next sample, but it makes the slow variation of noise with a long memory.
 
         Args:
             windows: Noise windows of shape `(windows, samples)`.
@@ -98,7 +99,7 @@ class GaussianAutoregression:
         if held_out is None:
             chosen = int(np.argmin(criteria))
         else:
-            chosen = int(np.argmax(np.array(errors) <= (1 + _NEARLY_LEAST) * min(errors)))
+            chosen = int(np.flatnonzero(np.array(errors) <= (1 + _NEARLY_LEAST) * min(errors))[-1])
         coefficients, variance = orders[chosen]
         return cls(coefficients, np.sqrt(variance), windows.shape[1])
 

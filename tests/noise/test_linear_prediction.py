@@ -7,7 +7,7 @@ from scipy.linalg import solve_toeplitz
 
 from enhsim_tf.noise.linear_prediction import LinearPrediction
 from enhsim_tf.noise.surrogates import GaussianAutoregression
-from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise
+from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise, FractionalGaussianNoise
 
 SAMPLES = 40
 
@@ -39,10 +39,17 @@ def test_held_out_windows_choose_the_order_where_windows_overlap():
     series = AutoregressiveNoise(0.7, 1.0).draw(2_400, np.random.default_rng(1))
     windows = np.lib.stride_tricks.sliding_window_view(series[:1_600], SAMPLES)
     held_out = np.lib.stride_tricks.sliding_window_view(series[1_600:], SAMPLES)
-    assert len(GaussianAutoregression.fit(windows, 20).coefficients) > 10  # each sample counts forty times
+    assert len(GaussianAutoregression.fit(windows, 20).coefficients) == 20  # each sample counts forty times
     chosen = GaussianAutoregression.fit(windows, 20, held_out)
-    assert len(chosen.coefficients) <= 3
+    assert len(chosen.coefficients) < 20
     assert chosen.coefficients[0] == pytest.approx(0.7, abs=0.06)
+
+
+def test_noise_with_a_long_memory_keeps_its_slow_variation():
+    noise = FractionalGaussianNoise(0.8, 1.0).draw(400_000, np.random.default_rng(2)).reshape(-1, 200)
+    model = GaussianAutoregression.fit(noise[:1_800], 100, noise[1_800:])
+    # the variance of the mean of n samples of fractional Gaussian noise is n to the power of 2 H - 2
+    assert np.std(model.generate(4_000, 1).mean(axis=1)) == pytest.approx(200 ** (0.8 - 1), rel=0.1)
 
 
 def test_the_error_falls_from_that_of_the_process_to_that_of_the_innovations():
@@ -58,7 +65,7 @@ def test_the_error_falls_from_that_of_the_process_to_that_of_the_innovations():
 
 def test_a_periodic_loudness_is_predicted(loud):
     found = LinearPrediction.fit(loud[:3_000], loud[3_000:])
-    assert len(found.values.coefficients) == 0  # no sample tells the next one
+    assert np.abs(found.values.coefficients).max(initial=0) < 0.05  # no sample tells the next one
     predicted = np.exp(found.predict(loud[3_000:])[:, 20:, 1])
     is_loud = np.abs(predicted) > found.mean_magnitude
     quiet, loud_ones = (np.std(loud[3_000:, 20:][each]) for each in (~is_loud, is_loud))

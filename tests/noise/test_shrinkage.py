@@ -43,5 +43,17 @@ def test_constants_that_held_out_data_contradict_are_left():
     assert found.offset.sum() == pytest.approx(float(np.mean(learnt[0]) * (1 - found.trust[0])), abs=0.02)
 
 
+def test_constants_are_preferred_where_they_are_as_good():
+    chance = data(0.0, 1), data(0.0, 2)  # neither output tells anything
+    found = shrink(squares, *chance, (1, 1), np.zeros(1, np.float32))
+    assert (found.trust == 0).all() and found.offset.sum() == pytest.approx(5, abs=0.03)
+    simplest = np.array([2.5, 2.5, 3.0])
+    found = shrink(squares, *chance, (1, 1), np.zeros(1, np.float32), simplest)
+    np.testing.assert_allclose([*found.offset, *found.weights], simplest, rtol=1e-6)
+    worse = np.array([2.0, 2.5, 3.0])
+    assert shrink(squares, *chance, (1, 1), np.zeros(1, np.float32), worse).offset.sum() == pytest.approx(5, abs=0.03)
+    assert shrink(squares, data(1.0, 1), data(1.0, 2), (1, 1), np.zeros(1, np.float32), simplest).trust[0] > 0.9
+
+
 def test_a_trust_is_never_beyond_one():
     assert shrink(squares, data(1.0, 1), data(1.6, 2), (1, 1), np.zeros(1, np.float32)).trust[0] == 1
