@@ -16,7 +16,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.realism.two_sample import boosted_trees
-from enhsim_tf.realism.window_features import signal_features, window_features
+from enhsim_tf.realism.window_features import DECIMALS, signal_features, window_features
 
 MAX_AUC_EXCESS = 0.05  # by which the AUC of a rung may exceed that of real windows against other real windows
 MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows
@@ -140,7 +140,7 @@ def features_of(noise: np.ndarray, signal: np.ndarray, edges: np.ndarray, unit: 
     Returns:
         float64 array of shape `(windows, 26)`; short windows have fewer frequency bands and therefore fewer columns.
     """
-    noise = np.asarray(noise, np.float64) / unit
+    noise = np.round(np.asarray(noise, np.float64) / unit, DECIMALS)
     return np.concatenate([window_features(noise), signal_features(noise, signal, edges)], axis=1)
 
 

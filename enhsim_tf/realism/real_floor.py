@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.realism import measures as fidelity
 from enhsim_tf.realism import two_sample
+from enhsim_tf.realism.window_features import DECIMALS
 
 Comparison = Callable[[np.ndarray, np.ndarray], float]
 
@@ -230,13 +231,14 @@ class RealFloor:
         return RealismReport(tuple(rows), self.num_windows)
 
     def _checked(self, windows: np.ndarray, kind: str) -> np.ndarray:
-        """Checks windows and returns the first `num_windows` of them, standardised by the mean and deviation of the real windows."""
+        """Checks windows and returns the first `num_windows` of them, standardised by the real windows and rounded."""
         if np.ndim(windows) != 2 or len(windows) < max(20, self.num_windows) or np.shape(windows)[1] != self.samples:
             least = f"at least {max(20, self.num_windows)} {kind} windows of {self.samples} samples"
             raise InputError(f"Expected {least}. Received: shape {np.shape(windows)}.")
         if not (np.isfinite(windows).all() and self._unit > 0):
             raise InputError(f"Expected finite values that vary. Received: {kind} windows with a NaN or infinity, or all the same value.")
-        return ((np.asarray(windows[: self.num_windows], np.float64) - self._offset) / self._unit).astype(np.float32)
+        standardised = (np.asarray(windows[: self.num_windows], np.float64) - self._offset) / self._unit
+        return np.round(standardised, DECIMALS).astype(np.float32)
 
     def _resplits(self, num_resplits: int, block: int, rng: np.random.Generator):
         """Yields pairs of index arrays. Blocks in time are assigned to the halves at random; each half keeps the order of time."""

@@ -5,6 +5,10 @@ Features of noise together with the signal below it tell noise that depends on t
 
 import numpy as np
 
+DECIMALS = 4
+"""Decimals, in standard deviations of the noise, at which noise is compared. Smaller differences are rounding errors of 32-bit telemetry, by
+which a classifier tells quantised noise from itself."""
+
 
 def window_features(windows: np.ndarray) -> np.ndarray:
     """Computes fourteen features of each window. Values far below 1e-6 have to be given in a larger unit.
