@@ -17,6 +17,7 @@ import numpy as np
 from enhsim_tf.keras_tools.backend import tf
 
 _NEARLY_LEAST = 1e-4  # held-out loss above the least one up to which constants are as good
+_MOST_LEARNT = 0.01  # loss above that of shrunk outputs on the training data up to which this counts: little held-out data can be alike
 _ROUNDS = 2  # trusts and constants in turn
 _STOP = {"ftol": 1e-9, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
 _MAX_STEPS = 40
@@ -46,7 +47,7 @@ def shrink(
     """Finds the trust of each group of outputs, and their constants.
 
     The result is the first of the following whose held-out loss is nearly the least: the simplest constants, constants that are fitted,
-    and outputs that are shrunk.
+    and outputs that are shrunk. Constants must not lose much on the training data either.
 
     Args:
         loss: Mean loss, given targets, outputs and `weights`.
@@ -92,8 +93,10 @@ def shrink(
     none = np.zeros_like(trust)
     fitted = minimize(of_constants, constants, (none,), "L-BFGS-B", jac=True, options=steps).x
     tried = [(none, fitted), (trust, constants)] if simplest is None else [(none, simplest), (none, fitted), (trust, constants)]
-    losses = [of_trust(*each)[0] for each in tried]
-    trust, constants = next(each for each, found in zip(tried, losses, strict=True) if found <= min(losses) + _NEARLY_LEAST)
-    print("SHRINK", losses, trust)
+    held, own = ([evaluate(*each, some)[0] for each in tried] for some in (held_out, learnt))
+    for each, on_held_out, on_learnt in zip(tried, held, own, strict=True):
+        if on_held_out <= min(held) + _NEARLY_LEAST and on_learnt <= own[-1] + _MOST_LEARNT:
+            trust, constants = each
+            break
     each, constants = (trust @ spread).astype(np.float32), np.asarray(constants, np.float32)
     return Shrunk(each, constants[:number] - each * centre, constants[number:])

@@ -244,7 +244,7 @@ class CurveSettings:
         (20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
     )
     num_real_networks: tuple[int, ...] = setting(
-        (5, 20, 100), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn; published GANs: 20 alone"
+        (20,), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn"
     )
 
 

@@ -55,5 +55,15 @@ def test_constants_are_preferred_where_they_are_as_good():
     assert shrink(squares, data(1.0, 1), data(1.0, 2), (1, 1), np.zeros(1, np.float32), simplest).trust[0] > 0.9
 
 
+def test_constants_that_the_training_data_contradict_are_not_preferred():
+    outputs, targets = data(1.0, 1)
+    learnt = outputs, targets - 5  # the constants are right as they are
+    centre = tf.reduce_mean(outputs, axis=0, keepdims=True)
+    alike = tf.repeat(centre, NUMBER, axis=0), tf.zeros((NUMBER, 1))  # held-out data that say nothing about trust
+    simplest = np.array([0.0, 0.0, 3.0])
+    assert shrink(squares, learnt, alike, (1, 1), np.full(1, 3, np.float32), simplest).trust[0] > 0.9
+    assert shrink(squares, alike, alike, (1, 1), np.full(1, 3, np.float32), simplest).trust[0] == 0
+
+
 def test_a_trust_is_never_beyond_one():
     assert shrink(squares, data(1.0, 1), data(1.6, 2), (1, 1), np.zeros(1, np.float32)).trust[0] == 1
