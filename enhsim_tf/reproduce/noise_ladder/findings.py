@@ -137,7 +137,8 @@ def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[s
         decides), the best rung, by how much more the detectors of the chosen rung alarm than those of the best one and than those of
         real windows, and how much recall they lose against real windows. A rung with few false alarms can be one whose detectors miss
         anomalies; the best rung is therefore also named among those that lose at most `MAX_RECALL_DIFFERENCE` (`best_that_finds`; among
-        all rungs if there is none).
+        all rungs if there is none). And since fewer alarms than after training on real windows come from thresholds that are too high, the
+        best rung is also counted with those of real windows, if it has fewer (`regret_above_real`).
     """
     judged = _judgements(rows)
     names, lost = [each.rung for each in judged], {each.rung: recalls[REAL] - recalls[each.rung] for each in judged}
@@ -153,6 +154,7 @@ def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[s
         "best_that_finds": best_that_finds,
         "regret_that_finds": rates[chosen] - rates[best_that_finds],
         "judged": len(judged),
+        "regret_above_real": rates[chosen] - max(rates[best], rates[REAL]),
         "excess": rates[chosen] - rates[REAL],
         "lost": lost[chosen],
     }
@@ -223,13 +225,15 @@ def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
     def means(measure: str) -> dict[str, float]:
         return {name: float(np.mean([each[measure] for each in choices])) for name, choices in judged.items()}
 
-    regrets, finding, lost = means("regret"), means("regret_that_finds"), means("lost")
+    regrets, finding, lost, above = means("regret"), means("regret_that_finds"), means("lost"), means("regret_above_real")
     misses = {name: regret for name, regret in finding.items() if regret > MAX_REGRET or lost[name] > MAX_RECALL_DIFFERENCE}
     return {
         "limit": MAX_REGRET,
         "kept": sum(regret <= MAX_REGRET for regret in regrets.values()),
         "kept_that_finds": len(judged) - len(misses),
         "missed_that_finds": misses,
+        "kept_above_real": sum(regret <= MAX_REGRET for regret in above.values()),
+        "missed_above_real": {name: regret for name, regret in above.items() if regret > MAX_REGRET},
         "of": len(judged),
         "seeds": sorted({each["seed"] for choices in judged.values() for each in choices}),
         "missed": {name: regret for name, regret in regrets.items() if regret > MAX_REGRET},
