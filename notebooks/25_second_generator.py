@@ -356,7 +356,7 @@ if is_full:
 #
 # The experiment on noise tried the generators on fourteen families, with seven detectors ([docs/noise.md](../docs/noise.md)); its network
 # is trained longer than the one above. False alarms, with thresholds set for 1 %, of detectors trained on the true waves with generated
-# noise:
+# noise (means over the seeds that each model has):
 
 # %%
 published = open_noise()
@@ -375,7 +375,7 @@ for family, about in published["families"].items():
         )
 ties = {}
 for family, about in published["families"].items():
-    gap = {name: about["rungs"][name]["alarms"] - about["rungs"]["real"]["alarms"] for name in rungs}
+    gap = {name: about["rungs"][name]["excess"] for name in rungs}  # over real windows of the same seeds
     ties[family] = next((name for name in rungs if gap[name] <= 0.01), "none")
 say(
     "The simplest of these generators whose false alarms are within 1 point of those of real noise: "

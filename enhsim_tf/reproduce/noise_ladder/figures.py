@@ -33,7 +33,8 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     kept, rung = found["limits"], found["limits"]["rung"]
     seeds = len(found["seeds"])
     shown = {had: [name for name in names if name in _MARKS] for had, names in fewer_seeds(found).items()}
-    fewer = "".join(f" ({in_list(names)}: {in_words(len(had))})" for had, names in shown.items() if names)
+    told = "; ".join(f"{in_list(names)}: {in_words(len(had))}" for had, names in shown.items() if names)
+    fewer = f" ({told})" if told else ""
     strict = [f"{name} {about['kept']}" for name, about in kept["within_strict"].items() if about["of"] and name in _MARKS]
     figure, down = new_sheet(
         DOUBLE,
