@@ -383,7 +383,7 @@ class AutoregressiveNetwork:
             begin, now = np.maximum(place - self.octaves, 0), reach + place
             means, magnitudes = (sums[:, :, place, None] - sums[:, :, begin]) / np.maximum(place - begin, 1)
             age = min(place, self.window - 1)
-            parts_seen = [self._last(series, now, num_lags), means, np.log(magnitudes + _TINY)]
+            parts_seen = [series[:, now - num_lags : now][:, ::-1], means, np.log(magnitudes + _TINY)]
             parts_seen.append(np.full((num_rows, 2), (age / self.window, 1 / math.sqrt(1 + age))))
             if prediction is not None:
                 latest = _PREDICTED[-1] + place
@@ -411,11 +411,6 @@ class AutoregressiveNetwork:
             loudness[:, now] += np.abs(value)
             sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
         return series[:, reach:] * np.float32(self.scale)
-
-    @staticmethod
-    def _last(series: np.ndarray, now: int, number: int) -> np.ndarray:
-        """The last samples of each row before a place, the latest first."""
-        return series[:, now - number : now][:, ::-1]
 
     def _to_level(self, values: np.ndarray) -> np.ndarray:
         """Rounds values, in units of the scale, to the levels of quantised noise; other noise stays as it is."""
