@@ -182,8 +182,8 @@ class HeldOutJudge:
         training, clean = self._training, self._clean
         rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
         noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
-        generated = clean + noise  # 32-bit numbers: the noise that is judged has the rounding errors of the real one
-        noise = (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
+        if training.quantisation is not None:
+            noise = training.quantisation.round(clean + noise) - clean
         return self._judge.judge(option, noise, compare(NoiseWindows(noise, clean), self._learnt, self._held_out)[0])
 
 

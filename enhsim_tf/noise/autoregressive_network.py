@@ -26,8 +26,11 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.keras_tools.backend import keras, tf
 from enhsim_tf.keras_tools.training import seeded_initialiser
+from enhsim_tf.noise import ladder
+from enhsim_tf.noise.calibration import Calibration, mixture_probabilities
 from enhsim_tf.noise.linear_prediction import LinearPrediction
 from enhsim_tf.noise.shrinkage import shrink
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 
 NUM_LAGS = 64  # samples that the network sees one by one
@@ -45,8 +48,7 @@ _MAX_LOG_DEGREES = 8.0  # no telemetry tells more degrees of freedom from a norm
 _LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimiser moves them by powers of ten, not by parts of one
 _PREDICTED = (0, 1, 2, 4, 8, 16, 32)  # samples before the present one whose linear prediction the network sees
 _EARLY = (25, 50, 75)  # iterations after which the weights are also compared on held-out windows: few windows are soon learnt by heart
-# Every third position is drawn early in the window: the first samples decide how loud the whole window is, and where periods begin.
-_EARLY_SHARE, _EARLINESS = 3, 4
+_LEAST_PAST = 4  # samples of real noise that generated noise continues
 _MOST_SHRUNK = 400_000  # samples that the shrinkage learns from
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
 
@@ -89,6 +91,8 @@ class AutoregressiveNetwork:
         self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
         self.sees_predictions = bool(sees_predictions)
         self.prediction = LinearPrediction.of_white_noise(self.window) if self.sees_predictions else None
+        self.pasts: WindowBootstrap | MatchedWindowBootstrap | None = None
+        self.calibration: Calibration | None = None
         self.start_logits = np.where(np.arange(self.num_components) < 2, -6.0, 0.0).astype(np.float32)
         self.network = self._build()
 
@@ -119,6 +123,9 @@ class AutoregressiveNetwork:
         num_predicted = (len(_PREDICTED) + 1) * self.sees_predictions
         features = keras.Input((num_linear + len(self.octaves) + 2 + num_predicted + len(_SIGNAL_LAGS) * self.follows_signal,))
         linear = keras.layers.Dense(1, kernel_initializer="zeros", name="linear")(features[:, :num_linear])
+        loudness = 0.0
+        if self.sees_predictions:
+            loudness = keras.layers.Dense(1, kernel_initializer="ones", name="loudness")(features[:, self._place_of_magnitude :][:, :1])
         hidden = keras.ops.clip(features, -_CLIP, _CLIP)
         for name, number in (("first", 600), ("second", 601)):
             kernel = seeded_initialiser("he_uniform", self.seed * 1000 + number)
@@ -129,8 +136,15 @@ class AutoregressiveNetwork:
         logits = logits + self.start_logits
         degrees = _Degrees(self.num_components, name="degrees")
         return keras.Model(
-            features, [logits, linear + shifts, keras.ops.clip(log_scales, *self.log_scales), degrees(logits)], name="density"
+            features,
+            [logits, linear + shifts, keras.ops.clip(loudness + log_scales, *self.log_scales), degrees(logits)],
+            name="density",
         )
+
+    @property
+    def _place_of_magnitude(self) -> int:
+        """Place of the logarithm of the predicted magnitude among the features."""
+        return len(self.lags) + 2 * len(self.octaves) + 2 + len(_PREDICTED)
 
     def fit(
         self,
@@ -169,12 +183,13 @@ class AutoregressiveNetwork:
         first, last = _split(starts, len(values), self.window, held_out)
         if self.sees_predictions:
             self.prediction = LinearPrediction.fit(values[first], values[last])
+            self.pasts = self._pasts(values, signal)
         data = (values, signal, self._predict(values))
         training, judged = (tuple(tf.constant(each[rows]) for each in data) for rows in (first, last[:500]))
-        judged_positions = tf.constant(np.linspace(0, self.window - 1, min(100, self.window)).astype(np.int32))
+        judged_positions = tf.constant(self._places(min(100, self.window)))
         schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
         optimizer = keras.optimizers.AdamW(schedule, weight_decay=_WEIGHT_DECAY, global_clipnorm=1.0)
-        optimizer.exclude_from_weight_decay(var_names=["bias", "degrees", "linear"])
+        optimizer.exclude_from_weight_decay(var_names=["bias", "degrees", "linear", "loudness"])
         optimizer.build(self.network.trainable_variables)
         averages = [tf.Variable(each) for each in self.network.trainable_variables]
         number = len(first)
@@ -182,9 +197,7 @@ class AutoregressiveNetwork:
         @tf.function
         def iterate(seed: tf.Tensor) -> tf.Tensor:
             rows = tf.random.stateless_uniform((min(batch_size, number),), seed, 0, number, tf.int32)
-            share = tf.random.stateless_uniform((min(positions, self.window),), seed + 1)
-            share = tf.where(tf.range(len(share)) % _EARLY_SHARE == 0, share**_EARLINESS, share)
-            where = tf.minimum(tf.cast(share * self.window, tf.int32), self.window - 1)
+            where = tf.random.stateless_uniform((min(positions, self.window),), seed + 1, 0, self.window, tf.int32)
             with tf.GradientTape() as tape:
                 loss = self._loss(*(tf.gather(each, rows) for each in training), where)
             variables = self.network.trainable_variables
@@ -210,36 +223,26 @@ class AutoregressiveNetwork:
         if kept is not None:
             self._assign(kept)
         self._shrink(training, judged)
+        self._calibrate(training, judged)
         self.held_out_loss = float(evaluate())
         return self
 
     def _shrink(self, training: tuple[tf.Tensor, ...], judged: tuple[tf.Tensor, ...]) -> None:
         """Shrinks what the density takes from the past, and fits what does not depend on it again; see `shrinkage`."""
         parts, (degrees,) = self.num_components, self.network.get_layer("degrees").get_weights()
-        sizes = (1, parts, parts, parts)  # of the linear layer, and of the logits, shifts and scales of the last layer
-        layers = [self.network.get_layer(name) for name in ("linear", "last")]
+        names = ("linear", "loudness", "last") if self.sees_predictions else ("linear", "last")
+        layers, levels = [self.network.get_layer(name) for name in names], [1] * (len(names) - 1)
+        sizes = (*levels, parts, parts, parts)  # of the first layers, and of the logits, shifts and scales of the last layer
         outputs = keras.Model(self.network.input, keras.ops.concatenate([each.output for each in layers], axis=1))
 
-        def seen(data: tuple[tf.Tensor, ...]) -> tuple[tf.Tensor, tf.Tensor]:
-            each = max(1, min(self.window, _MOST_SHRUNK // len(data[0])))
-            where = tf.constant(np.linspace(0, self.window - 1, each).astype(np.int32))
-
-            @tf.function
-            def compute(rows: tuple[tf.Tensor, ...]) -> tuple[tf.Tensor, tf.Tensor]:
-                features, targets = self._features(*rows, where)
-                return outputs(features), targets
-
-            found = [compute(tuple(part[begin : begin + 200] for part in data)) for begin in range(0, len(data[0]), 200)]
-            return tuple(tf.concat(parts, 0) for parts in zip(*found, strict=True))
-
         def loss(targets: tf.Tensor, outputs: tf.Tensor, weights: tf.Tensor) -> tf.Tensor:
-            linear, logits, shifts, log_scales = tf.split(outputs, sizes, axis=1)
-            log_scales = tf.clip_by_value(log_scales, *self.log_scales)
+            linear, *loudness, logits, shifts, log_scales = tf.split(outputs, sizes, axis=1)
+            log_scales = tf.clip_by_value(sum(loudness, log_scales), *self.log_scales)
             return self._negative_log_likelihood(targets, logits + self.start_logits, linear + shifts, log_scales, _degrees(weights)[None])
 
-        learnt, held_out = seen(training), seen(judged)
+        learnt, held_out = (self._outputs(outputs, data) for data in (training, judged))
         targets = learnt[1][:, 0].numpy().astype(np.float64)
-        level = np.repeat([np.mean(targets), 0.0, 0.0, np.log(np.std(targets) + _TINY)], sizes)
+        level = np.repeat([np.mean(targets), *[0.0] * (len(sizes) - 2), np.log(max(np.std(targets), _TINY))], sizes)
         normal = np.concatenate(
             [level, np.full(parts, _MAX_LOG_DEGREES / _LOG_UNIT)]
         )  # one normal distribution around the linear prediction
@@ -251,6 +254,44 @@ class AutoregressiveNetwork:
             layer.set_weights([kernel * found.trust[own], found.trust[own] * bias + found.offset[own]])
             begin += len(bias)
         self.network.get_layer("degrees").set_weights([found.weights])
+
+    def _outputs(self, model: keras.Model, data: tuple[tf.Tensor, ...]) -> tuple[tf.Tensor, tf.Tensor]:
+        """Computes the outputs of a model of the features, and the targets, at places that are spread over all windows."""
+        where = tf.constant(self._places(max(1, _MOST_SHRUNK // len(data[0]))))
+
+        @tf.function
+        def compute(rows: tuple[tf.Tensor, ...]) -> tuple[tf.Tensor, tf.Tensor]:
+            features, targets = self._features(*rows, where)
+            return model(features), targets
+
+        found = [compute(tuple(part[begin : begin + 200] for part in data)) for begin in range(0, len(data[0]), 200)]
+        return tuple(tf.concat(parts, 0) for parts in zip(*found, strict=True))
+
+    def _calibrate(self, training: tuple[tf.Tensor, ...], judged: tuple[tf.Tensor, ...]) -> None:
+        """Counts how often samples are below the quantiles of the predicted densities; see `calibration`."""
+        if self.step or not self.sees_predictions:  # of a level, only the probability of its whole step is known
+            return
+        logits, means, log_scales, _ = self.network.outputs
+        model, degrees = keras.Model(self.network.input, keras.ops.concatenate([logits, means, log_scales], axis=1)), self.degrees
+
+        def probabilities(data: tuple[tf.Tensor, ...]) -> np.ndarray:
+            outputs, targets = (each.numpy().astype(np.float64) for each in self._outputs(model, data))
+            return mixture_probabilities(targets[:, 0], *np.split(outputs, 3, axis=1), degrees)
+
+        self.calibration = Calibration.fit(probabilities(training), probabilities(judged))
+
+    def _pasts(self, values: np.ndarray, signal: np.ndarray) -> WindowBootstrap | MatchedWindowBootstrap | None:
+        """Returns real noise that generated noise continues: the samples before the last half of each window, and the signal after them."""
+        half = self.window // 2
+        if half < _LEAST_PAST:
+            return None
+        before = values[:, self.window - 2 * half : self.window - half]
+        return MatchedWindowBootstrap.fit(before, signal[:, self.window - half :]) if self.follows_signal else WindowBootstrap.fit(before)
+
+    def _places(self, number: int) -> np.ndarray:
+        """Returns places of a window, evenly spaced, that have as long a past as generated samples have."""
+        first = 0 if self.pasts is None else self.pasts.windows.shape[1]
+        return np.linspace(first, self.window - 1, min(number, self.window - first)).astype(np.int32)
 
     def _predict(self, values: np.ndarray) -> np.ndarray:
         """Returns the linear predictions of value and logarithm of the magnitude, or nothing if the network does not see them."""
@@ -372,14 +413,21 @@ class AutoregressiveNetwork:
         layers = ("linear", "first", "second", "last")
         (linear, linear_bias), first_layer, second_layer, last_layer = (self.network.get_layer(name).get_weights() for name in layers)
         degrees, prediction, errors = self.degrees, self.prediction, self._errors
-        num_lags, num_linear, parts = len(self.lags), len(linear), self.num_components
-        reach = max(self.window - 1, num_lags)
-        series, loudness = np.zeros((2, num_rows, reach + num_samples), np.float32)
-        predicted = np.zeros((num_rows, _PREDICTED[-1] + num_samples), np.float32)
-        sums = np.zeros((2, num_rows, num_samples + 1))
+        num_lags, num_linear = len(self.lags), len(linear)
+        past = self._draw_pasts(num_rows, num_samples, signal, rng)
+        known, reach, begun = past.shape[1], max(self.window - 1, num_lags), max(self.window - 1, num_lags) + past.shape[1]
+        series, loudness = np.zeros((2, num_rows, begun + num_samples), np.float32)
+        series[:, reach:begun] = past
+        predicted = np.zeros((num_rows, _PREDICTED[-1] + known + num_samples), np.float32)
+        sums = np.zeros((2, num_rows, known + num_samples + 1))
+        sums[:, :, 1 : known + 1] = np.cumsum([past, np.abs(past)], axis=2, dtype=np.float64)
+        if prediction is not None:
+            slope, level = self.network.get_layer("loudness").get_weights()
+        if prediction is not None and known:
+            predicted[:, _PREDICTED[-1] : _PREDICTED[-1] + known] = past_predicted = prediction.predict(past)[:, :, 0]
+            loudness[:, reach:begun] = prediction.loudness(past, past_predicted)
         features = np.zeros((num_rows, len(first_layer[0])), np.float32)
-        rows = np.arange(num_rows)
-        for place in range(num_samples):
+        for place in range(known, known + num_samples):
             begin, now = np.maximum(place - self.octaves, 0), reach + place
             means, magnitudes = (sums[:, :, place, None] - sums[:, :, begin]) / np.maximum(place - begin, 1)
             age = min(place, self.window - 1)
@@ -390,27 +438,48 @@ class AutoregressiveNetwork:
                 predicted[:, latest], loud = prediction.next(series[:, place:now], loudness[:, place:now], place)
                 parts_seen += [predicted[:, latest - np.array(_PREDICTED)], loud[:, None]]
             if self.follows_signal:
-                parts_seen.append(signal[:, np.clip(place + np.array(_SIGNAL_LAGS), 0, num_samples - 1)])
+                parts_seen.append(signal[:, np.clip(place - known + np.array(_SIGNAL_LAGS), 0, num_samples - 1)])
             np.concatenate(parts_seen, axis=1, out=features)
             hidden = np.clip(features, -_CLIP, _CLIP)
             for layer, bias in (first_layer, second_layer):
                 hidden = hidden @ layer + bias
                 hidden /= 1 + np.exp(-np.maximum(hidden, -80))
             logits, shifts, log_scales = np.split(hidden @ last_layer[0] + last_layer[1], 3, axis=1)
-            logits = logits + self.start_logits
-            shares = np.cumsum(np.exp(logits - logits.max(axis=1, keepdims=True)), axis=1)
-            chosen = (rng.random(num_rows)[:, None] * shares[:, -1:] > shares).sum(axis=1).clip(max=parts - 1)
-            centre = features[:, :num_linear] @ linear[:, 0] + linear_bias[0] + shifts[rows, chosen]
-            draw = rng.standard_normal(num_rows) / np.sqrt(2 * rng.standard_gamma(degrees[chosen] / 2) / degrees[chosen])
-            value = centre + np.exp(np.clip(log_scales[rows, chosen], *self.log_scales)) * draw
+            centres = shifts + (features[:, :num_linear] @ linear + linear_bias)
+            if prediction is not None:
+                log_scales = log_scales + (level + slope[0] * loud[:, None])
+            value = self._sample(logits + self.start_logits, centres, np.clip(log_scales, *self.log_scales), degrees, rng)
             if prediction is not None:
                 value = predicted[:, latest] + errors[age] * value
-                loudness[:, now] = -prediction.mean_magnitude
             value = self._to_level(np.clip(value, -self.limit, self.limit))
             series[:, now] = value
-            loudness[:, now] += np.abs(value)
+            if prediction is not None:
+                loudness[:, now] = prediction.loudness(value[:, None], predicted[:, latest, None], age)[:, 0]
             sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
-        return series[:, reach:] * np.float32(self.scale)
+        return series[:, begun:] * np.float32(self.scale)
+
+    def _sample(
+        self, logits: np.ndarray, means: np.ndarray, log_scales: np.ndarray, degrees: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """Draws a sample from each row's mixture, until all are accepted by the calibration."""
+        shares = np.cumsum(np.exp(logits - logits.max(axis=1, keepdims=True)), axis=1)
+        values, rows = np.empty(len(logits)), np.arange(len(logits))
+        while len(rows):
+            chosen = (rng.random(len(rows))[:, None] * shares[rows, -1:] > shares[rows]).sum(axis=1).clip(max=self.num_components - 1)
+            draw = rng.standard_normal(len(rows)) / np.sqrt(2 * rng.standard_gamma(degrees[chosen] / 2) / degrees[chosen])
+            values[rows] = means[rows, chosen] + np.exp(log_scales[rows, chosen]) * draw
+            if self.calibration is None:
+                break
+            probabilities = mixture_probabilities(values[rows], logits[rows], means[rows], log_scales[rows], degrees)
+            rows = rows[~self.calibration.accept(probabilities, rng)]
+        return values
+
+    def _draw_pasts(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Draws the real noise that is continued, from windows in which a similar signal followed; none for networks saved before."""
+        if self.pasts is None:
+            return np.zeros((num_rows, 0), np.float32)
+        after = signal[:, np.minimum(np.arange(self.pasts.windows.shape[1]), num_samples - 1)] if self.follows_signal else None
+        return ladder.generate(self.pasts, num_rows, rng, after)
 
     def _to_level(self, values: np.ndarray) -> np.ndarray:
         """Rounds values, in units of the scale, to the levels of quantised noise; other noise stays as it is."""

@@ -45,11 +45,13 @@ class LinearPrediction:
             held_out: Other noise windows, which choose the orders.
         """
         order = min(_MAX_ORDER, windows.shape[1] // 2)
-        mean_magnitude = float(np.mean(np.abs(windows), dtype=np.float64))
         values = GaussianAutoregression.fit(windows, order, held_out)
         if values.innovation_sd < _LEAST_ERROR:  # a prediction without an error leaves nothing to learn, and cannot be computed exactly
             values = GaussianAutoregression([], 1.0, windows.shape[1])
-        loud, held_out_loud = (np.abs(each) - mean_magnitude for each in (windows, held_out))
+        found = cls(values, GaussianAutoregression([], 1.0, windows.shape[1]), 0.0)
+        loud, held_out_loud = (found.loudness(each, values.predict(each)) for each in (windows, held_out))
+        mean_magnitude = float(np.mean(loud, dtype=np.float64))
+        loud, held_out_loud = loud - mean_magnitude, held_out_loud - mean_magnitude
         if np.ptp(loud) > 0:
             magnitudes = GaussianAutoregression.fit(loud, order, held_out_loud)
         else:  # two values of equal magnitude
@@ -65,8 +67,20 @@ class LinearPrediction:
         Returns:
             float32 array of shape `(windows, samples, 2)`.
         """
-        magnitudes = self.magnitudes.predict(np.abs(windows) - self.mean_magnitude)
-        return np.stack([self.values.predict(windows), self._log(magnitudes)], axis=2).astype(np.float32)
+        predicted = self.values.predict(windows)
+        magnitudes = self.magnitudes.predict(self.loudness(windows, predicted))
+        return np.stack([predicted, self._log(magnitudes)], axis=2).astype(np.float32)
+
+    def loudness(self, windows: np.ndarray, predicted: np.ndarray, place: int = 0) -> np.ndarray:
+        """Returns the magnitude of the errors of predicted values, in units of their standard deviation, minus its mean.
+
+        Args:
+            windows: Noise, shape `(windows, samples)`.
+            predicted: Its prediction, same shape.
+            place: Place of the first sample in a window.
+        """
+        errors = self.errors[place : place + windows.shape[1]]
+        return np.abs(windows - predicted) / errors - self.mean_magnitude
 
     def next(self, past: np.ndarray, loudness: np.ndarray, place: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns the same for the sample that follows.

@@ -24,7 +24,7 @@ _KINDS = {
     MatchedWindowBootstrap: "matched residual windows",
 }
 _AUTOREGRESSIVE_NETWORK = "autoregressive network"
-_WEIGHT, _PREDICTION = "weight_", "prediction_"  # beginnings of the names of its arrays
+_WEIGHT, _PREDICTION, _PAST, _CALIBRATION = "weight_", "prediction_", "past_", "calibration_"  # beginnings of the names of its arrays
 _OLD_NAMES = {"resampled": "residual windows"}  # of models that were saved before
 
 
@@ -76,6 +76,10 @@ def state_of(model: Any) -> NoiseState:
         arrays = {f"{_WEIGHT}{number:02}": weight for number, weight in enumerate(model.network.get_weights())}
         if model.prediction is not None:
             arrays |= {_PREDICTION + name: values for name, values in model.prediction.arrays.items()}
+        if model.pasts is not None:
+            arrays |= {_PAST + name: values for name, values in state_of(model.pasts).arrays.items()}
+        if model.calibration is not None:
+            arrays |= {_CALIBRATION + "edges": model.calibration.edges, _CALIBRATION + "density": model.calibration.density}
         return NoiseState({"kind": _AUTOREGRESSIVE_NETWORK, "tails": TAILS} | model.get_config(), arrays=arrays)
     if isinstance(model, NoiseGAN):
         return NoiseState({"kind": _GAN} | model.get_config(), {"generator": model.generator, "discriminator": model.discriminator})
@@ -110,6 +114,7 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         return MatchedWindowBootstrap(arrays["windows"], arrays["signals"])
     if kind == _AUTOREGRESSIVE_NETWORK:
         from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
+        from enhsim_tf.noise.calibration import Calibration
         from enhsim_tf.noise.linear_prediction import LinearPrediction
 
         _positive(values["scale"])
@@ -118,9 +123,16 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         tails = str(values.pop("tails", "softplus"))  # models that were saved before do not say
         model = AutoregressiveNetwork(**{"sees_predictions": False} | values)
         model.set_weights([arrays[name] for name in sorted(arrays) if name.startswith(_WEIGHT)], tails)
+        predictions, pasts, calibration = (
+            {name.removeprefix(kind): each for name, each in arrays.items() if name.startswith(kind)}
+            for kind in (_PREDICTION, _PAST, _CALIBRATION)
+        )
         if model.sees_predictions:
-            saved = {name.removeprefix(_PREDICTION): each for name, each in arrays.items() if name.startswith(_PREDICTION)}
-            model.prediction = LinearPrediction.from_arrays(saved, model.window)
+            model.prediction = LinearPrediction.from_arrays(predictions, model.window)
+        if pasts:
+            model.pasts = model_from({"kind": "matched residual windows" if model.follows_signal else "residual windows"}, {}, pasts)
+        if calibration:
+            model.calibration = Calibration(**calibration)
         return model
     if kind == _GAN:
         from enhsim_tf.noise.gan import NoiseGAN

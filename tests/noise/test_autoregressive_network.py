@@ -70,7 +70,8 @@ def test_numpy_draws_from_the_density_that_training_maximises():
     width = network.network.input_shape[1]
     features = np.zeros((1, width), np.float32)
     features[0, len(network.lags) + len(network.octaves) :][: len(network.octaves)] = np.log(1e-3)  # no past has no magnitude
-    features[0, -1] = 1.0  # 1 / sqrt(1 + 0)
+    features[0, len(network.lags) + 2 * len(network.octaves) + 1] = 1.0  # 1 / sqrt(1 + 0)
+    features[0, -1] = np.log(np.sqrt(2 / np.pi))  # the predicted magnitude of white noise
     logits, means, log_scales, degrees = (np.asarray(each, np.float64)[0] for each in network.network(features))
     drawn = network.generate(20_000, 3)[:, 0] / network.scale
     for value in np.linspace(-5, 5, 21):  # below the limit of generated samples
@@ -91,6 +92,43 @@ def test_the_largest_samples_are_as_large_as_those_of_the_process():
     generated = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 400).generate(20_000, 1)
     for share in (1e-2, 1e-3, 1e-4):  # of 640,000 samples
         assert np.quantile(np.abs(generated), 1 - share) == pytest.approx(-np.log(share), rel=0.1)
+
+
+def test_an_edge_and_a_tail_that_no_component_has_are_drawn():
+    """Independent exponential samples: their distribution function in closed form."""
+    noise = np.random.default_rng(6).exponential(size=(8_000, 32)) - 1
+    network = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 300)
+    generated = network.generate(10_000, 1)
+    assert network.calibration is not None
+    for value in (-0.9, -0.5, 0.0, 1.0, 3.0):
+        assert np.mean(generated <= value) == pytest.approx(1 - np.exp(-(value + 1)), abs=0.005)
+    assert np.quantile(generated, 0.999) == pytest.approx(-np.log(1e-3) - 1, abs=0.25)  # four standard errors of the training data
+    assert np.mean(generated < -1.05) < 0.002
+
+
+def test_generated_noise_continues_real_noise():
+    """Each window has a loudness of its own, which no first sample tells: 0.1 or 1, as often."""
+    rng = np.random.default_rng(8)
+    noise = rng.standard_normal((1_000, 40)) * np.where(rng.random((1_000, 1)) < 0.5, 0.1, 1.0)
+    network = AutoregressiveNetwork.untrained(noise, seed=2).fit(noise, 400)
+    scales = np.std(network.generate(2_000, 3), axis=1)
+    assert np.mean(scales < 0.3) == pytest.approx(0.5, abs=0.05)
+    assert np.mean((scales > 0.17) & (scales < 0.6)) < 0.03  # of the real windows: fewer than one in a thousand
+    before = network.pasts.windows * network.scale
+    np.testing.assert_allclose(before, noise[:, :20], rtol=1e-5)  # real noise, as long as half a window
+
+
+def test_noise_that_follows_the_signal_continues_noise_before_a_similar_signal():
+    rng = np.random.default_rng(9)
+    is_rising = rng.random((400, 1)) < 0.5
+    signal = np.where(is_rising, np.linspace(-1, 1, 40), np.linspace(1, -1, 40))
+    noise = rng.standard_normal((400, 40)) * np.where(is_rising, 0.1, 1.0)
+    network = AutoregressiveNetwork.untrained(noise, signal, seed=2).fit(noise, 5, signal)
+    after_rising = signal[is_rising[:, 0]][:1, 20:]
+    wanted = np.repeat(np.concatenate([after_rising, -after_rising], axis=0), 50, axis=0)
+    wanted = np.concatenate([wanted, wanted], axis=1).astype(np.float32)
+    drawn = network._draw_pasts(100, 40, wanted, np.random.default_rng(1)) * network.scale
+    assert (np.std(drawn[:50], axis=1) < 0.3).all() and (np.std(drawn[50:], axis=1) > 0.3).all()
 
 
 def test_noise_whose_scale_follows_the_signal_is_learnt():

@@ -72,11 +72,21 @@ def test_a_periodic_loudness_is_predicted(loud):
     assert loud_ones > 3 * quiet
 
 
+def test_the_loudness_is_that_of_what_is_not_predicted():
+    noise = AutoregressiveNoise(0.7, 1.0).draw(40_000, np.random.default_rng(1)).reshape(-1, SAMPLES).astype(np.float32)
+    found = LinearPrediction.fit(noise[:900], noise[900:])
+    innovations = (noise[900:, 1:] - 0.7 * noise[900:, :-1]) / np.sqrt(1 - 0.7**2)
+    predicted = found.predict(noise[900:])
+    expected = np.abs(innovations) - np.sqrt(2 / np.pi)  # the mean magnitude of a normal distribution
+    assert_allclose(found.loudness(noise[900:], predicted[:, :, 0])[:, 1:], expected, atol=0.25)
+    assert_allclose(predicted[:, 1:, 1], np.log(np.sqrt(2 / np.pi)), atol=0.2)  # a loud sample says nothing of the next innovation
+
+
 def test_single_steps_give_the_predictions_of_whole_windows(loud):
     found = LinearPrediction.fit(loud[:3_000], loud[3_000:])
     rows, whole = loud[:6], found.predict(loud[:6])
     past = np.pad(rows, ((0, 0), (SAMPLES - 1, 0)))
-    loudness = np.pad(np.abs(rows) - np.float32(found.mean_magnitude), ((0, 0), (SAMPLES - 1, 0)))
+    loudness = np.pad(found.loudness(rows, whole[:, :, 0]), ((0, 0), (SAMPLES - 1, 0)))
     for place in range(SAMPLES):
         value, magnitude = found.next(past[:, place : place + SAMPLES - 1], loudness[:, place : place + SAMPLES - 1], place)
         assert_allclose(value, whole[:, place, 0], atol=1e-5)
@@ -102,4 +112,6 @@ def test_saved_predictions_are_made_again_and_impossible_ones_are_refused(loud):
 def test_noise_of_one_magnitude_has_a_constant_loudness():
     signs = np.where(np.random.default_rng(0).random((300, 20)) < 0.5, -1, 1).astype(np.float32)
     found = LinearPrediction.fit(signs[:200], signs[200:])
-    assert_allclose(found.predict(signs)[:, :, 1], 0, atol=1e-6)
+    loudness = found.predict(signs)[:, :, 1]
+    assert_allclose(loudness, loudness[0, 0])
+    assert_allclose(loudness, 0, atol=0.01)

@@ -95,8 +95,7 @@ class Cell:
             waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
-            # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
-            generated = more + ladder.generate(model, len(held_out), draws, more) - more
+            generated = ladder.generate(model, len(held_out), draws, more)
             judgement = dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung)
             choice = [{"rule": PRESENT} | dataclasses.asdict(judgement)]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)

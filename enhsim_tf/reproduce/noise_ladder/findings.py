@@ -27,14 +27,19 @@ REVISED = ("bernoulli", "quantised")  # unseen families whose first result led t
 MAX_RECALL_DIFFERENCE = 0.03
 MAX_REALISM_RATIO = 3.0
 MAX_REGRET = 0.005  # by which the excess of the chosen rung may be above that of the best rung
-FORMER_RULES = ("second", "first")
-"""The rules of the choice before the present one, which judged the published seeds 3001 and 3000. The classifier of the first rule saw the
-noise alone, in windows that overlap. Neither rule knew the recall."""
-FORMER = "autoregressive network, first form"
-"""Rows of the autoregressive network on the seeds of the former rules, before its tails were changed."""
+RULES = {
+    PRESENT: "present rule",
+    "present, second form": "present rule, with the second form of the network,",
+    "second": "second rule, with the first form of the network,",
+    "first": "first rule, with the first form of the network,",
+}
+"""The rules of the choice, by their names in the tables; the former ones judged the published seeds 3002, 3001 and 3000. The classifier of the
+first rule saw the noise alone, in windows that overlap. Neither the first nor the second rule knew the recall."""
 _NETWORK = "autoregressive network"
-ARMS = tuple(name for rung in RUNGS for name in ((rung, FORMER) if rung == _NETWORK else (rung,)))
-"""The rungs of the ladder and the former network, the simplest first."""
+FORMER = tuple(f"{_NETWORK}, {form} form" for form in ("second", "first"))
+"""Rows of the autoregressive network on the seeds of the former rules, before it was worked over."""
+ARMS = tuple(name for rung in RUNGS for name in ((rung, *FORMER) if rung == _NETWORK else (rung,)))
+"""The rungs of the ladder and the former networks, the simplest first."""
 
 
 def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
@@ -46,7 +51,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
     Returns:
         For each family, its half, its seeds, each rung's seeds, false-alarm rate, excess, recall, share of realism measures within
         `MAX_REALISM_RATIO` times their floor and those beyond it (means over seeds); and for each seed, the rule
-        that judged it, the chosen rung, those that pass, and the best one. And whether each limit is kept. Rungs are compared with
+        that judged it, the chosen rung, and those that pass. And whether each limit is kept. Rungs are compared with
         real windows of their own seeds.
     """
     detectors, realism, choice = (tables[name] for name in ("detectors", "realism", "choice"))
@@ -133,30 +138,18 @@ def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[s
         recalls: The recall of each rung at its own thresholds.
 
     Returns:
-        The seed, the rule, the number of rungs that it judged, the chosen rung, those that pass the rule (none: the smallest departure
-        decides), the best rung, by how much more the detectors of the chosen rung alarm than those of the best one and than those of
-        real windows, and how much recall they lose against real windows. A rung with few false alarms can be one whose detectors miss
-        anomalies; the best rung is therefore also named among those that lose at most `MAX_RECALL_DIFFERENCE` (`best_that_finds`; among
-        all rungs if there is none). And since fewer alarms than after training on real windows come from thresholds that are too high, the
-        best rung is also counted with those of real windows, if it has fewer (`regret_above_real`).
+        The seed, the rule, the chosen rung, those that pass the rule (none: the smallest departure decides), the false-alarm rate of
+        each judged rung and of real windows, and how much recall each loses against real windows.
     """
     judged = _judgements(rows)
-    names, lost = [each.rung for each in judged], {each.rung: recalls[REAL] - recalls[each.rung] for each in judged}
-    finding = [name for name in names if lost[name] <= MAX_RECALL_DIFFERENCE] or names
-    chosen, best, best_that_finds = choose(judged), *(min(some, key=rates.__getitem__) for some in (names, finding))
+    names = [each.rung for each in judged]
     return {
         "seed": int(rows["seed"].iloc[0]),
         "rule": str(rows["rule"].iloc[0]),
-        "chosen": chosen,
+        "chosen": choose(judged),
         "passing": [each.rung for each in judged if each.passes],
-        "best": best,
-        "regret": rates[chosen] - rates[best],
-        "best_that_finds": best_that_finds,
-        "regret_that_finds": rates[chosen] - rates[best_that_finds],
-        "judged": len(judged),
-        "regret_above_real": rates[chosen] - max(rates[best], rates[REAL]),
-        "excess": rates[chosen] - rates[REAL],
-        "lost": lost[chosen],
+        "rates": {name: rates[name] for name in (REAL, *names)},
+        "lost": {name: recalls[REAL] - recalls[name] for name in names},
     }
 
 
@@ -213,19 +206,31 @@ def _limits(families: dict[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
         "of": len(learnt),
         "by_model": {name: _realism_of(name, families) for name in (REAL, *ARMS)},
     }
-    found["choice"] = {rule: _choices(families, rule, rung) for rule in (PRESENT, *FORMER_RULES)}
+    found["choice"] = {rule: _choices(families, rule, rung) for rule in RULES}
     return found
 
 
 def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
-    """How far the detectors of what a rule chooses are from those of the best rung, in the mean over the seeds that it judged."""
+    """How far the detectors of what a rule chooses are from those of the best rung.
+
+    The best rung of a family has the fewest false alarms in the mean over the seeds that the rule judged: the best of each seed would be
+    the luckiest. A rung with few false alarms can be one whose detectors miss anomalies; the best rung is therefore also found among those
+    that lose at most `MAX_RECALL_DIFFERENCE` (`that_finds`; among all rungs if there is none). And since fewer alarms than after training
+    on real windows come from thresholds that are too high, such a best rung is also counted as real windows (`above_real`).
+    """
     judged = {name: [each for each in about["choices"] if each["rule"] == rule] for name, about in families.items()}
     judged = {name: each for name, each in judged.items() if each}
-
-    def means(measure: str) -> dict[str, float]:
-        return {name: float(np.mean([each[measure] for each in choices])) for name, choices in judged.items()}
-
-    regrets, finding, lost, above = means("regret"), means("regret_that_finds"), means("lost"), means("regret_above_real")
+    regrets, finding, above, excess, lost = {}, {}, {}, {}, {}
+    for name, choices in judged.items():
+        rates, losses = (
+            {model: float(np.mean([each[about][model] for each in choices])) for model in choices[0][about]} for about in ("rates", "lost")
+        )
+        chosen = float(np.mean([each["rates"][each["chosen"]] for each in choices]))
+        lost[name] = float(np.mean([each["lost"][each["chosen"]] for each in choices]))
+        best = min(rates[model] for model in losses)
+        regrets[name], excess[name] = chosen - best, chosen - rates[REAL]
+        above[name] = chosen - max(best, rates[REAL])
+        finding[name] = chosen - min(rates[model] for model in [each for each in losses if losses[each] <= MAX_RECALL_DIFFERENCE] or losses)
     misses = {name: regret for name, regret in finding.items() if regret > MAX_REGRET or lost[name] > MAX_RECALL_DIFFERENCE}
     return {
         "limit": MAX_REGRET,
@@ -237,11 +242,11 @@ def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
         "of": len(judged),
         "seeds": sorted({each["seed"] for choices in judged.values() for each in choices}),
         "missed": {name: regret for name, regret in regrets.items() if regret > MAX_REGRET},
-        "judged": sorted({each["judged"] for choices in judged.values() for each in choices}),
-        "excess": means("excess"),
+        "judged": sorted({len(each["lost"]) for choices in judged.values() for each in choices}),
+        "excess": excess,
         "lost": lost,
         "none_passes": [name for name, choices in judged.items() if not all(each["passing"] for each in choices)],
-        "learnt_passes": sum(all({rung, FORMER} & set(each["passing"]) for each in choices) for choices in judged.values()),
+        "learnt_passes": sum(all({rung, *FORMER} & set(each["passing"]) for each in choices) for choices in judged.values()),
     }
 
 

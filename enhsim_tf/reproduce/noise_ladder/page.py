@@ -7,7 +7,7 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.reproduce.noise_gallery import GALLERY
-from enhsim_tf.reproduce.noise_ladder.findings import ARMS, MAX_RECALL_DIFFERENCE, PRESENT, REAL, fewer_seeds
+from enhsim_tf.reproduce.noise_ladder.findings import ARMS, MAX_RECALL_DIFFERENCE, PRESENT, REAL, RULES, fewer_seeds
 from enhsim_tf.reproduce.publish.results import fill_parts
 from enhsim_tf.reproduce.publish.wording import in_list
 
@@ -61,7 +61,7 @@ def _kind(family: str) -> str:
 def _chosen(choices: Sequence[Findings]) -> list[str]:
     """The models that the present rule chooses, or the former rules where the present one has judged no seed."""
     by_present = sorted({each["chosen"] for each in choices if each["rule"] == PRESENT})
-    return by_present or sorted({f"{each['chosen']} ({each['rule']} rule)" for each in choices})
+    return by_present or sorted({f"{each['chosen']} ({each['rule']})" for each in choices})
 
 
 def _scope(found: Findings) -> str:
@@ -116,7 +116,7 @@ def _choice(choice: Findings, which: str, learnt: str) -> str:
     worst, least = (max(choice[measure], key=choice[measure].__getitem__) for measure in ("excess", "lost"))
     models = " or ".join(map(str, choice["judged"]))
     return (
-        f"- Excess of the model that the {which} rule chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
+        f"- Excess of the model that the {RULES[which]} chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
         f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
         f"Among the models that lose at most {100 * MAX_RECALL_DIFFERENCE:g} points of recall, and if the chosen one loses no more either: "
         f"{choice['kept_that_finds']} of {choice['of']} families{_differences(choice['missed_that_finds'])}. If a best model with fewer alarms than "
