@@ -3,14 +3,18 @@
 The probability density of a window is the product of the densities of its samples, each given all samples before it. A network
 that predicts these conditional densities can represent any stationary noise, up to its capacity: no correlation time, no period
 and no pulse is built into the network. The network receives the last samples one by one, and the whole past of the window as
-averages of the value and of its magnitude over the last 2, 4, 8, ... samples, and as linear predictions of both, which are fitted in
-closed form (`linear_prediction`). The density of a sample is a mixture of Student's t distributions around the linear prediction, so
-that it can have several modes, a skew and heavy tails.
+averages of the value and of its magnitude over the last 2, 4, 8, ... samples, and as linear predictions of the value and of the size of
+its error, which are fitted in closed form (`linear_prediction`). The density of a sample is a mixture of Student's t distributions around
+the linear prediction, so that it can have several modes, a skew and heavy tails.
 
 Training maximises the likelihood. A network with thousands of weights finds a little structure in any noise, even in white noise,
 whose samples then get heavier tails than they have. What the density takes from the past is therefore shrunk after training, as far
 as the likelihood of held-out windows asks for it (`shrinkage`). If one normal distribution around the linear prediction is as likely, the
-density becomes that.
+density becomes that. What is left of the difference between predicted and true shape is counted on the training data (`calibration`).
+
+Generated noise continues real noise: the first half of a window of the telemetry's noise, drawn at random, or from the windows whose signal
+goes on as the one that the noise is added to. Slow states of the noise, such as its loudness or the amplitude of a period, are therefore
+distributed as in the telemetry, and nothing has to be learnt of how noise begins. All generated samples are new.
 
 References:
     Bishop, "Mixture density networks", 1994.

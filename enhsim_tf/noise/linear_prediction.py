@@ -1,8 +1,8 @@
-"""Linear predictions of noise and of its magnitude from the whole past of a window (an alternative to the GAN of section 2.3).
+"""Linear predictions of noise and of the size of their errors, from the whole past of a window (an alternative to the GAN of section 2.3).
 
-Long correlations, periods and slow changes of loudness are to a large part linear: the next sample, or its magnitude, is near a
-weighted sum of those before it. The weights are fitted in closed form, for all lags of up to half a window. The autoregressive network
-starts from these predictions.
+Long correlations, periods and slow changes of loudness are to a large part linear: the next sample is near a weighted sum of those before
+it, and the magnitude of the error of this prediction near a weighted sum of those of the predictions before it. The weights are fitted in
+closed form, for all lags of up to half a window. The autoregressive network starts from these predictions.
 """
 
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ _LEAST_MAGNITUDE = 0.02  # of a predicted magnitude, in standard deviations
 
 
 class LinearPrediction:
-    """Predicts each sample of a window, and its magnitude, from the samples before it.
+    """Predicts each sample of a window, and the magnitude of the error of this prediction, from the samples before it.
 
     Args:
         values: Autoregression of the noise, which is in units of its standard deviation.
-        magnitudes: Autoregression of its magnitude minus `mean_magnitude`.
-        mean_magnitude: Mean magnitude of the noise.
+        magnitudes: Autoregression of the magnitude of its errors, in units of their standard deviation, minus `mean_magnitude`.
+        mean_magnitude: Mean of this magnitude.
     """
 
     def __init__(self, values: GaussianAutoregression, magnitudes: GaussianAutoregression, mean_magnitude: float):
@@ -59,7 +59,7 @@ class LinearPrediction:
         return cls(values, magnitudes, mean_magnitude)
 
     def predict(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the predicted value, and the logarithm of the predicted magnitude, of each sample.
+        """Returns the predicted value of each sample, and the logarithm of the predicted magnitude of its error, which is in units of its standard deviation.
 
         Args:
             windows: Noise windows, float32 of shape `(windows, samples)`.
@@ -87,7 +87,7 @@ class LinearPrediction:
 
         Args:
             past: The last samples, at least as many as a window has but one, zero before the first one; shape `(rows, samples)`.
-            loudness: Their magnitudes minus `mean_magnitude`, in the same form.
+            loudness: As returned by `loudness`, in the same form.
             place: Number of samples before the one that is predicted.
 
         Returns:

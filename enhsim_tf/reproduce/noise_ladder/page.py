@@ -61,7 +61,7 @@ def _kind(family: str) -> str:
 def _chosen(choices: Sequence[Findings]) -> list[str]:
     """The models that the present rule chooses, or the former rules where the present one has judged no seed."""
     by_present = sorted({each["chosen"] for each in choices if each["rule"] == PRESENT})
-    return by_present or sorted({f"{each['chosen']} ({each['rule']})" for each in choices})
+    return by_present or sorted({f"{each['chosen']} ({each['rule']} rule)" for each in choices})
 
 
 def _scope(found: Findings) -> str:
