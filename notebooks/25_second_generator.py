@@ -194,10 +194,12 @@ def negative_log_likelihood(network, degrees, past, sample):
 
 # %% [markdown]
 # Training makes this number small, with Adam and nothing else: no second network, no equilibrium, and a loss that says how good the model
-# is. The package's network does two things more. Its density starts from the best linear predictions of the sample and of its magnitude,
-# which are those of an autoregression as above. And after training, what it takes from the past is shrunk until held-out windows gain
-# from it: a network with thousands of weights finds a little structure even in white noise. On a small instance without linear
-# predictions, with the package's weights, the loss at some positions must be that of the package:
+# is. The package's network does four things more. Its density starts from the best linear prediction of the sample, which is that of an
+# autoregression as above, and from one of the size of its error. After training, what it takes from the past is shrunk until held-out
+# windows gain from it: a network with thousands of weights finds a little structure even in white noise. The shape of the density is
+# corrected by how often real samples lie below each of its quantiles. And generated noise continues a piece of real noise, from which it
+# takes slow states such as its loudness. On a small instance without all this, with the package's weights, the loss at some positions must
+# be that of the package:
 
 # %%
 tiny = AutoregressiveNetwork.untrained(example[:100, :40], seed=1, sees_predictions=False)

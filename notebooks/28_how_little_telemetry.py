@@ -347,7 +347,7 @@ for environment, about in found["environments"].items():
         }
         best = min((arm for arm in rates if arm not in networks), key=lambda arm: abs(rates[arm] - RATE))
         say(
-            f"**{environment}**, {number:,} real windows, seeds {in_words(few['seeds'])}, false alarms: "
+            f"**{environment}**, {number:,} real windows, seeds {', '.join(map(str, few['seeds']))}, false alarms: "
             + ", ".join(
                 f"{arm.removeprefix('simulator + ')} **{rates[arm]:.1%}**" for arm in networks if arm in rates
             )

@@ -131,6 +131,8 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
             model.prediction = LinearPrediction.from_arrays(predictions, model.window)
         if pasts:
             model.pasts = model_from({"kind": "matched residual windows" if model.follows_signal else "residual windows"}, {}, pasts)
+            if model.pasts.windows.shape[1] >= model.window:
+                raise ValueError("a noise network with a past of more than a window")
         if calibration:
             model.calibration = Calibration(**calibration)
         return model

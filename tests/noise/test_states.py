@@ -29,6 +29,21 @@ def test_models_saved_under_the_old_name_are_read():
     np.testing.assert_array_equal(model.windows, WINDOWS)
 
 
+def test_a_network_saved_without_predictions_draws_the_same_noise():
+    network = AutoregressiveNetwork.untrained(WINDOWS, seed=4, sees_predictions=False).fit(WINDOWS, 5)
+    state = state_of(network)
+    settings = {name: value for name, value in state.settings.items() if name != "sees_predictions"}
+    assert all(name.startswith("weight_") for name in state.arrays)
+    np.testing.assert_array_equal(model_from(settings, {}, state.arrays).generate(3, 1), network.generate(3, 1))
+
+
+def test_a_network_with_a_past_of_more_than_a_window_is_refused():
+    state = state_of(AutoregressiveNetwork.untrained(WINDOWS, seed=4).fit(WINDOWS, 2))
+    assert state.arrays["past_windows"].shape == (30, 20)
+    with pytest.raises(ValueError, match="past of more than a window"):
+        model_from(state.settings, {}, state.arrays | {"past_windows": np.zeros((30, 40), np.float32)})
+
+
 def test_a_network_saved_with_degrees_of_freedom_under_a_softplus_draws_the_same_noise():
     network = AutoregressiveNetwork.untrained(WINDOWS, seed=4).fit(WINDOWS, 5)
     state = state_of(network)

@@ -27,14 +27,13 @@ REVISED = ("bernoulli", "quantised")  # unseen families whose first result led t
 MAX_RECALL_DIFFERENCE = 0.03
 MAX_REALISM_RATIO = 3.0
 MAX_REGRET = 0.005  # by which the excess of the chosen rung may be above that of the best rung
-RULES = {
-    PRESENT: "present rule",
-    "present, second form": "present rule, with the second form of the network,",
-    "second": "second rule, with the first form of the network,",
-    "first": "first rule, with the first form of the network,",
+FORMER_RULES = {
+    "present, second form": "the present rule with the second form of the network",
+    "second": "the second rule with the first form of the network",
+    "first": "the first rule with the first form of the network",
 }
-"""The rules of the choice, by their names in the tables; the former ones judged the published seeds 3002, 3001 and 3000. The classifier of the
-first rule saw the noise alone, in windows that overlap. Neither the first nor the second rule knew the recall."""
+"""What judged the published seeds 3002, 3001 and 3000, by its name in the tables. The classifier of the first rule saw the noise alone, in
+windows that overlap. Neither the first nor the second rule knew the recall."""
 _NETWORK = "autoregressive network"
 FORMER = tuple(f"{_NETWORK}, {form} form" for form in ("second", "first"))
 """Rows of the autoregressive network on the seeds of the former rules, before it was worked over."""
@@ -206,7 +205,7 @@ def _limits(families: dict[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
         "of": len(learnt),
         "by_model": {name: _realism_of(name, families) for name in (REAL, *ARMS)},
     }
-    found["choice"] = {rule: _choices(families, rule, rung) for rule in RULES}
+    found["choice"] = {rule: _choices(families, rule, rung) for rule in (PRESENT, *FORMER_RULES)}
     return found
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.reproduce.noise_gallery import GALLERY
-from enhsim_tf.reproduce.noise_ladder.findings import ARMS, MAX_RECALL_DIFFERENCE, PRESENT, REAL, RULES, fewer_seeds
+from enhsim_tf.reproduce.noise_ladder.findings import ARMS, FORMER, FORMER_RULES, MAX_RECALL_DIFFERENCE, PRESENT, REAL, fewer_seeds
 from enhsim_tf.reproduce.publish.results import fill_parts
 from enhsim_tf.reproduce.publish.wording import in_list
 
@@ -41,9 +41,9 @@ def fill_page(path: Path, noise: Findings | None = None, curve: Findings | None 
 
 
 def families(found: Findings) -> str:
-    """The table of false-alarm rates, a row for each family and a column for each noise model, and what the families are."""
+    """The table of false-alarm rates, a row for each family and a column for each present noise model, and what the families are."""
     used = {name for about in found["families"].values() for name in about["rungs"]}
-    names = [name for name in (REAL, *ARMS) if name in used]
+    names = [name for name in (REAL, *ARMS) if name in used and name not in FORMER]
     lines = [f"| family | half | {' | '.join(names)} | chosen by the rule |", "|---" * (len(names) + 3) + "|"]
     for family, about in sorted(found["families"].items(), key=lambda item: item[1]["half"] != "looked at"):
         half = f"{about['half']} (see above)" if about["half"] == "revised" else about["half"]
@@ -106,18 +106,25 @@ def limits(found: Findings) -> str:
         f"{_losses(recall['lost_by_model'][kept['rung']])}{_other_losses(recall['lost_by_model'], kept['rung'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
         f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
-        *(_choice(choice, rule, kept["rung"]) for rule, choice in kept["choice"].items() if choice["of"]),
+        *(_choice(kept["choice"][rule], kept["rung"]) for rule in (PRESENT,) if kept["choice"][rule]["of"]),
     ]
+    former = [
+        f"{said} on {kept['choice'][rule]['kept']} of {kept['choice'][rule]['of']} families ({_seeds(kept['choice'][rule]['seeds'])})"
+        for rule, said in FORMER_RULES.items()
+        if kept["choice"][rule]["of"]
+    ]
+    if former:
+        lines.append(f"- What was tried before kept the limit on the choice as follows: {'; '.join(former)}.")
     return "\n".join([*lines, "", *_realism(realism["by_model"])])
 
 
-def _choice(choice: Findings, which: str, learnt: str) -> str:
-    """How far a rule's choice is from the best model."""
+def _choice(choice: Findings, learnt: str) -> str:
+    """How far the choice of the present rule is from the best model."""
     worst, least = (max(choice[measure], key=choice[measure].__getitem__) for measure in ("excess", "lost"))
     models = " or ".join(map(str, choice["judged"]))
     return (
-        f"- Excess of the model that the {RULES[which]} chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
-        f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
+        f"- Excess of the model that the rule chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
+        f"in the mean over seeds ({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
         f"Among the models that lose at most {100 * MAX_RECALL_DIFFERENCE:g} points of recall, and if the chosen one loses no more either: "
         f"{choice['kept_that_finds']} of {choice['of']} families{_differences(choice['missed_that_finds'])}. If a best model with fewer alarms than "
         f"after training on real windows counts as these: {choice['kept_above_real']} of {choice['of']} families"
