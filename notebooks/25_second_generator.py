@@ -179,7 +179,7 @@ def build_density(num_features, num_linear):
     hidden = keras.layers.Dense(64, "swish", name="first")(hidden)
     hidden = keras.layers.Dense(64, "swish", name="second")(hidden)
     shares, shifts, log_scales = keras.ops.split(keras.layers.Dense(24, name="last")(hidden), 3, axis=1)
-    shares = shares + np.array([-6.0] * 2 + [0.0] * 6, "float32")  # two components start rare
+    shares = shares + np.array([-6.0] * 4 + [0.0] * 4, "float32")  # four components start rare
     return keras.Model(past, [shares, linear + shifts, keras.ops.clip(log_scales, -6, 3)])
 
 

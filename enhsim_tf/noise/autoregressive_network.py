@@ -68,6 +68,7 @@ class AutoregressiveNetwork:
         origin: One of the levels of quantised noise, in the unit of the telemetry.
         follows_signal: Whether the density depends on the enhanced signal, too.
         num_components: Number of components of the mixture.
+        num_rare: Number of those that start with a small share; networks that were saved before have 2.
         units: Number of units of both hidden layers.
         sees_predictions: Whether the density starts from linear predictions. Networks that were saved before do not.
         seed: Seed for the initial weights and for all random numbers in training.
@@ -82,6 +83,7 @@ class AutoregressiveNetwork:
         origin: float = 0.0,
         follows_signal: bool = False,
         num_components: int = 8,
+        num_rare: int = 4,
         units: int = 64,
         sees_predictions: bool = True,
         seed: int = 0,
@@ -90,14 +92,15 @@ class AutoregressiveNetwork:
         self.step, self.origin = float(step), float(origin)
         least = max(_LOG_SCALES[0], math.log(_LEAST_SCALE * self.step / self.scale)) if self.step else _LOG_SCALES[0]
         self.log_scales = (least, _LOG_SCALES[1])
-        self.follows_signal, self.num_components, self.units = bool(follows_signal), int(num_components), int(units)
+        self.follows_signal, self.units = bool(follows_signal), int(units)
+        self.num_components, self.num_rare = int(num_components), int(num_rare)
         self.lags = np.arange(1, min(NUM_LAGS, window) + 1)
         self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
         self.sees_predictions = bool(sees_predictions)
         self.prediction = LinearPrediction.of_white_noise(self.window) if self.sees_predictions else None
         self.pasts: WindowBootstrap | MatchedWindowBootstrap | None = None
         self.calibration: Calibration | None = None
-        self.start_logits = np.where(np.arange(self.num_components) < 2, -6.0, 0.0).astype(np.float32)
+        self.start_logits = np.where(np.arange(self.num_components) < self.num_rare, -6.0, 0.0).astype(np.float32)
         self.network = self._build()
 
     @classmethod
@@ -242,7 +245,8 @@ class AutoregressiveNetwork:
         def loss(targets: tf.Tensor, outputs: tf.Tensor, weights: tf.Tensor) -> tf.Tensor:
             linear, *loudness, logits, shifts, log_scales = tf.split(outputs, sizes, axis=1)
             log_scales = tf.clip_by_value(sum(loudness, log_scales), *self.log_scales)
-            return self._negative_log_likelihood(targets, logits + self.start_logits, linear + shifts, log_scales, _degrees(weights)[None])
+            logits += self.start_logits.astype(logits.dtype.as_numpy_dtype)
+            return self._negative_log_likelihood(targets, logits, linear + shifts, log_scales, _degrees(weights)[None])
 
         learnt, held_out = (self._outputs(outputs, data) for data in (training, judged))
         targets = learnt[1][:, 0].numpy().astype(np.float64)
@@ -382,7 +386,7 @@ class AutoregressiveNetwork:
         standardised = (targets - means) * tf.exp(-log_scales)
         own = tf.cast(degrees[:1], tf.float64)  # the same for all samples; the difference below loses four digits
         constant = tf.math.lgamma((own + 1) / 2) - tf.math.lgamma(own / 2) - 0.5 * tf.math.log(math.pi * own)
-        return tf.cast(constant, tf.float32) - log_scales - (degrees + 1) / 2 * tf.math.log1p(standardised**2 / degrees)
+        return tf.cast(constant, log_scales.dtype) - log_scales - (degrees + 1) / 2 * tf.math.log1p(standardised**2 / degrees)
 
     def generate(self, num_windows: int, seed: int | np.random.Generator, signal_windows: np.ndarray | None = None) -> np.ndarray:
         """Generates windows of noise. The same seed gives the same noise.
@@ -499,8 +503,8 @@ class AutoregressiveNetwork:
 
     def get_config(self) -> dict:
         """Returns the settings that rebuild the network, as JSON types."""
-        names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "units", "sees_predictions", "seed")
-        return {name: getattr(self, name) for name in names}
+        names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "num_rare", "units", "sees_predictions")
+        return {name: getattr(self, name) for name in (*names, "seed")}
 
     def set_weights(self, weights: Sequence[np.ndarray], tails: str = TAILS) -> None:
         """Sets the weights of the network, as `network.get_weights` returned them.

@@ -19,8 +19,9 @@ from enhsim_tf.keras_tools.backend import tf
 _NEARLY_LEAST = 1e-4  # held-out loss above the least one up to which constants are as good
 _MOST_LEARNT = 0.01  # loss above that of shrunk outputs on the training data up to which this counts: little held-out data can be alike
 _ROUNDS = 2  # trusts and constants in turn
-_STOP = {"ftol": 1e-9, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
+_STOP = {"ftol": 1e-10, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
 _MAX_STEPS = 40
+_MORE_STEPS = 200  # where constants may be all there is: rare large samples, which decide the scale, are the last to be fitted
 
 Data = tuple[tf.Tensor, tf.Tensor]
 Loss = Callable[[tf.Tensor, tf.Tensor, tf.Tensor], tf.Tensor]
@@ -64,18 +65,18 @@ def shrink(
 
     spread = np.repeat(np.eye(len(sizes), dtype=np.float32), sizes, axis=1)  # from the trusts of groups to those of outputs
     centre, number = np.mean(learnt[0], axis=0), spread.shape[1]
-    trust, constants = np.ones(len(sizes), np.float32), np.concatenate([centre, weights]).astype(np.float32)
+    trust, constants = np.ones(len(sizes)), np.concatenate([centre, weights])
 
     @tf.function
     def both(trust: tf.Tensor, constants: tf.Tensor, outputs: tf.Tensor, targets: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor, tf.Tensor]:
         with tf.GradientTape() as tape:
             tape.watch([trust, constants])
-            shrunk = constants[None, :number] + (trust[None] @ spread) * (outputs - centre)
+            shrunk = constants[None, :number] + (trust[None] @ tf.cast(spread, trust.dtype)) * (outputs - tf.cast(centre, trust.dtype))
             value = loss(targets, shrunk, constants[number:])
         return value, *tape.gradient(value, [trust, constants])
 
     def evaluate(trust: np.ndarray, constants: np.ndarray, data: Data) -> list[np.ndarray]:
-        found = both(tf.constant(trust, tf.float32), tf.constant(constants, tf.float32), *data)
+        found = both(*(tf.constant(each, data[0].dtype) for each in (trust, constants)), *data)
         return [np.asarray(each, np.float64) for each in found]
 
     def of_trust(numbers: np.ndarray, constants: np.ndarray) -> list[np.ndarray]:
@@ -91,12 +92,20 @@ def shrink(
         if of_trust(trust, tried)[0] <= of_trust(trust, constants)[0]:
             constants = tried
     none = np.zeros_like(trust)
-    fitted = minimize(of_constants, constants, (none,), "L-BFGS-B", jac=True, options=steps).x
+    # one row of outputs serves all samples; in double precision, because what rare samples add to a mean loss is small
+    alone = tf.constant(centre[None], tf.float64), tf.cast(learnt[1], tf.float64)
+
+    def without_trust(numbers: np.ndarray) -> list[np.ndarray]:
+        return evaluate(none, numbers, alone)[::2]
+
+    fitted = minimize(without_trust, constants, (), "L-BFGS-B", jac=True, options=steps).x
+    if without_trust(fitted)[0] <= of_constants(constants, trust)[0] + _MOST_LEARNT:
+        fitted = minimize(without_trust, fitted, (), "L-BFGS-B", jac=True, options=_STOP | {"maxiter": _MORE_STEPS}).x
     tried = [(none, fitted), (trust, constants)] if simplest is None else [(none, simplest), (none, fitted), (trust, constants)]
     held, own = ([evaluate(*each, some)[0] for each in tried] for some in (held_out, learnt))
     for each, on_held_out, on_learnt in zip(tried, held, own, strict=True):
         if on_held_out <= min(held) + _NEARLY_LEAST and on_learnt <= own[-1] + _MOST_LEARNT:
             trust, constants = each
             break
-    each, constants = (trust @ spread).astype(np.float32), np.asarray(constants, np.float32)
+    each = trust @ spread
     return Shrunk(each, constants[:number] - each * centre, constants[number:])

@@ -121,7 +121,7 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         if not (2 <= values["window"] <= 1_000_000 and 0 < values["num_components"] * values["units"] <= 1_000_000):
             raise ValueError("a noise network of an impossible size")
         tails = str(values.pop("tails", "softplus"))  # models that were saved before do not say
-        model = AutoregressiveNetwork(**{"sees_predictions": False} | values)
+        model = AutoregressiveNetwork(**{"sees_predictions": False, "num_rare": 2} | values)
         model.set_weights([arrays[name] for name in sorted(arrays) if name.startswith(_WEIGHT)], tails)
         predictions, pasts, calibration = (
             {name.removeprefix(kind): each for name, each in arrays.items() if name.startswith(kind)}

@@ -67,3 +67,22 @@ def test_constants_that_the_training_data_contradict_are_not_preferred():
 
 def test_a_trust_is_never_beyond_one():
     assert shrink(squares, data(1.0, 1), data(1.6, 2), (1, 1), np.zeros(1, np.float32)).trust[0] == 1
+
+
+def test_rare_large_samples_are_fitted_too():
+    """Constants are the logarithms of two scales: a sample in two hundred is forty times larger. Closed form: the root mean squares."""
+    rng = np.random.default_rng(7)
+    is_rare = rng.random(40_000) < 0.005
+    values = rng.standard_normal(40_000) * np.where(is_rare, 40.0, 1.0)
+    targets = tf.constant(np.stack([values, is_rare], axis=1), tf.float32)
+    outputs = tf.constant(0.01 * rng.standard_normal((40_000, 2)), tf.float32)
+
+    def loss(targets, outputs, weights):
+        log_scale = tf.where(targets[:, 1] > 0.5, outputs[:, 1], outputs[:, 0])
+        return tf.reduce_mean((targets[:, 0] * tf.exp(-log_scale)) ** 2 / 2 + log_scale) + tf.reduce_sum(weights**2)
+
+    halves = [(outputs[:20_000], targets[:20_000]), (outputs[20_000:], targets[20_000:])]
+    found = shrink(loss, *halves, (1, 1), np.zeros(1, np.float32))
+    learnt, rare = values[:20_000], is_rare[:20_000]
+    expected = [np.sqrt(np.mean(learnt[which] ** 2)) for which in (~rare, rare)]
+    np.testing.assert_allclose(np.exp(found.offset), expected, rtol=0.01)

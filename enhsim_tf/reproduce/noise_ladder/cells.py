@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLES = ("detectors", "realism", "choice")
+_NUM_DRAWS = 3  # of as many generated windows as there are real ones: measures of realism are means over them
 OPTIONS = {rung: option for option, rung in BY_OPTION.items()}
 
 
@@ -85,7 +86,7 @@ class Cell:
         floor, held_out = self.one.floor()
         if rung == REAL:
             arms = [self.data.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
-            generated = held_out
+            compared = [held_out]
             choice = []
         else:
             number_of_iterations = chosen.ladder.gan_iterations if "GAN" in rung else chosen.ladder.num_iterations
@@ -95,7 +96,7 @@ class Cell:
             waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
-            generated = ladder.generate(model, len(held_out), draws, more)
+            compared = [ladder.generate(model, len(held_out), draws, more) for _ in range(_NUM_DRAWS)]
             judgement = dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung)
             choice = [{"rule": PRESENT} | dataclasses.asdict(judgement)]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
@@ -110,7 +111,10 @@ class Cell:
             }
             for name in rates
         ]
-        realism = [{"measure": row.measure, "value": row.value, "ratio": row.ratio} for row in floor.evaluate(generated).rows]
+        measured = [
+            {"measure": row.measure, "value": row.value, "ratio": row.ratio} for each in compared for row in floor.evaluate(each).rows
+        ]
+        realism = pd.DataFrame(measured).groupby("measure", sort=False).mean().reset_index()
         for name, rows in {"detectors": detectors, "realism": realism, "choice": choice}.items():
             table = pd.DataFrame(rows).assign(family=self.settings.telemetry.noise, seed=seed, rung=rung)
             table.to_parquet(folder / f"{name}.parquet")
