@@ -17,6 +17,7 @@ _REACH = 9.0  # of the edges of the bins, on the logistic scale: the bins are na
 _LEAST_COUNT = 100  # samples that a bin would have if the density were right
 _PRIOR = 30  # samples of a right density that are added to the counts of each bin
 _LEAST_GAIN = 1e-4  # of the likelihood of held-out data, in nats for each sample
+_MOST = 100.0  # density: where it is high, nearly all draws are rejected
 _MANY_DEGREES = 1_000  # of freedom, from which a t distribution is computed as a normal one
 
 
@@ -38,6 +39,8 @@ class Calibration:
             raise ValueError("a calibration without bins from 0 to 1")
         if not ((self.density >= 0).all() and abs(self.density @ np.diff(self.edges) - 1) < 1e-6):
             raise ValueError("a calibration that is no density")
+        if self.density.max() > _MOST:
+            raise ValueError("a calibration that rejects nearly all draws")
 
     @classmethod
     def fit(cls, probabilities: np.ndarray, held_out: np.ndarray) -> "Calibration | None":
@@ -48,7 +51,7 @@ class Calibration:
             held_out: The same for held-out data.
 
         Returns:
-            The calibration, or None if it makes the held-out data no more likely.
+            The calibration, or None if it makes the held-out data no more likely, or would reject nearly all draws.
         """
         edges = 1 / (1 + np.exp(-np.linspace(-_REACH, _REACH, _NUM_BINS + 1)))
         least = _LEAST_COUNT / len(probabilities)
@@ -59,7 +62,10 @@ class Calibration:
         edges = np.array([*kept, 1.0])
         counts, expected = np.histogram(probabilities, edges)[0] + _PRIOR, len(probabilities) * np.diff(edges) + _PRIOR
         density = counts / expected
-        found = cls(edges, density / (density @ np.diff(edges)))
+        density /= density @ np.diff(edges)
+        if density.max() > _MOST:
+            return None
+        found = cls(edges, density)
         return found if np.mean(np.log(found.at(held_out))) > _LEAST_GAIN else None
 
     def at(self, probabilities: np.ndarray) -> np.ndarray:

@@ -134,7 +134,7 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
             if model.pasts.windows.shape[1] >= model.window:
                 raise ValueError("a noise network with a past of more than a window")
         if calibration:
-            model.calibration = Calibration(**calibration)
+            model.calibration = Calibration(calibration["edges"], calibration["density"])
         return model
     if kind == _GAN:
         from enhsim_tf.noise.gan import NoiseGAN

@@ -28,6 +28,7 @@ def test_a_right_density_is_left_alone():
     rng = np.random.default_rng(3)
     assert Calibration.fit(rng.random(50_000), rng.random(10_000)) is None
     assert Calibration.fit(rng.random(150), rng.random(20)) is None  # few samples: one bin or two
+    assert Calibration.fit(rng.normal(0.5, 1e-5, 100_000), rng.normal(0.5, 1e-5, 1_000)) is None  # nearly all draws would be rejected
 
 
 def test_the_probabilities_of_a_mixture_are_the_sum_of_its_parts():
@@ -41,7 +42,14 @@ def test_the_probabilities_of_a_mixture_are_the_sum_of_its_parts():
 
 @pytest.mark.parametrize(
     ("edges", "density"),
-    [([0.0, 0.5], [2.0]), ([0.0, 0.6, 0.5, 1.0], [1.0] * 3), ([0.0, 1.0], [1.0, 1.0]), ([0.0, 1.0], [2.0]), ([0.0, 0.5, 1.0], [-1.0, 3.0])],
+    [
+        ([0.0, 0.5], [2.0]),
+        ([0.0, 0.6, 0.5, 1.0], [1.0] * 3),
+        ([0.0, 1.0], [1.0, 1.0]),
+        ([0.0, 1.0], [2.0]),
+        ([0.0, 0.5, 1.0], [-1.0, 3.0]),
+        ([0.0, 1e-3, 1.0], [1e3, 0.0]),
+    ],
 )
 def test_what_is_no_density_is_refused(edges, density):
     with pytest.raises(ValueError, match="calibration"):
