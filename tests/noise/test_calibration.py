@@ -28,7 +28,7 @@ def test_a_right_density_is_left_alone():
     rng = np.random.default_rng(3)
     assert Calibration.fit(rng.random(50_000), rng.random(10_000)) is None
     assert Calibration.fit(rng.random(150), rng.random(20)) is None  # few samples: one bin or two
-    assert Calibration.fit(rng.normal(0.5, 1e-5, 100_000), rng.normal(0.5, 1e-5, 1_000)) is None  # nearly all draws would be rejected
+    assert Calibration.fit(1e-5 * rng.random(100_000), 1e-5 * rng.random(1_000)) is None  # nearly all draws would be rejected
 
 
 def test_the_probabilities_of_a_mixture_are_the_sum_of_its_parts():
