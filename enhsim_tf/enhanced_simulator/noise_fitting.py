@@ -182,8 +182,10 @@ class HeldOutJudge:
         training, clean = self._training, self._clean
         rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
         noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
-        if training.quantisation is not None:
-            noise = training.quantisation.round(clean + noise) - clean
+        generated = (
+            clean + noise
+        )  # 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
+        noise = (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
         return self._judge.judge(option, noise, compare(NoiseWindows(noise, clean), self._learnt, self._held_out)[0])
 
 

@@ -12,9 +12,10 @@ whose samples then get heavier tails than they have. What the density takes from
 as the likelihood of held-out windows asks for it (`shrinkage`). If one normal distribution around the linear prediction is as likely, the
 density becomes that. What is left of the difference between predicted and true shape is counted on the training data (`calibration`).
 
-Generated noise continues real noise: the first half of a window of the telemetry's noise, drawn at random, or from the windows whose signal
-goes on as the one that the noise is added to. Slow states of the noise, such as its loudness or the amplitude of a period, are therefore
-distributed as in the telemetry, and nothing has to be learnt of how noise begins. All generated samples are new.
+Generated noise continues real noise of half a window, unless windows have fewer than eight samples. This noise is drawn at random; where
+the noise may follow the signal, it is drawn from the windows in which the most similar signal came next. Slow states of the noise, such as
+its loudness or the amplitude of a period, are therefore distributed as in the telemetry, and nothing has to be learnt of how noise begins.
+All generated samples are new.
 
 References:
     Bishop, "Mixture density networks", 1994.
@@ -46,14 +47,14 @@ _NUM_NODES = 5  # at which the density over a step is evaluated (Gauss-Legendre 
 _LEAST_SCALE = 0.25  # of a component of quantised noise, in steps: a narrower one lies between the nodes
 _LEAST_DEGREES = 2.1  # degrees of freedom of a component; at 2 its variance is infinite
 _LIMIT = 1.2  # generated samples stay within this multiple of the largest magnitude of the training windows: the tails of t distributions have no end
-_WEIGHT_DECAY = 0.3  # of the layers that see the past, so that they follow it no more than the telemetry shows
+_WEIGHT_DECAY = 0.3  # of all layers, so that they follow the past no more than the telemetry shows
 _LOG_DEGREES = (2.0, 7.0)  # initial logarithms of the degrees of freedom above the least: of the two components with tails, of the others
 _MAX_LOG_DEGREES = 8.0  # no telemetry tells more degrees of freedom from a normal distribution
 _LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimiser moves them by powers of ten, not by parts of one
 _PREDICTED = (0, 1, 2, 4, 8, 16, 32)  # samples before the present one whose linear prediction the network sees
 _EARLY = (25, 50, 75)  # iterations after which the weights are also compared on held-out windows: few windows are soon learnt by heart
 _LEAST_PAST = 4  # samples of real noise that generated noise continues
-_MOST_SHRUNK = 400_000  # samples that the shrinkage learns from
+_MOST_SHRUNK = 400_000  # samples that the shrinkage and the calibration learn from
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
 
 
@@ -196,7 +197,7 @@ class AutoregressiveNetwork:
         judged_positions = tf.constant(self._places(min(100, self.window)))
         schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
         optimizer = keras.optimizers.AdamW(schedule, weight_decay=_WEIGHT_DECAY, global_clipnorm=1.0)
-        optimizer.exclude_from_weight_decay(var_names=["bias", "degrees", "linear", "loudness"])
+        optimizer.exclude_from_weight_decay(var_names=["bias", "degrees"])  # names of variables, not of layers: all kernels decay
         optimizer.build(self.network.trainable_variables)
         averages = [tf.Variable(each) for each in self.network.trainable_variables]
         number = len(first)
@@ -230,7 +231,8 @@ class AutoregressiveNetwork:
         if kept is not None:
             self._assign(kept)
         self._shrink(training, judged)
-        self._calibrate(training, judged)
+        if first is not last:  # otherwise there is nothing that the calibration could be judged on
+            self._calibrate(training, judged)
         self.held_out_loss = float(evaluate())
         return self
 
@@ -484,7 +486,7 @@ class AutoregressiveNetwork:
 
     def _draw_pasts(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Draws the real noise that is continued, from windows in which a similar signal followed; none for networks saved before."""
-        if self.pasts is None:
+        if self.pasts is None or not num_samples:
             return np.zeros((num_rows, 0), np.float32)
         after = signal[:, np.minimum(np.arange(self.pasts.windows.shape[1]), num_samples - 1)] if self.follows_signal else None
         return ladder.generate(self.pasts, num_rows, rng, after)

@@ -26,7 +26,7 @@ class Calibration:
 
     Args:
         edges: Edges of the bins, from 0 to 1, increasing, shape `(bins + 1,)`.
-        density: Density in each bin, shape `(bins,)`; its mean over 0 to 1 is 1.
+        density: Density in each bin, positive, shape `(bins,)`; its mean over 0 to 1 is 1.
 
     Raises:
         ValueError: If this is no such density.
@@ -37,10 +37,12 @@ class Calibration:
         is_grid = self.edges.ndim == 1 and len(self.edges) > 1 and (np.diff(self.edges) > 0).all()
         if not (is_grid and self.edges[0] == 0 and self.edges[-1] == 1 and self.density.shape == (len(self.edges) - 1,)):
             raise ValueError("a calibration without bins from 0 to 1")
-        if not ((self.density >= 0).all() and abs(self.density @ np.diff(self.edges) - 1) < 1e-6):
+        if not ((self.density > 0).all() and abs(self.density @ np.diff(self.edges) - 1) < 1e-6):
             raise ValueError("a calibration that is no density")
         if self.density.max() > _MOST:
             raise ValueError("a calibration that rejects nearly all draws")
+        if self.density.min() < 1 / _MOST**2:
+            raise ValueError("a calibration that never accepts some draws")
 
     @classmethod
     def fit(cls, probabilities: np.ndarray, held_out: np.ndarray) -> "Calibration | None":
@@ -63,7 +65,7 @@ class Calibration:
         counts, expected = np.histogram(probabilities, edges)[0] + _PRIOR, len(probabilities) * np.diff(edges) + _PRIOR
         density = counts / expected
         density /= density @ np.diff(edges)
-        if density.max() > _MOST:
+        if density.max() > _MOST or density.min() < 1 / _MOST**2:
             return None
         found = cls(edges, density)
         return found if np.mean(np.log(found.at(held_out))) > _LEAST_GAIN else None
@@ -80,9 +82,9 @@ class Calibration:
             rng: Random numbers.
 
         Returns:
-            Array of bool, of the same shape.
+            Array of bool, of the same shape. Draws whose probability is not a number are accepted.
         """
-        return rng.random(np.shape(probabilities)) * self.density.max() < self.at(probabilities)
+        return (rng.random(np.shape(probabilities)) * self.density.max() < self.at(probabilities)) | np.isnan(probabilities)
 
 
 def mixture_probabilities(

@@ -59,13 +59,13 @@ class LinearPrediction:
         return cls(values, magnitudes, mean_magnitude)
 
     def predict(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the predicted value of each sample, and the logarithm of the predicted magnitude of its error, which is in units of its standard deviation.
+        """Returns the predicted value of each sample, and the logarithm of the predicted magnitude of its error.
 
         Args:
             windows: Noise windows, float32 of shape `(windows, samples)`.
 
         Returns:
-            float32 array of shape `(windows, samples, 2)`.
+            float32 array of shape `(windows, samples, 2)`. Magnitudes are in units of the standard deviation of the error.
         """
         predicted = self.values.predict(windows)
         magnitudes = self.magnitudes.predict(self.loudness(windows, predicted))

@@ -132,7 +132,7 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         if pasts:
             model.pasts = model_from({"kind": "matched residual windows" if model.follows_signal else "residual windows"}, {}, pasts)
             if model.pasts.windows.shape[1] >= model.window:
-                raise ValueError("a noise network with a past of more than a window")
+                raise ValueError("a noise network with a past of a window or more")
         if calibration:
             model.calibration = Calibration(calibration["edges"], calibration["density"])
         return model

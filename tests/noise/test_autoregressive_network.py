@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import softmax
-from scipy.stats import t
+from scipy.stats import kstest, t
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.keras_tools.backend import tf
 from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
+from enhsim_tf.noise.calibration import mixture_probabilities
 from enhsim_tf.realism.measures import autocorrelation, effective_rank
 from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise
 
@@ -32,9 +34,8 @@ def test_the_parameter_of_a_known_process_is_recovered(coloured):
 
 def test_the_likelihood_reaches_the_entropy_of_the_process(coloured):
     _, network = coloured
-    # a Gaussian innovation has the entropy log(sd sqrt(2 pi e)); the first sample of 64 has the larger sd of the process
-    innovation = np.sqrt(1 - 0.7**2)
-    entropy = 0.5 * np.log(2 * np.pi * np.e) + np.log(innovation) * (SAMPLES - 1) / SAMPLES
+    # a Gaussian innovation has the entropy log(sd sqrt(2 pi e)); samples with less than half a window before them are not judged
+    entropy = 0.5 * np.log(2 * np.pi * np.e) + np.log(np.sqrt(1 - 0.7**2))
     assert network.held_out_loss == pytest.approx(entropy, abs=0.03)
     assert network.held_out_loss <= min(held for _, _, held in network.losses) + 1e-4
 
@@ -92,6 +93,38 @@ def test_the_largest_samples_are_as_large_as_those_of_the_process():
     generated = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 400).generate(20_000, 1)
     for share in (1e-2, 1e-3, 1e-4):  # of 640,000 samples
         assert np.quantile(np.abs(generated), 1 - share) == pytest.approx(-np.log(share), rel=0.1)
+
+
+def test_samples_after_a_past_have_the_density_that_training_sees():
+    """What the network predicts of drawn windows, computed as in training, is calibrated: probabilities of the drawn samples are uniform."""
+    rng = np.random.default_rng(3)
+    loudness = np.where(rng.random((1_500, 1)) < 0.5, 0.3, 1.2)  # the density depends on the past in value and in loudness
+    noise = AutoregressiveNoise(0.7, 1.0).draw(1_500 * 32, rng).reshape(-1, 32) * loudness
+    network = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 300)
+    network.calibration = None  # the density itself
+    drawn = network.generate(2_000, 5)[:, :16]
+    past = network._draw_pasts(2_000, 32, np.zeros((2_000, 0)), np.random.default_rng(5))  # the first that the seed draws
+    windows = np.concatenate([past, drawn / network.scale], axis=1).astype(np.float32)
+    for place in (16, 17, 24, 31):
+        where = tf.constant([place], tf.int32)
+        features, targets = network._features(tf.constant(windows), tf.zeros((2_000, 0)), tf.constant(network._predict(windows)), where)
+        logits, means, log_scales, _ = (np.asarray(each, np.float64) for each in network.network(features))
+        targets = np.asarray(targets, np.float64)[:, 0]
+        below = mixture_probabilities(targets, logits, means, log_scales, network.degrees)
+        assert kstest(below, "uniform").statistic < 0.04  # 0.036 is exceeded by chance once in a hundred
+        below = mixture_probabilities(targets, logits[::-1], means[::-1], log_scales[::-1], network.degrees)
+        assert kstest(below, "uniform").statistic > 0.06, "the past of another window would not be noticed"
+
+
+@pytest.mark.parametrize("window", [2, 7, 9])
+def test_short_and_odd_windows_and_short_series_are_drawn(window):
+    rng = np.random.default_rng(1)
+    noise, signal = rng.normal(size=(60, window)), rng.normal(size=(60, window)).astype(np.float32)
+    network = AutoregressiveNetwork.untrained(noise, signal, seed=1).fit(noise, 3, signal)
+    assert np.isfinite(network.generate(5, 2, signal[:5])).all()
+    for number in (0, 1, 3, 40):
+        series = network.generate_series(number, 2, rng.normal(size=number))
+        assert series.shape == (number,) and np.isfinite(series).all()
 
 
 def test_an_edge_and_a_tail_that_no_component_has_are_drawn():

@@ -22,6 +22,7 @@ def test_accepted_draws_have_this_density():
     accepted = draws[found.accept(draws, rng)]
     assert len(accepted) / len(draws) == pytest.approx(1 / found.density.max(), abs=0.02)
     assert kstest(accepted, lambda value: value**2).statistic < 0.02
+    assert found.accept(np.full(100, np.nan), rng).all()  # no draw would ever be accepted otherwise
 
 
 def test_a_right_density_is_left_alone():
@@ -48,7 +49,8 @@ def test_the_probabilities_of_a_mixture_are_the_sum_of_its_parts():
         ([0.0, 1.0], [1.0, 1.0]),
         ([0.0, 1.0], [2.0]),
         ([0.0, 0.5, 1.0], [-1.0, 3.0]),
-        ([0.0, 1e-3, 1.0], [1e3, 0.0]),
+        ([0.0, 0.5, 1.0], [2.0, 0.0]),
+        ([0.0, 1e-3, 1.0], [999.0, 1e-3 / 0.999]),
     ],
 )
 def test_what_is_no_density_is_refused(edges, density):

@@ -96,7 +96,8 @@ class Cell:
             waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
             arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
             more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
-            compared = [ladder.generate(model, len(held_out), draws, more) for _ in range(_NUM_DRAWS)]
+            # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
+            compared = [more + ladder.generate(model, len(held_out), draws, more) - more for _ in range(_NUM_DRAWS)]
             judgement = dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung)
             choice = [{"rule": PRESENT} | dataclasses.asdict(judgement)]
         judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
@@ -114,7 +115,8 @@ class Cell:
         measured = [
             {"measure": row.measure, "value": row.value, "ratio": row.ratio} for each in compared for row in floor.evaluate(each).rows
         ]
-        realism = pd.DataFrame(measured).groupby("measure", sort=False).mean().reset_index()
+        by_measure = pd.DataFrame(measured).groupby("measure", sort=False)
+        realism = by_measure.agg(lambda each: each.mean(skipna=False)).reset_index()  # what cannot be computed once has no mean
         for name, rows in {"detectors": detectors, "realism": realism, "choice": choice}.items():
             table = pd.DataFrame(rows).assign(family=self.settings.telemetry.noise, seed=seed, rung=rung)
             table.to_parquet(folder / f"{name}.parquet")

@@ -221,8 +221,13 @@ def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
     judged = {name: each for name, each in judged.items() if each}
     regrets, finding, above, excess, lost = {}, {}, {}, {}, {}
     for name, choices in judged.items():
-        rates, losses = (
-            {model: float(np.mean([each[about][model] for each in choices])) for model in choices[0][about]} for about in ("rates", "lost")
+        rates, losses = (  # of the models that were judged on every seed
+            {
+                model: float(np.mean([each[about][model] for each in choices]))
+                for model in choices[0][about]
+                if all(model in each[about] for each in choices)
+            }
+            for about in ("rates", "lost")
         )
         chosen = float(np.mean([each["rates"][each["chosen"]] for each in choices]))
         lost[name] = float(np.mean([each["lost"][each["chosen"]] for each in choices]))

@@ -121,10 +121,10 @@ def limits(found: Findings) -> str:
 def _choice(choice: Findings, learnt: str) -> str:
     """How far the choice of the present rule is from the best model."""
     worst, least = (max(choice[measure], key=choice[measure].__getitem__) for measure in ("excess", "lost"))
-    models = " or ".join(map(str, choice["judged"]))
+    models = f"{' or '.join(map(str, choice['judged']))} models{' in the mean over seeds' * (len(choice['seeds']) > 1)}"
     return (
-        f"- Excess of the model that the rule chooses within {100 * choice['limit']:g} points of that of the best of {models} models "
-        f"in the mean over seeds ({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
+        f"- Excess of the model that the rule chooses within {100 * choice['limit']:g} points of that of the best of {models} "
+        f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
         f"Among the models that lose at most {100 * MAX_RECALL_DIFFERENCE:g} points of recall, and if the chosen one loses no more either: "
         f"{choice['kept_that_finds']} of {choice['of']} families{_differences(choice['missed_that_finds'])}. If a best model with fewer alarms than "
         f"after training on real windows counts as these: {choice['kept_above_real']} of {choice['of']} families"
@@ -190,8 +190,8 @@ def _realism(models: Findings) -> list[str]:
     most = max(models[name]["families_with_all"] for name in tested)
     is_within_reach = real["families_with_all"] >= _ENOUGH * real["of"]
     return [
-        f"With fifteen measures, {'the limit on realism is strict' if is_within_reach else 'two thirds are beyond reach'}: fresh real noise itself keeps the "
-        f"limit on {real['families_with_all']} of {real['of']} families, and no model on more than {most}. The same count for every model:",
+        f"With fifteen measures, {'the limit on realism is strict' if is_within_reach else 'two thirds are beyond reach'}: fresh real noise itself, one draw "
+        f"for each seed, keeps the limit on {real['families_with_all']} of {real['of']} families, and no model on more than {most}. The same count for every model:",
         "",
         "| noise | families with every measure within three times its floor | measures within it, mean |",
         "|---|---|---|",
