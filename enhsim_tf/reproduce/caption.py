@@ -35,7 +35,9 @@ def figure_caption(name: str, experiment: "Experiment") -> str:
 def experiment_caption(found: Mapping[str, Any], command: str) -> str:
     """The caption line of the figures of an experiment: its `seeds`, its `budget` and its command."""
     seeds = found["seeds"]
-    ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+    is_gapless = seeds[-1] - seeds[0] == len(seeds) - 1
+    several = f"{seeds[0]} to {seeds[-1]}" if is_gapless else ", ".join(map(str, seeds))
+    ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {several}"
     return f"{ran} · {found['budget']} budget · {command}"
 
 

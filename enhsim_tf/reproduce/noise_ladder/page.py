@@ -126,7 +126,7 @@ def _choice(choice: Findings, learnt: str) -> str:
         f"- Excess of the model that the rule chooses within {100 * choice['limit']:g} points of that of the best of {models} "
         f"({_seeds(choice['seeds'])}): {choice['kept']} of {choice['of']} families{_differences(choice['missed'])}. "
         f"Among the models that lose at most {100 * MAX_RECALL_DIFFERENCE:g} points of recall, and if the chosen one loses no more either: "
-        f"{choice['kept_that_finds']} of {choice['of']} families{_differences(choice['missed_that_finds'])}. If a best model with fewer alarms than "
+        f"{choice['kept_that_finds']} of {choice['of']} families{_found_less(choice)}. If a best model with fewer alarms than "
         f"after training on real windows counts as these: {choice['kept_above_real']} of {choice['of']} families"
         f"{_differences(choice['missed_above_real'])}. On "
         f"{_families(choice['none_passes'])}, no model passes, and the smallest departure decides. The {learnt} passes on {choice['learnt_passes']} "
@@ -134,6 +134,17 @@ def _choice(choice: Findings, learnt: str) -> str:
         f"windows ({worst.replace('_', ' ')}), and lose at most {100 * choice['lost'][least]:.1f} points of recall ({least.replace('_', ' ')})."
         f"{_below_real(choice)}"
     )
+
+
+def _found_less(choice: Findings) -> str:
+    """The families that the choice misses if recall counts, with what it misses."""
+    missed = [
+        f"{name.replace('_', ' ')} ({100 * choice['lost'][name]:.1f} points of recall lost)"
+        if choice["lost"][name] > MAX_RECALL_DIFFERENCE
+        else f"{name.replace('_', ' ')} ({100 * regret:+.1f} points)"
+        for name, regret in choice["missed_that_finds"].items()
+    ]
+    return f"; not on {in_list(missed)}" if missed else ""
 
 
 def _range(values: Findings) -> str:
