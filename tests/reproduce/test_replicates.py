@@ -5,6 +5,7 @@ import json
 import pandas as pd
 import pytest
 
+from enhsim_tf.reproduce.caption import experiment_caption
 from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.tables import KeptTables
 
@@ -40,3 +41,10 @@ def test_findings_are_computed_from_the_written_tables_and_name_the_versions(tmp
     assert found["value"] == pytest.approx(0.1)  # rounded as it is stored
     assert found["budget"] == "smoke" and found["versions"]["other"] == "1" and "tensorflow" in found["versions"]
     assert json.loads((tmp_path / "findings.json").read_text()) == found
+
+
+def test_a_caption_names_each_seed_where_one_is_missing():
+    found = {"seeds": [3, 4, 5], "budget": "full"}
+    assert experiment_caption(found, "run") == "seeds 3 to 5 · full budget · run"
+    assert experiment_caption(found | {"seeds": [3, 5]}, "run") == "seeds 3, 5 · full budget · run"
+    assert experiment_caption(found | {"seeds": [3]}, "run") == "seed 3 · full budget · run"
