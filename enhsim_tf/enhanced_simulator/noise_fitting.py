@@ -182,9 +182,8 @@ class HeldOutJudge:
         training, clean = self._training, self._clean
         rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
         noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
-        generated = (
-            clean + noise
-        )  # 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
+        # sums of 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
+        generated = clean + noise
         noise = (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
         return self._judge.judge(option, noise, compare(NoiseWindows(noise, clean), self._learnt, self._held_out)[0])
 

@@ -132,8 +132,9 @@ class AutoregressiveNetwork:
         features = keras.Input((num_linear + len(self.octaves) + 2 + num_predicted + len(_SIGNAL_LAGS) * self.follows_signal,))
         linear = keras.layers.Dense(1, kernel_initializer="zeros", name="linear")(features[:, :num_linear])
         loudness = 0.0
-        if self.sees_predictions:
-            loudness = keras.layers.Dense(1, kernel_initializer="ones", name="loudness")(features[:, self._place_of_magnitude :][:, :1])
+        if self.sees_predictions:  # the logarithm of the predicted magnitude is the last feature before the signal
+            place = num_linear + len(self.octaves) + 2 + len(_PREDICTED)
+            loudness = keras.layers.Dense(1, kernel_initializer="ones", name="loudness")(features[:, place : place + 1])
         hidden = keras.ops.clip(features, -_CLIP, _CLIP)
         for name, number in (("first", 600), ("second", 601)):
             kernel = seeded_initialiser("he_uniform", self.seed * 1000 + number)
@@ -148,11 +149,6 @@ class AutoregressiveNetwork:
             [logits, linear + shifts, keras.ops.clip(loudness + log_scales, *self.log_scales), degrees(logits)],
             name="density",
         )
-
-    @property
-    def _place_of_magnitude(self) -> int:
-        """Place of the logarithm of the predicted magnitude among the features."""
-        return len(self.lags) + 2 * len(self.octaves) + 2 + len(_PREDICTED)
 
     def fit(
         self,
@@ -240,8 +236,8 @@ class AutoregressiveNetwork:
         """Shrinks what the density takes from the past, and fits what does not depend on it again; see `shrinkage`."""
         parts, (degrees,) = self.num_components, self.network.get_layer("degrees").get_weights()
         names = ("linear", "loudness", "last") if self.sees_predictions else ("linear", "last")
-        layers, levels = [self.network.get_layer(name) for name in names], [1] * (len(names) - 1)
-        sizes = (*levels, parts, parts, parts)  # of the first layers, and of the logits, shifts and scales of the last layer
+        layers = [self.network.get_layer(name) for name in names]
+        sizes = (*(1 for _ in names[:-1]), parts, parts, parts)  # of the first layers, and of the logits, shifts and scales of the last one
         outputs = keras.Model(self.network.input, keras.ops.concatenate([each.output for each in layers], axis=1))
 
         def loss(targets: tf.Tensor, outputs: tf.Tensor, weights: tf.Tensor) -> tf.Tensor:
@@ -425,7 +421,8 @@ class AutoregressiveNetwork:
         degrees, prediction, errors = self.degrees, self.prediction, self._errors
         num_lags, num_linear = len(self.lags), len(linear)
         past = self._draw_pasts(num_rows, num_samples, signal, rng)
-        known, reach, begun = past.shape[1], max(self.window - 1, num_lags), max(self.window - 1, num_lags) + past.shape[1]
+        known, reach = past.shape[1], max(self.window - 1, num_lags)
+        begun = reach + known
         series, loudness = np.zeros((2, num_rows, begun + num_samples), np.float32)
         series[:, reach:begun] = past
         predicted = np.zeros((num_rows, _PREDICTED[-1] + known + num_samples), np.float32)

@@ -106,8 +106,9 @@ def limits(found: Findings) -> str:
         f"{_losses(recall['lost_by_model'][kept['rung']])}{_other_losses(recall['lost_by_model'], kept['rung'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
         f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
-        *(_choice(kept["choice"][rule], kept["rung"]) for rule in (PRESENT,) if kept["choice"][rule]["of"]),
     ]
+    if kept["choice"][PRESENT]["of"]:
+        lines.append(_choice(kept["choice"][PRESENT], kept["rung"]))
     former = [
         f"{said} on {kept['choice'][rule]['kept']} of {kept['choice'][rule]['of']} families ({_seeds(kept['choice'][rule]['seeds'])})"
         for rule, said in FORMER_RULES.items()
