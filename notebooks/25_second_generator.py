@@ -252,8 +252,8 @@ np.testing.assert_allclose(mine, tiny.generate(5, 3), rtol=1e-2, atol=1e-3)
 #
 # The first noise is that of the paper's example, and white: the difference of telemetry and true signal. The second was not designed for
 # anyone here: *interference*, a sine whose phase wanders, on white noise, as from the mains or a reaction wheel. Every generator learns
-# from the same windows. *Residual windows* draws whole windows of them again. The paper's GAN learned from the noise that a moving average
-# extracts (notebook 08), and is compared with that.
+# from the same windows. *Residual windows* draws whole windows of them again, with replacement. The paper's GAN learned from the noise that
+# a moving average extracts (notebook 08), and is compared with that.
 
 # %%
 from enhsim_tf.reproduce.noise_gallery import GALLERY
@@ -322,6 +322,7 @@ with drawing(alt, 2, 2.3, title, sharex=True) as panels:
 #
 # Residual windows are real, and are recognised all the same. A window that is drawn twice can be in the training data of the classifier and
 # among the windows that it judges; it need only remember (the trap of notebook 26). If each window is used once, what remains is the floor.
+# The package therefore draws no window twice, and none that overlaps with one drawn before, while others are left.
 
 # %%
 white, other = noises

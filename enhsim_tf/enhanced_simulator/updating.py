@@ -153,10 +153,12 @@ def _update_noise(simulator: EnhancedSimulator, parts: Sequence[Telemetry], seed
     residuals = windows.noise
     real_sd, generated_sd = float(np.std(residuals, dtype=np.float64)), simulator.noise_sd
     noise = simulator.noise
-    if isinstance(noise, WindowBootstrap | GaussianNoise):
-        simulator.noise = type(noise).fit(residuals)
+    if isinstance(noise, GaussianNoise):
+        simulator.noise = GaussianNoise.fit(residuals)
+    elif isinstance(noise, WindowBootstrap):
+        simulator.noise = WindowBootstrap.fit(residuals, windows.starts)
     elif isinstance(noise, MatchedWindowBootstrap):
-        simulator.noise = MatchedWindowBootstrap.fit(residuals, simulator.in_unit(windows.clean))
+        simulator.noise = MatchedWindowBootstrap.fit(residuals, simulator.in_unit(windows.clean), windows.starts)
     elif isinstance(noise, GaussianAutoregression):
         simulator.noise = GaussianAutoregression.fit(residuals, min(_MOST_ORDER, simulator.window - 1))
     elif isinstance(getattr(noise, "scale", None), float) and generated_sd > 0 and real_sd > 0:

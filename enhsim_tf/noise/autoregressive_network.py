@@ -44,10 +44,12 @@ _CLIP = 6.0  # largest magnitude, in standard deviations, with which a sample en
 _TINY = 1e-3  # added to magnitudes before their logarithm is taken
 _LOG_SCALES = (-6.0, 3.0)  # limits of the logarithm of a component's scale, in standard deviations
 _NUM_NODES = 5  # at which the density over a step is evaluated (Gauss-Legendre quadrature)
-_LEAST_SCALE = 0.25  # of a component of quantised noise, in steps: a narrower one lies between the nodes
+_LEAST_SCALE = 0.25  # of a component of quantised noise, in steps (not in errors of the prediction): a narrower one lies between the nodes
 _LEAST_DEGREES = 2.1  # degrees of freedom of a component; at 2 its variance is infinite
 _LIMIT = 1.2  # generated samples stay within this multiple of the largest magnitude of the training windows: the tails of t distributions have no end
-_WEIGHT_DECAY = 0.3  # of all layers, so that they follow the past no more than the telemetry shows
+_WEIGHT_DECAY = (
+    1.0  # of all layers, so that they follow the past no more than the telemetry shows: 0.3 learns windows by heart, 3 learns too little
+)
 _LOG_DEGREES = (2.0, 7.0)  # initial logarithms of the degrees of freedom above the least: of the two components with tails, of the others
 _MAX_LOG_DEGREES = 8.0  # no telemetry tells more degrees of freedom from a normal distribution
 _LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimiser moves them by powers of ten, not by parts of one
@@ -91,8 +93,6 @@ class AutoregressiveNetwork:
     ):
         self.window, self.scale, self.limit, self.seed = int(window), float(scale), float(limit), int(seed)
         self.step, self.origin = float(step), float(origin)
-        least = max(_LOG_SCALES[0], math.log(_LEAST_SCALE * self.step / self.scale)) if self.step else _LOG_SCALES[0]
-        self.log_scales = (least, _LOG_SCALES[1])
         self.follows_signal, self.units = bool(follows_signal), int(units)
         self.num_components, self.num_rare = int(num_components), int(num_rare)
         self.lags = np.arange(1, min(NUM_LAGS, window) + 1)
@@ -146,7 +146,7 @@ class AutoregressiveNetwork:
         degrees = _Degrees(self.num_components, name="degrees")
         return keras.Model(
             features,
-            [logits, linear + shifts, keras.ops.clip(loudness + log_scales, *self.log_scales), degrees(logits)],
+            [logits, linear + shifts, keras.ops.clip(loudness + log_scales, *_LOG_SCALES), degrees(logits)],
             name="density",
         )
 
@@ -187,7 +187,7 @@ class AutoregressiveNetwork:
         first, last = _split(starts, len(values), self.window, held_out)
         if self.sees_predictions:
             self.prediction = LinearPrediction.fit(values[first], values[last])
-            self.pasts = self._pasts(values, signal)
+            self.pasts = self._pasts(values, signal, starts)
         data = (values, signal, self._predict(values))
         training, judged = (tuple(tf.constant(each[rows]) for each in data) for rows in (first, last[:500]))
         judged_positions = tf.constant(self._places(min(100, self.window)))
@@ -242,7 +242,7 @@ class AutoregressiveNetwork:
 
         def loss(targets: tf.Tensor, outputs: tf.Tensor, weights: tf.Tensor) -> tf.Tensor:
             linear, *loudness, logits, shifts, log_scales = tf.split(outputs, sizes, axis=1)
-            log_scales = tf.clip_by_value(sum(loudness, log_scales), *self.log_scales)
+            log_scales = tf.clip_by_value(sum(loudness, log_scales), *_LOG_SCALES)
             logits += self.start_logits.astype(logits.dtype.as_numpy_dtype)
             return self._negative_log_likelihood(targets, logits, linear + shifts, log_scales, _degrees(weights)[None])
 
@@ -286,13 +286,15 @@ class AutoregressiveNetwork:
 
         self.calibration = Calibration.fit(probabilities(training), probabilities(judged))
 
-    def _pasts(self, values: np.ndarray, signal: np.ndarray) -> WindowBootstrap | MatchedWindowBootstrap | None:
+    def _pasts(self, values: np.ndarray, signal: np.ndarray, starts: np.ndarray | None) -> WindowBootstrap | MatchedWindowBootstrap | None:
         """Returns real noise that generated noise continues: the samples before the last half of each window, and the signal after them."""
         half = self.window // 2
         if half < _LEAST_PAST:
             return None
         before = values[:, self.window - 2 * half : self.window - half]
-        return MatchedWindowBootstrap.fit(before, signal[:, self.window - half :]) if self.follows_signal else WindowBootstrap.fit(before)
+        if self.follows_signal:
+            return MatchedWindowBootstrap.fit(before, signal[:, self.window - half :], starts)
+        return WindowBootstrap.fit(before, starts)
 
     def _places(self, number: int) -> np.ndarray:
         """Returns places of a window, evenly spaced, that have as long a past as generated samples have."""
@@ -369,6 +371,7 @@ class AutoregressiveNetwork:
         targets, errors = targets[:, :1], targets[:, 1:]
         if self.step:  # a level stands for all values that are rounded to it
             half = self.step / self.scale / 2 / errors
+            log_scales = tf.maximum(log_scales, tf.math.log(2 * _LEAST_SCALE * half))
             terms = [
                 math.log(weight / 2) + self._log_density(targets + half * node, means, log_scales, degrees)
                 for node, weight in zip(*np.polynomial.legendre.leggauss(_NUM_NODES), strict=True)
@@ -455,7 +458,10 @@ class AutoregressiveNetwork:
             centres = shifts + (features[:, :num_linear] @ linear + linear_bias)
             if prediction is not None:
                 log_scales = log_scales + (level + slope[0] * loud[:, None])
-            value = self._sample(logits + self.start_logits, centres, np.clip(log_scales, *self.log_scales), degrees, rng)
+            log_scales = np.clip(log_scales, *_LOG_SCALES)
+            if self.step:
+                log_scales = np.maximum(log_scales, math.log(_LEAST_SCALE * self.step / self.scale / errors[age]))
+            value = self._sample(logits + self.start_logits, centres, log_scales, degrees, rng)
             if prediction is not None:
                 value = predicted[:, latest] + errors[age] * value
             value = self._to_level(np.clip(value, -self.limit, self.limit))

@@ -74,13 +74,13 @@ def _autoregression(task: FitTask) -> Any:
 def _residual_windows(task: FitTask) -> Any:
     from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
-    return WindowBootstrap.fit(task.noise)
+    return WindowBootstrap.fit(task.noise, task.starts)
 
 
 def _matched_windows(task: FitTask) -> Any:
     from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap
 
-    return MatchedWindowBootstrap.fit(task.noise, task.signal)
+    return MatchedWindowBootstrap.fit(task.noise, task.signal, task.starts)
 
 
 def _network(task: FitTask) -> Any:

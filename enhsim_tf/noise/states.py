@@ -65,10 +65,9 @@ def state_of(model: Any) -> NoiseState:
     if kind == "autoregression":
         settings = {"kind": kind, "window": model.window, "innovation_sd": model.innovation_sd}
         return NoiseState(settings, arrays={"coefficients": model.coefficients})
-    if kind == "residual windows":
-        return NoiseState({"kind": kind}, arrays={"windows": model.windows})
-    if kind == "matched residual windows":
-        return NoiseState({"kind": kind}, arrays={"windows": model.windows, "signals": model.signals})
+    if kind in ("residual windows", "matched residual windows"):
+        arrays = {name: getattr(model, name, None) for name in ("windows", "signals", "starts")}
+        return NoiseState({"kind": kind}, arrays={name: each for name, each in arrays.items() if each is not None})
     from enhsim_tf.noise.autoregressive_network import TAILS, AutoregressiveNetwork
     from enhsim_tf.noise.gan import NoiseGAN
 
@@ -109,9 +108,9 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
     if kind == "autoregression":
         return GaussianAutoregression(arrays["coefficients"], _positive(values["innovation_sd"]), values["window"])
     if kind == "residual windows":
-        return WindowBootstrap(arrays["windows"])
+        return WindowBootstrap(arrays["windows"], arrays.get("starts"))
     if kind == "matched residual windows":
-        return MatchedWindowBootstrap(arrays["windows"], arrays["signals"])
+        return MatchedWindowBootstrap(arrays["windows"], arrays["signals"], arrays.get("starts"))
     if kind == _AUTOREGRESSIVE_NETWORK:
         from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
         from enhsim_tf.noise.calibration import Calibration

@@ -10,10 +10,15 @@ from enhsim_tf.common.errors import InputError
 _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over these segments
 _EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
 _BATCH = 2**24  # distances that are computed at a time
+_LAST_START = 2**60  # sums of two starts are still integers of 64 bits
 
 
 class WindowBootstrap:
-    """Draws whole windows of real noise, with replacement (Efron 1979).
+    """Draws whole windows of real noise.
+
+    Each draw takes a window at random from those that share the fewest samples with the windows drawn before. No noise is therefore
+    drawn twice until none is left: among windows that were drawn with replacement (Efron 1979), or that overlap, a classifier
+    recognises what it has seen, whatever the noise is like.
 
     Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
     and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
@@ -21,18 +26,19 @@ class WindowBootstrap:
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
+        starts: Start of each window in samples, shape `(windows,)`. None: no two windows overlap.
 
     Raises:
-        InputError: If there is no window, or a value is not finite.
+        InputError: If there is no window, a value is not finite, or the numbers of windows and starts differ.
     """
 
-    def __init__(self, windows: np.ndarray):
-        self.windows = _checked(windows)
+    def __init__(self, windows: np.ndarray, starts: np.ndarray | None = None):
+        self.windows, self.starts = _checked(windows, starts)
 
     @classmethod
-    def fit(cls, windows: np.ndarray) -> "WindowBootstrap":
-        """Stores noise windows of shape `(windows, samples)`."""
-        return cls(windows)
+    def fit(cls, windows: np.ndarray, starts: np.ndarray | None = None) -> "WindowBootstrap":
+        """Stores noise windows of shape `(windows, samples)`, and where they start."""
+        return cls(windows, starts)
 
     @property
     def scale(self) -> float:
@@ -41,8 +47,8 @@ class WindowBootstrap:
 
     def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws windows, float32 of shape `(num_windows, samples)`. The same seed gives the same windows."""
-        rng = np.random.default_rng(seed)
-        return self.windows[rng.integers(0, len(self.windows), num_windows)]
+        draws, everything = _SparingDraws(self, np.random.default_rng(seed)), np.arange(len(self.windows))
+        return self.windows[[draws.draw(everything) for _ in range(num_windows)]]
 
     def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
         """Draws a series of any length without seams, float32 of shape `(num_samples,)`. The same seed gives the same series."""
@@ -58,7 +64,8 @@ class MatchedWindowBootstrap:
     noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
     whose signal is the same. The distance of two signals is that of their means over 64 segments. The idea, and the number of
     neighbours, are those of the nearest-neighbour bootstrap of Lall and Sharma (1996), which resamples the successors of similar
-    pasts instead. If the signal never repeats, the nearest windows can be few stretches of the record.
+    pasts instead. Of these windows, those that share the fewest samples with the windows drawn before are preferred, as by
+    `WindowBootstrap`. If the signal never repeats, the nearest windows can be few stretches of the record.
 
     In a longer series, the mean of the candidates, which neighbouring windows have in common, is cross-faded with weights that add
     up to one, and the rest as by `WindowBootstrap`.
@@ -66,6 +73,7 @@ class MatchedWindowBootstrap:
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
         signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`.
+        starts: Start of each window in samples, shape `(windows,)`. None: no two windows overlap.
 
     Raises:
         InputError: If there is no window, a value is not finite, or the numbers of windows differ.
@@ -73,16 +81,16 @@ class MatchedWindowBootstrap:
 
     follows_signal = True
 
-    def __init__(self, windows: np.ndarray, signals: np.ndarray):
-        self.windows, self.signals = _checked(windows), np.asarray(signals, np.float32)
+    def __init__(self, windows: np.ndarray, signals: np.ndarray, starts: np.ndarray | None = None):
+        (self.windows, self.starts), self.signals = _checked(windows, starts), np.asarray(signals, np.float32)
         expected = (len(self.windows), min(_NUM_SEGMENTS, self.windows.shape[1]))
         if self.signals.shape != expected or not np.isfinite(self.signals).all():
             raise InputError(f"Expected the finite signal of each window, shape {expected}. Received: shape {self.signals.shape}.")
 
     @classmethod
-    def fit(cls, windows: np.ndarray, signal_windows: np.ndarray) -> "MatchedWindowBootstrap":
-        """Stores noise windows, and the signal below them, both of shape `(windows, samples)`."""
-        return cls(windows, _segment_means(signal_windows, np.shape(windows)))
+    def fit(cls, windows: np.ndarray, signal_windows: np.ndarray, starts: np.ndarray | None = None) -> "MatchedWindowBootstrap":
+        """Stores noise windows, the signal below them, both of shape `(windows, samples)`, and where they start."""
+        return cls(windows, _segment_means(signal_windows, np.shape(windows)), starts)
 
     @property
     def scale(self) -> float:
@@ -130,7 +138,7 @@ class MatchedWindowBootstrap:
         """Draws windows, and computes the mean of the windows that each was drawn from."""
         from sklearn.metrics.pairwise import euclidean_distances
 
-        window, choices = self.windows.shape[1], rng.random(number)
+        window, draws = self.windows.shape[1], _SparingDraws(self, rng)
         wanted = _segment_means(signal_windows, (number, window)).astype(np.float64)
         centre = self.signals.mean(axis=0, dtype=np.float64)
         known, wanted = self.signals - centre, wanted - centre  # smaller numbers, smaller rounding errors
@@ -142,20 +150,48 @@ class MatchedWindowBootstrap:
             apart = euclidean_distances(wanted[rows], known, squared=True)
             reach = np.maximum(np.partition(apart, nearest - 1, axis=1)[:, nearest - 1], equal)
             is_near = apart <= reach[:, None]
-            counts = is_near.sum(axis=1)
-            wanted_rank = np.floor(choices[rows] * counts).astype(int)
-            drawn[rows] = self.windows[np.argmax(np.cumsum(is_near, axis=1) > wanted_rank[:, None], axis=1)]
+            drawn[rows] = self.windows[[draws.draw(np.flatnonzero(near)) for near in is_near]]
             if with_mean:
-                means[rows] = (is_near.astype(np.float32) @ self.windows) / counts[:, None]
+                means[rows] = (is_near.astype(np.float32) @ self.windows) / is_near.sum(axis=1, keepdims=True)
         return drawn, means if with_mean else 0.0
 
 
-def _checked(windows: np.ndarray) -> np.ndarray:
-    """Returns windows of noise as float32."""
+class _SparingDraws:
+    """Draws windows that share as few samples as possible with those drawn before.
+
+    Args:
+        noise: Its `windows` and `starts` are used.
+        rng: Draws among equals.
+    """
+
+    def __init__(self, noise: WindowBootstrap | MatchedWindowBootstrap, rng: np.random.Generator):
+        number, self._window = noise.windows.shape
+        self._rng, self._shared = rng, np.zeros(number, np.int64)  # samples that each window shares with the windows drawn so far
+        self._starts = self._window * np.arange(number) if noise.starts is None else noise.starts
+        self._order = np.argsort(self._starts, kind="stable")
+        apart = ((self._starts - self._window, "right"), (self._starts + self._window, "left"))
+        self._first, self._last = (np.searchsorted(self._starts[self._order], edge, side) for edge, side in apart)
+
+    def draw(self, candidates: np.ndarray) -> int:
+        """Draws one of the given windows, and returns its number."""
+        shared = self._shared[candidates]
+        least = candidates[shared == shared.min()]
+        chosen = int(least[self._rng.integers(len(least))])
+        near = self._order[self._first[chosen] : self._last[chosen]]
+        self._shared[near] += self._window - np.abs(self._starts[near] - self._starts[chosen])
+        return chosen
+
+
+def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
+    """Returns windows of noise as float32, and where they start as integers."""
     windows = np.asarray(windows, np.float32)
     if windows.ndim != 2 or windows.shape[0] < 1 or windows.shape[1] < 4 or not np.isfinite(windows).all():
         raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {windows.shape}. Extract noise first.")
-    return windows
+    if starts is None:
+        return windows, None
+    if np.shape(starts) != windows.shape[:1] or not np.isfinite(starts).all() or np.min(starts) < 0 or np.max(starts) > _LAST_START:
+        raise InputError(f"Expected where each of {len(windows)} windows of noise starts, in samples. Received: shape {np.shape(starts)}.")
+    return windows, np.asarray(starts, np.int64)
 
 
 def _segment_means(signal_windows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -188,6 +188,18 @@ def test_quantised_noise_stays_on_its_grid(origin):
     np.testing.assert_allclose(generated, np.rint(generated), atol=1e-4)
 
 
+@pytest.mark.parametrize("log_scale", [-6.0, -2.0, 0.0, 2.0])
+@pytest.mark.parametrize("error", [1.0, 0.05])
+def test_the_likelihoods_of_all_levels_add_up_to_one(error, log_scale):
+    """Also where the error of the linear prediction is a tenth of a step, and a component is far narrower than a step."""
+    network = AutoregressiveNetwork(8, 1.0, step=0.5)
+    levels = 0.5 * np.arange(-100, 101)
+    targets = np.stack([(levels - 0.13) / error, np.full(201, error)], axis=1).astype(np.float32)
+    logits, means, log_scales, degrees = (np.full((1, 2), each, np.float32) for each in (0.0, 0.4, log_scale, 30.0))
+    losses = [float(network._negative_log_likelihood(row[None], logits, means, log_scales, degrees)) for row in targets]
+    assert np.sum(np.exp(-np.array(losses))) * network.step == pytest.approx(1, abs=0.01)
+
+
 def test_quantised_noise_keeps_its_scale_and_correlation():
     rng = np.random.default_rng(5)
     latent = np.zeros((1_000, 48))

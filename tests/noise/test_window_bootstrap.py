@@ -21,6 +21,52 @@ def test_windows_are_real_ones():
     assert drawn.shape == (100, 40) and {row.tobytes() for row in drawn} <= {row.tobytes() for row in windows}
 
 
+@pytest.mark.parametrize("follows_signal", [False, True])
+def test_each_window_is_drawn_once_before_any_is_drawn_again(follows_signal):
+    windows, signal = ar1(20, 40), np.zeros((60, 40))
+    noise = MatchedWindowBootstrap.fit(windows, signal[:20]) if follows_signal else WindowBootstrap(windows)
+    for number, times in ((20, [1]), (60, [3]), (30, [1, 2])):
+        drawn = noise.generate(number, 3, signal[:number]) if follows_signal else noise.generate(number, 3)
+        _, counts = np.unique(drawn, axis=0, return_counts=True)
+        assert len(counts) == 20 and sorted(set(counts)) == times
+
+
+@pytest.mark.parametrize("follows_signal", [False, True])
+def test_windows_that_overlap_are_not_drawn_while_others_are_left(follows_signal):
+    starts = np.random.default_rng(1).permutation(np.arange(0, 361, 10))
+    windows = (starts[:, None] + np.arange(40)).astype(np.float32)  # the values say where a window starts
+    signal = np.zeros((37, 40))
+    noise = MatchedWindowBootstrap.fit(windows, signal, starts) if follows_signal else WindowBootstrap.fit(windows, starts)
+    begun = set()
+    for seed in range(50):
+        # a window overlaps with six others at most, so that 37 windows always leave a sixth one that overlaps with none of five
+        drawn = noise.generate(6, seed, signal[:6]) if follows_signal else noise.generate(6, seed)
+        assert np.diff(np.sort(drawn[:, 0])).min() >= 40
+        begun |= set(drawn[:, 0])
+    assert len(begun) == 37  # each can be drawn
+
+
+def test_where_the_windows_overlap_is_what_decides():
+    starts = np.array([0, 35, 45])
+    windows = (starts[:, None] + np.arange(40)).astype(np.float32)
+    for seed in range(20):
+        first, second, third = WindowBootstrap(windows, starts).generate(3, seed)[:, 0]
+        if first == 35:  # the windows at 0 and 45 share 5 and 30 samples with it
+            assert (second, third) == (0, 45)
+        else:
+            assert {first, second} == {0, 45} and third == 35
+
+
+@pytest.mark.parametrize(
+    "starts", [np.arange(3), np.full(20, np.nan), np.full(20, np.inf), np.full(20, -1), np.full(20, 1e300), np.zeros((20, 2))]
+)
+def test_unusable_starts_are_refused(refused, starts):
+    with refused("starts"):
+        WindowBootstrap(ar1(20, 40), starts)
+    with refused("starts"):
+        MatchedWindowBootstrap.fit(ar1(20, 40), sines(20, 40), starts)
+
+
 def test_the_scale_is_constant_across_seams():
     noise = WindowBootstrap(ar1(3_000, 40))
     series = np.stack([noise.generate_series(120, seed) for seed in range(4_000)])
@@ -76,7 +122,7 @@ def test_matched_windows_are_real_ones_of_the_nearest_signals():
         np.angle(np.exp(2j * np.pi * (np.array([np.argmax(each[:40]) for each in signal[rows]]) - signal[:, :40].argmax(axis=1)) / 40))
     )
     assert apart.max() <= 1.01 * 2 * np.pi * 2 / 40  # 20 of 400 windows: at most two of 40 phases away
-    assert len(set(rows)) > 150  # of 400 draws with replacement, 253 are expected to differ
+    assert len(set(rows)) > 300  # of 400 draws with replacement, 253 would be expected to differ
 
 
 def test_matched_noise_follows_the_signal_and_whole_windows_do_not():
