@@ -21,6 +21,7 @@ from enhsim_tf.realism.two_sample import boosted_trees
 from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import first_samples
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -39,7 +40,7 @@ class NoiseWindows:
     Args:
         noise: Telemetry minus enhanced signal, shape `(windows, samples)`, in the unit of the telemetry.
         clean: Enhanced windows of the same shape.
-        starts: Start of each window in samples, shape `(windows,)`. Needed to judge with these windows.
+        starts: First sample of each window, shape `(windows,)`. Needed to judge with these windows.
     """
 
     noise: np.ndarray
@@ -70,7 +71,7 @@ def noise_windows(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], st
     """
     pairs = simulator.pairs(parts, starts)
     clean = simulator.follow(pairs)
-    return NoiseWindows(pairs.target - clean, clean, starts)
+    return NoiseWindows(pairs.target - clean, clean, first_samples(parts, starts, simulator.window))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,11 +182,28 @@ class HeldOutJudge:
         """
         training, clean = self._training, self._clean
         rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
-        noise = ladder.generate(model, len(clean), rng, training.to_unit(clean))
-        # sums of 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
-        generated = clean + noise
-        noise = (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
-        return self._judge.judge(option, noise, compare(NoiseWindows(noise, clean), self._learnt, self._held_out)[0])
+
+        def noise_on(clean: np.ndarray) -> np.ndarray:
+            # sums of 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
+            generated = clean + ladder.generate(model, len(clean), rng, training.to_unit(clean))
+            return (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
+
+        few = classified(clean, self._learnt, self._held_out)
+        return self._judge.judge(option, noise_on(clean), compare(NoiseWindows(noise_on(few), few), self._learnt, self._held_out)[0])
+
+
+def classified(clean: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows) -> np.ndarray:
+    """Returns the enhanced windows for which noise is to be generated that a classifier sees: as many as there are disjoint windows.
+
+    Of more windows than these, some would have to repeat real noise if the noise model draws real windows again.
+
+    Args:
+        clean: Enhanced windows, shape `(windows, samples)`.
+        learnt: Windows from which the noise model was fitted.
+        judged: Windows that it has not seen.
+    """
+    number = min(len(clean), len(learnt.disjoint), len(judged.disjoint))
+    return clean[np.linspace(0, len(clean) - 1, number).astype(int)] if number else clean[:0]
 
 
 def compare(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows) -> list[np.ndarray]:
@@ -230,11 +248,14 @@ def pieces_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindow
     return found
 
 
-def auc_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows, seed: int) -> dict[str, float]:
+def auc_of(
+    add_noise: Callable[[np.ndarray], np.ndarray], clean: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows, seed: int
+) -> dict[str, float]:
     """Returns how well a classifier tells generated, and learnt, from held-out noise, in disjoint windows or pieces of them.
 
     Args:
-        generated: Generated windows of noise, and the enhanced windows that it was generated for.
+        add_noise: Adds generated noise to enhanced windows.
+        clean: Enhanced windows, shape `(windows, samples)`.
         learnt: Windows from which the noise model was fitted.
         judged: Windows that it has not seen.
         seed: Seed of the classifier.
@@ -242,9 +263,8 @@ def auc_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows, 
     Returns:
         The AUC of `generated` and of `real` noise; empty if there are fewer than 20 pieces of each.
     """
-    if not (len(learnt) and len(judged)):
-        return {}
-    tried = compare(generated, learnt, judged)
+    few = classified(clean, learnt, judged)
+    tried = compare(NoiseWindows(add_noise(few) - few, few), learnt, judged) if len(few) else [few]
     if len(tried[0]) < _LEAST_JUDGED:
         return {}
     return {kind: boosted_trees(features, tried[2], seed).auc for kind, features in (("generated", tried[0]), ("real", tried[1]))}

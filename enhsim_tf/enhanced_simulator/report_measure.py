@@ -11,7 +11,7 @@ import numpy as np
 
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, NoiseWindows, auc_of, noise_windows
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, auc_of, noise_windows
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
 from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
@@ -106,8 +106,8 @@ def report_on(
 def _noise_auc(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], seed: int) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out noise; empty if there are too few windows."""
     real = [noise_windows(simulator, parts, evenly_spaced_starts(parts, simulator.window, MOST_JUDGED)) for parts in (learnt, held_out)]
-    clean, rng = real[0].clean, np.random.default_rng([seed, 3])
-    return auc_of(NoiseWindows(simulator.add_noise(clean, rng) - clean, clean), *real, seed)
+    rng = np.random.default_rng([seed, 3])
+    return auc_of(lambda windows: simulator.add_noise(windows, rng), real[0].clean, *real, seed)
 
 
 def _nrmse(windows: np.ndarray, target: np.ndarray) -> float:

@@ -32,7 +32,7 @@ from enhsim_tf.noise.extraction import extract_noise
 from enhsim_tf.noise.rung_names import BEST, BY_OPTION, FOLLOWERS
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
-from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, first_samples, random_window_starts
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -160,7 +160,7 @@ def train(
     else:
         starts = random_window_starts(averaged, settings.window, settings.num_windows, rng)
         noise, _ = cut_windows_from_parts(averaged, starts, settings.window)
-        windows = NoiseWindows(noise, np.zeros_like(noise))
+        windows = NoiseWindows(noise, np.zeros_like(noise), first_samples(averaged, starts, settings.window))
     if settings.noise == BEST:
         halves = [_evenly_spaced(simulator, some, settings) for some in split_end(rest, JUDGED_SHARE)]
         simulator.noise, simulator.trained["noise_ladder"] = choose_noise(*halves, windows, training, notes)

@@ -47,9 +47,7 @@ _NUM_NODES = 5  # at which the density over a step is evaluated (Gauss-Legendre 
 _LEAST_SCALE = 0.25  # of a component of quantised noise, in steps (not in errors of the prediction): a narrower one lies between the nodes
 _LEAST_DEGREES = 2.1  # degrees of freedom of a component; at 2 its variance is infinite
 _LIMIT = 1.2  # generated samples stay within this multiple of the largest magnitude of the training windows: the tails of t distributions have no end
-_WEIGHT_DECAY = (
-    1.0  # of all layers, so that they follow the past no more than the telemetry shows: 0.3 learns windows by heart, 3 learns too little
-)
+_WEIGHT_DECAY = 1.0  # of all layers: with 0.3 the network learns windows by heart, with 3 it learns too little
 _LOG_DEGREES = (2.0, 7.0)  # initial logarithms of the degrees of freedom above the least: of the two components with tails, of the others
 _MAX_LOG_DEGREES = 8.0  # no telemetry tells more degrees of freedom from a normal distribution
 _LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimiser moves them by powers of ten, not by parts of one

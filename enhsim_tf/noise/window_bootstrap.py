@@ -10,26 +10,27 @@ from enhsim_tf.common.errors import InputError
 _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over these segments
 _EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
 _BATCH = 2**24  # distances that are computed at a time
-_LAST_START = 2**60  # sums of two starts are still integers of 64 bits
+_LAST_START = 2**60  # the end of a window is still an integer of 64 bits
+_DRAWN = 2**40  # more samples than a window shares with all others that are drawn
 
 
 class WindowBootstrap:
     """Draws whole windows of real noise.
 
-    Each draw takes a window at random from those that share the fewest samples with the windows drawn before. No noise is therefore
-    drawn twice until none is left: among windows that were drawn with replacement (Efron 1979), or that overlap, a classifier
-    recognises what it has seen, whatever the noise is like.
+    Of the windows that a call has drawn least often, each draw takes one at random from those that share the fewest samples with all
+    windows drawn before. So no window is drawn again, and hardly any that overlaps with one drawn before, while others are left. Among
+    windows that are drawn with replacement (Efron 1979), a classifier recognises what it has seen, whatever the noise is like.
 
     Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
     and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
-    because two windows that are drawn independently are uncorrelated. The mean of all windows is not faded.
+    because two windows that are drawn at random are uncorrelated, or nearly so if there are few. The mean of all windows is not faded.
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
-        starts: Start of each window in samples, shape `(windows,)`. None: no two windows overlap.
+        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap; models that were saved before say so of all.
 
     Raises:
-        InputError: If there is no window, a value is not finite, or the numbers of windows and starts differ.
+        InputError: If there is no window, a value is not finite, or `starts` are not a whole number for each window.
     """
 
     def __init__(self, windows: np.ndarray, starts: np.ndarray | None = None):
@@ -64,8 +65,7 @@ class MatchedWindowBootstrap:
     noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
     whose signal is the same. The distance of two signals is that of their means over 64 segments. The idea, and the number of
     neighbours, are those of the nearest-neighbour bootstrap of Lall and Sharma (1996), which resamples the successors of similar
-    pasts instead. Of these windows, those that share the fewest samples with the windows drawn before are preferred, as by
-    `WindowBootstrap`. If the signal never repeats, the nearest windows can be few stretches of the record.
+    pasts instead. Of these windows, one is drawn as by `WindowBootstrap`. If the signal never repeats, the nearest windows can be few stretches of the record.
 
     In a longer series, the mean of the candidates, which neighbouring windows have in common, is cross-faded with weights that add
     up to one, and the rest as by `WindowBootstrap`.
@@ -73,10 +73,10 @@ class MatchedWindowBootstrap:
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
         signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`.
-        starts: Start of each window in samples, shape `(windows,)`. None: no two windows overlap.
+        starts: First sample of each window, shape `(windows,)`; see `WindowBootstrap`.
 
     Raises:
-        InputError: If there is no window, a value is not finite, or the numbers of windows differ.
+        InputError: If there is no window, a value is not finite, the numbers of windows differ, or `starts` are not whole numbers.
     """
 
     follows_signal = True
@@ -157,7 +157,7 @@ class MatchedWindowBootstrap:
 
 
 class _SparingDraws:
-    """Draws windows that share as few samples as possible with those drawn before.
+    """Draws windows that were drawn as seldom, and share as few samples with those drawn before, as possible.
 
     Args:
         noise: Its `windows` and `starts` are used.
@@ -166,7 +166,7 @@ class _SparingDraws:
 
     def __init__(self, noise: WindowBootstrap | MatchedWindowBootstrap, rng: np.random.Generator):
         number, self._window = noise.windows.shape
-        self._rng, self._shared = rng, np.zeros(number, np.int64)  # samples that each window shares with the windows drawn so far
+        self._rng, self._used = rng, np.zeros(number, np.int64)  # samples shared with the windows drawn so far, plus _DRAWN for each draw
         self._starts = self._window * np.arange(number) if noise.starts is None else noise.starts
         self._order = np.argsort(self._starts, kind="stable")
         apart = ((self._starts - self._window, "right"), (self._starts + self._window, "left"))
@@ -174,11 +174,12 @@ class _SparingDraws:
 
     def draw(self, candidates: np.ndarray) -> int:
         """Draws one of the given windows, and returns its number."""
-        shared = self._shared[candidates]
-        least = candidates[shared == shared.min()]
+        used = self._used[candidates]
+        least = candidates[used == used.min()]
         chosen = int(least[self._rng.integers(len(least))])
         near = self._order[self._first[chosen] : self._last[chosen]]
-        self._shared[near] += self._window - np.abs(self._starts[near] - self._starts[chosen])
+        self._used[chosen] += _DRAWN
+        self._used[near] += self._window - np.abs(self._starts[near] - self._starts[chosen])
         return chosen
 
 
@@ -189,9 +190,14 @@ def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray
         raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {windows.shape}. Extract noise first.")
     if starts is None:
         return windows, None
-    if np.shape(starts) != windows.shape[:1] or not np.isfinite(starts).all() or np.min(starts) < 0 or np.max(starts) > _LAST_START:
-        raise InputError(f"Expected where each of {len(windows)} windows of noise starts, in samples. Received: shape {np.shape(starts)}.")
-    return windows, np.asarray(starts, np.int64)
+    starts = np.asarray(starts)
+    if starts.shape != windows.shape[:1] or starts.dtype.kind not in "iu" or not 0 <= starts.min() <= starts.max() <= _LAST_START:
+        span = f", from {starts.min()} to {starts.max()}" if starts.size and starts.dtype.kind in "iuf" else ""
+        raise InputError(
+            f"Expected the starts of {len(windows)} windows of noise, a whole number from 0 to {_LAST_START} for each. "
+            f"Received: shape {starts.shape} of {starts.dtype}{span}. Give the first sample of each window."
+        )
+    return windows, starts.astype(np.int64)
 
 
 def _segment_means(signal_windows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -132,6 +132,28 @@ def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarr
     return np.lib.stride_tricks.sliding_window_view(values, window)[starts]
 
 
+def first_samples(parts: Sequence[Sized], starts: np.ndarray, window: int) -> np.ndarray:
+    """Returns the first sample of each window, counted over all samples of the parts that are long enough.
+
+    Unlike the starts, these tell which windows overlap: two windows of different parts are at least a window apart.
+
+    Args:
+        parts: Contiguous parts of one series.
+        starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
+        window: Number of samples in a window.
+    """
+    return np.asarray(starts) + (window - 1) * _which_part(_first_starts(parts, window), starts)
+
+
+def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
+    """The number of possible starts before each part that is long enough, and that of all."""
+    return np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
+
+
+def _which_part(firsts: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    return np.searchsorted(firsts, starts, "right") - 1
+
+
 def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
     """Cuts windows out of a series that consists of several contiguous parts.
 
@@ -147,10 +169,10 @@ def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, windo
         InputError: If an index is out of range.
     """
     starts, usable = np.asarray(starts), [part for part in parts if len(part) >= window]
-    firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
+    firsts = _first_starts(parts, window)
     if len(starts) and not 0 <= starts.min() <= starts.max() < firsts[-1]:
         raise InputError(f"Expected window starts from 0 to before {firsts[-1]}. Received: from {starts.min()} to {starts.max()}.")
-    which = np.searchsorted(firsts, starts, "right") - 1
+    which = _which_part(firsts, starts)
     windows, time_s = np.empty((len(starts), window), np.float32), np.empty(len(starts))
     for number, part in enumerate(usable):
         here = which == number

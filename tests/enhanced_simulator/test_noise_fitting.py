@@ -8,7 +8,15 @@ import pytest
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import noise_fitting
-from enhsim_tf.enhanced_simulator.noise_fitting import NoiseTraining, NoiseWindows, choose_noise, compare, pieces_of, sentence_of
+from enhsim_tf.enhanced_simulator.noise_fitting import (
+    NoiseTraining,
+    NoiseWindows,
+    choose_noise,
+    compare,
+    noise_windows,
+    pieces_of,
+    sentence_of,
+)
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import BY_OPTION
@@ -101,6 +109,27 @@ def test_a_classifier_sees_disjoint_windows_and_pieces_of_them():
     np.testing.assert_array_equal(learnt.noise, judged.noise)
     np.testing.assert_array_equal(generated.noise, -generated.clean)
     assert [each.shape for each in compare(windows, windows, windows)] == [(15, 24)] * 3  # in 18 samples, there are six frequency bands
+
+
+def test_windows_of_two_parts_are_disjoint():
+    simulator = fit(series(0.0, 3_000), "gaussian")
+    values = series(0.0, 320).values
+    parts = [Telemetry(values[begin : begin + 64], name="volts", offset_s=200 + begin) for begin in range(0, 320, 64)]
+    windows = noise_windows(simulator, parts, np.arange(5))  # each part is one window, so that the starts are the numbers of the parts
+    assert len(windows.disjoint) == 5
+    assert len(np.unique(WindowBootstrap.fit(windows.noise, windows.starts).generate(5, 1), axis=0)) == 5
+
+
+def test_a_classifier_hardly_sees_a_residual_twice(monkeypatch):
+    """Whole windows of a short record: only as many are generated as the classifier sees, and these share few samples."""
+    halves = [np.lib.stride_tricks.sliding_window_view(half, 40) for half in np.arange(2_400.0).reshape(2, -1)]  # values are places
+    learnt, judged = (NoiseWindows(each, np.zeros_like(each), np.arange(len(each))) for each in halves)
+    judge = noise_fitting.HeldOutJudge(learnt, judged, NoiseTraining(1, 0, lambda clean: clean))
+    seen = []
+    monkeypatch.setattr(noise_fitting, "compare", lambda *groups: seen.append(groups[0].noise) or compare(*groups))
+    judge.judge("residual windows", WindowBootstrap.fit(learnt.noise, learnt.starts))
+    (drawn,) = seen
+    assert drawn.shape == (30, 40) and len(np.unique(drawn)) > 0.85 * drawn.size  # with replacement: 63 %
 
 
 @pytest.mark.usefixtures("no_networks")

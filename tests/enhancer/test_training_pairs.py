@@ -13,7 +13,13 @@ from enhsim_tf.enhancer.training_pairs import (
     window_errors,
 )
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, num_window_starts, random_window_starts
+from enhsim_tf.telemetry.windows import (
+    cut_windows_from_parts,
+    evenly_spaced_starts,
+    first_samples,
+    num_window_starts,
+    random_window_starts,
+)
 
 COARSE = SquareWaveSimulator([SquareWave(period_s=100, phase=0.005, duty=0.3, low=-1.0, high=1.0)])  # edges between samples
 
@@ -33,6 +39,11 @@ def test_window_starts_are_counted_over_all_parts():
     np.testing.assert_array_equal(windows, np.array(begins)[:, None] + np.arange(4))
     np.testing.assert_array_equal(time_s, begins)
     assert windows.dtype == np.float32
+
+
+def test_first_samples_are_counted_over_all_samples_of_long_parts():
+    assert first_samples(PARTS, np.arange(10), 4).tolist() == [0, 1, 2, 3, 4, 5, 6, 10, 11, 15]
+    assert first_samples(PARTS, [9, 0, 7, 9], 4).tolist() == [15, 0, 10, 15]
 
 
 def test_window_starts_may_be_unsorted_and_repeated():

@@ -15,13 +15,27 @@ CLEAN = np.sin(np.arange(40) / 5).astype(np.float32) * np.ones((30, 1), np.float
 
 @pytest.mark.parametrize("rung", RUNGS)
 def test_a_saved_noise_model_generates_the_same_noise(rung):
-    model = RUNGS[rung](FitTask(WINDOWS, CLEAN, 2, 5))
+    model = RUNGS[rung](FitTask(WINDOWS, CLEAN, 2, 5, starts=10 * np.arange(30)))
     state = state_of(model)
     assert state.is_finite and bool(state.networks) != bool(state.arrays)
     again = model_from(json.loads(json.dumps(dict(state.settings))), state.networks, state.arrays)
     assert type(again) is type(model)
     np.testing.assert_array_equal(generate(again, 6, 1, CLEAN[:6]), generate(model, 6, 1, CLEAN[:6]))
     np.testing.assert_array_equal(generate_series(again, 90, 1, np.zeros(90)), generate_series(model, 90, 1, np.zeros(90)))
+
+
+@pytest.mark.parametrize("rung", ["residual windows", "matched residual windows", "autoregressive network"])
+def test_real_noise_is_drawn_sparingly_also_from_saved_models(rung):
+    """Windows that begin every ten samples: of four windows of forty samples, or pasts of twenty, none need overlap."""
+    values = np.random.default_rng(2).standard_normal(330).astype(np.float32)
+    windows = np.stack([values[begin : begin + 40] for begin in 10 * np.arange(30)])
+    state = state_of(RUNGS[rung](FitTask(windows, CLEAN, 2, 5, starts=10 * np.arange(30))))
+    model = model_from(state.settings, state.networks, state.arrays)
+    real = model.pasts if rung == "autoregressive network" else model
+    for seed in range(20):
+        drawn = generate(real, 4, seed, CLEAN[:4, : real.windows.shape[1]])
+        rows = [np.flatnonzero((real.windows == each).all(axis=1))[0] for each in drawn]
+        assert np.diff(np.sort(rows)).min() * 10 >= real.windows.shape[1]
 
 
 def test_models_saved_under_the_old_name_are_read():

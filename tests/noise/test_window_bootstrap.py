@@ -46,7 +46,7 @@ def test_windows_that_overlap_are_not_drawn_while_others_are_left(follows_signal
     assert len(begun) == 37  # each can be drawn
 
 
-def test_where_the_windows_overlap_is_what_decides():
+def test_how_far_the_windows_overlap_is_what_decides():
     starts = np.array([0, 35, 45])
     windows = (starts[:, None] + np.arange(40)).astype(np.float32)
     for seed in range(20):
@@ -57,13 +57,22 @@ def test_where_the_windows_overlap_is_what_decides():
             assert {first, second} == {0, 45} and third == 35
 
 
+@pytest.mark.parametrize("length", [50, 80, 200])
+def test_windows_of_a_short_record_are_drawn_equally_often(length):
+    starts = np.arange(length - 39)  # those at the ends overlap with fewer others
+    noise = WindowBootstrap((starts[:, None] + np.arange(40)).astype(np.float32), starts)
+    for number in (len(starts), 5 * len(starts) + 3):
+        drawn, counts = np.unique(noise.generate(number, 1)[:, 0], return_counts=True)
+        assert len(drawn) == len(starts) and counts.max() - counts.min() <= 1
+
+
 @pytest.mark.parametrize(
-    "starts", [np.arange(3), np.full(20, np.nan), np.full(20, np.inf), np.full(20, -1), np.full(20, 1e300), np.zeros((20, 2))]
+    "starts", [np.arange(3), np.arange(20.0), np.full(20, np.nan), np.full(20, -1), np.full(20, 2**61), np.zeros((20, 2), int), ["a"] * 20]
 )
 def test_unusable_starts_are_refused(refused, starts):
-    with refused("starts"):
+    with refused("whole number"):
         WindowBootstrap(ar1(20, 40), starts)
-    with refused("starts"):
+    with refused("whole number"):
         MatchedWindowBootstrap.fit(ar1(20, 40), sines(20, 40), starts)
 
 

@@ -36,7 +36,7 @@ from enhsim_tf.noise.rung_names import BEST
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
-from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, random_window_starts
+from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, first_samples, random_window_starts
 
 _LEAST_WINDOW, _MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
 _WINDOWS_IN_TRAINING = 20  # the default window is this share of the training telemetry
@@ -287,8 +287,8 @@ def _noise_auc(
 ) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out residuals; empty if there are too few windows."""
     real = [_evenly_spaced(residuals, model.window, MOST_JUDGED) for residuals in (learnt, left)]
-    clean = np.concatenate([*model.nominal_chunks(MOST_JUDGED, np.random.default_rng([seed, 8]))])
-    return auc_of(NoiseWindows(model.add_noise(clean, np.random.default_rng([seed, 9])) - clean, clean), *real, seed)
+    clean, rng = np.concatenate([*model.nominal_chunks(MOST_JUDGED, np.random.default_rng([seed, 8]))]), np.random.default_rng([seed, 9])
+    return auc_of(lambda windows: model.add_noise(windows, rng), clean, *real, seed)
 
 
 def _evenly_spaced(residuals: Sequence[tuple[Telemetry, Telemetry]], window: int, num_windows: int) -> NoiseWindows:
@@ -300,7 +300,9 @@ def _evenly_spaced(residuals: Sequence[tuple[Telemetry, Telemetry]], window: int
 
 
 def _cut(residuals: Sequence[tuple[Telemetry, Telemetry]], starts: np.ndarray, window: int) -> NoiseWindows:
-    return NoiseWindows(*(cut_windows_from_parts([each[which] for each in residuals], starts, window)[0] for which in (0, 1)), starts)
+    noise, clean = (list(each) for each in zip(*residuals, strict=True))
+    windows = (cut_windows_from_parts(parts, starts, window)[0] for parts in (noise, clean))
+    return NoiseWindows(*windows, first_samples(noise, starts, window))
 
 
 def _one_run(model: RunModel, pair: Pair) -> Recording:
