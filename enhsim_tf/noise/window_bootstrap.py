@@ -11,15 +11,14 @@ _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over 
 _EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
 _BATCH = 2**24  # distances that are computed at a time
 _LAST_START = 2**60  # the end of a window is still an integer of 64 bits
-_DRAWN = 2**40  # more samples than a window shares with all others that are drawn
 
 
 class WindowBootstrap:
     """Draws whole windows of real noise.
 
-    Of the windows that a call has drawn least often, each draw takes one at random from those that share the fewest samples with all
-    windows drawn before. So no window is drawn again, and hardly any that overlaps with one drawn before, while others are left. Among
-    windows that are drawn with replacement (Efron 1979), a classifier recognises what it has seen, whatever the noise is like.
+    A call first draws windows that share no sample with those it drew before: among windows that are drawn with replacement, or overlap,
+    a classifier recognises what it has seen, whatever the noise is like. When no such window is left, all are drawn with replacement
+    (Efron 1979). Drawing them in turn instead would put the same windows into training and threshold of a detector.
 
     Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
     and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
@@ -157,7 +156,7 @@ class MatchedWindowBootstrap:
 
 
 class _SparingDraws:
-    """Draws windows that were drawn as seldom, and share as few samples with those drawn before, as possible.
+    """Draws windows that share no sample with those drawn before, as long as there are any.
 
     Args:
         noise: Its `windows` and `starts` are used.
@@ -165,21 +164,19 @@ class _SparingDraws:
     """
 
     def __init__(self, noise: WindowBootstrap | MatchedWindowBootstrap, rng: np.random.Generator):
-        number, self._window = noise.windows.shape
-        self._rng, self._used = rng, np.zeros(number, np.int64)  # samples shared with the windows drawn so far, plus _DRAWN for each draw
-        self._starts = self._window * np.arange(number) if noise.starts is None else noise.starts
-        self._order = np.argsort(self._starts, kind="stable")
-        apart = ((self._starts - self._window, "right"), (self._starts + self._window, "left"))
-        self._first, self._last = (np.searchsorted(self._starts[self._order], edge, side) for edge, side in apart)
+        number, window = noise.windows.shape
+        self._rng, self._is_free = rng, np.ones(number, bool)
+        starts = window * np.arange(number) if noise.starts is None else noise.starts
+        self._order = np.argsort(starts, kind="stable")
+        apart = ((starts - window, "right"), (starts + window, "left"))
+        self._first, self._last = (np.searchsorted(starts[self._order], edge, side) for edge, side in apart)
 
     def draw(self, candidates: np.ndarray) -> int:
         """Draws one of the given windows, and returns its number."""
-        used = self._used[candidates]
-        least = candidates[used == used.min()]
-        chosen = int(least[self._rng.integers(len(least))])
-        near = self._order[self._first[chosen] : self._last[chosen]]
-        self._used[chosen] += _DRAWN
-        self._used[near] += self._window - np.abs(self._starts[near] - self._starts[chosen])
+        free = candidates[self._is_free[candidates]]
+        drawn_from = free if len(free) else candidates
+        chosen = int(drawn_from[self._rng.integers(len(drawn_from))])
+        self._is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
         return chosen
 
 

@@ -15,8 +15,10 @@ from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.reproduce import __main__ as command
 from enhsim_tf.reproduce.noise_gallery import GALLERY
 from enhsim_tf.reproduce.noise_ladder import figures, findings
+from enhsim_tf.reproduce.noise_ladder.names import PRESENT
 from enhsim_tf.reproduce.noise_ladder.page import families, fill_page, limits, unrealistic
 from enhsim_tf.reproduce.noise_ladder.run import lines
+from enhsim_tf.reproduce.settings import LadderSettings
 
 
 def test_the_lists_of_the_command_are_those_of_the_gallery_and_the_ladder():
@@ -282,6 +284,16 @@ def test_the_published_findings_and_the_page_come_from_the_published_tables(near
     text = (root / "docs" / "noise.md").read_text(encoding="utf-8")
     for part in (families(kept), limits(kept), unrealistic(kept)):
         assert part in text
+
+
+def test_rows_of_changed_models_have_names_of_their_own():
+    tables = findings.KEPT.read(Path(__file__).parents[2] / "figures" / "noise")
+    changed = {name.partition(",")[0] for name in findings.FORMER}
+    for table in tables.values():
+        assert table.loc[table["rung"].isin(changed), "seed"].min() >= LadderSettings().first_seed
+        assert not set(table.loc[table["seed"] >= LadderSettings().first_seed, "rung"]) & set(findings.FORMER)
+    choice = tables["choice"]
+    assert choice.loc[choice["rule"] == PRESENT, "seed"].min() >= LadderSettings().first_seed
 
 
 def test_models_are_compared_with_real_windows_of_their_own_seeds():

@@ -94,7 +94,11 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
                 },
             }
         choices = [
-            _choice(choice[(choice["family"] == family) & (choice["seed"] == seed)], *_by_rung(own[own["seed"] == seed]))
+            _choice(
+                choice[(choice["family"] == family) & (choice["seed"] == seed)],
+                *_by_rung(own[own["seed"] == seed]),
+                realism[(realism["family"] == family) & (realism["seed"] == seed)],
+            )
             for seed in sorted(set(choice[choice["family"] == family]["seed"]))
         ]
         families[family] = {
@@ -135,24 +139,28 @@ def _by_rung(rows: "pd.DataFrame") -> tuple[dict[str, float], dict[str, float]]:
     return means["rate"].to_dict(), means["recall"].to_dict()
 
 
-def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[str, float]) -> dict[str, Any]:
+def _choice(rows: "pd.DataFrame", rates: Mapping[str, float], recalls: Mapping[str, float], realism: "pd.DataFrame") -> dict[str, Any]:
     """What the rule chooses for one family and seed.
 
     Args:
         rows: The judgements.
         rates: The false-alarm rate of each rung.
         recalls: The recall of each rung at its own thresholds.
+        realism: The measures of realism of each rung.
 
     Returns:
-        The seed, the rule, the chosen rung, those that pass the rule (none: the smallest departure decides), the false-alarm rate of
-        each judged rung and of real windows, and how much recall each loses against real windows.
+        The seed, the rule, the chosen rung, the share of measures of its noise within `MAX_REALISM_RATIO` times their floor, the rungs
+        that pass the rule (none: the smallest departure decides), the false-alarm rate of each judged rung and of real windows, and how
+        much recall each loses against real windows.
     """
     judged = _judgements(rows)
+    chosen = choose(judged)
     names = [each.rung for each in judged]
     return {
         "seed": int(rows["seed"].iloc[0]),
         "rule": str(rows["rule"].iloc[0]),
-        "chosen": choose(judged),
+        "chosen": chosen,
+        "realism_within": float(np.mean(realism[realism["rung"] == chosen]["ratio"] <= MAX_REALISM_RATIO)),
         "passing": [each.rung for each in judged if each.passes],
         "rates": {name: rates[name] for name in (REAL, *names)},
         "lost": {name: recalls[REAL] - recalls[name] for name in names},
@@ -211,6 +219,7 @@ def _limits(families: dict[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
         "mean_share": float(np.mean([about["realism_within"] for about in learnt.values()])) if learnt else None,
         "of": len(learnt),
         "by_model": {name: _realism_of(name, families) for name in (REAL, *ARMS)},
+        "chosen": _realism_of_chosen(families),
     }
     found["choice"] = {rule: _choices(families, rule, rung) for rule in (PRESENT, *FORMER_RULES)}
     return found
@@ -271,6 +280,17 @@ def _within(rung: str, families: dict[str, Any], limits: Mapping[str, float]) ->
         if rung in about["rungs"]
     ]
     return {"kept": sum(kept), "of": len(kept)}
+
+
+def _realism_of_chosen(families: dict[str, Any]) -> dict[str, Any]:
+    """On how many families the noise that the present rule chooses keeps the limit of realism, on each seed that it judged."""
+    judged = {name: [each["realism_within"] for each in about["choices"] if each["rule"] == PRESENT] for name, about in families.items()}
+    worst = {name: min(shares) for name, shares in judged.items() if shares}
+    return {
+        "families_with_all": sum(share == 1 for share in worst.values()),
+        "missed": [name for name, share in worst.items() if share < 1],
+        "of": len(worst),
+    }
 
 
 def _realism_of(rung: str, families: dict[str, Any]) -> dict[str, Any]:

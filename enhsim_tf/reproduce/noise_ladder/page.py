@@ -105,7 +105,7 @@ def limits(found: Findings) -> str:
         f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows"
         f"{_losses(recall['lost_by_model'][kept['rung']])}{_other_losses(recall['lost_by_model'], kept['rung'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
-        f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.",
+        f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.{_of_chosen(realism['chosen'])}",
     ]
     if kept["choice"][PRESENT]["of"]:
         lines.append(_choice(kept["choice"][PRESENT], kept["rung"]))
@@ -135,6 +135,14 @@ def _choice(choice: Findings, learnt: str) -> str:
         f"windows ({worst.replace('_', ' ')}), and lose at most {100 * choice['lost'][least]:.1f} points of recall ({least.replace('_', ' ')})."
         f"{_below_real(choice)}"
     )
+
+
+def _of_chosen(realism: Findings) -> str:
+    """The same for the noise of the chosen models."""
+    if not realism["of"]:
+        return ""
+    missed = f"; not on {_families(realism['missed'])}" if realism["missed"] else ""
+    return f" The noise of the model that the rule chooses keeps the limit on {realism['families_with_all']} of {realism['of']} families{missed}."
 
 
 def _found_less(choice: Findings) -> str:
