@@ -115,7 +115,7 @@ def _unseen(noise: Findings | None) -> str:
     if any(len(each) < len(families) for each in excess.values()):
         return f"{said}, without the convolutional GAN so far."
     counts = sorted({len(about[rung]["seeds"]) for about in families.values() for rung in excess})
-    seeds = f"{counts[0]} seed{'s' * (counts[0] > 1)} for each model" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
+    seeds = f"{counts[0]} seed{'s' * (counts[0] > 1)} each" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
     parts = []
     for rung, each in excess.items():
         worst = max(each, key=each.__getitem__)
