@@ -245,7 +245,7 @@ def test_the_page_says_what_the_findings_say(tmp_path):
     assert "at most 3 points: 1 of 1 families; the largest excess is 2.1 points (bursts)" in text
     assert "bursts: 2 measures beyond three times the floor: energy (7.1 times its floor), rank (4.2 times its floor)." in text
     assert (
-        "two thirds are beyond reach: fresh real noise itself, one draw for each seed, keeps the limit on 0 of 1 families, and no model on more than 0."
+        "two thirds are beyond reach: fresh real noise itself, one draw for each seed, keeps the limit on 0 of 1 families, and the best model on 0."
         in text
     )
     assert (
