@@ -120,8 +120,8 @@ def test_windows_of_two_parts_are_disjoint():
     assert len(np.unique(WindowBootstrap.fit(windows.noise, windows.starts).generate(5, 1), axis=0)) == 5
 
 
-def test_a_classifier_hardly_sees_a_residual_twice(monkeypatch):
-    """Whole windows of a short record: only as many are generated as the classifier sees, and these share few samples."""
+def test_a_classifier_seldom_sees_a_residual_twice(monkeypatch):
+    """Whole windows of a short record: as many are generated as there are disjoint ones, and most of them share no sample."""
     halves = [np.lib.stride_tricks.sliding_window_view(half, 40) for half in np.arange(2_400.0).reshape(2, -1)]  # values are places
     learnt, judged = (NoiseWindows(each, np.zeros_like(each), np.arange(len(each))) for each in halves)
     judge = noise_fitting.HeldOutJudge(learnt, judged, NoiseTraining(1, 0, lambda clean: clean))
@@ -129,7 +129,7 @@ def test_a_classifier_hardly_sees_a_residual_twice(monkeypatch):
     monkeypatch.setattr(noise_fitting, "compare", lambda *groups: seen.append(groups[0].noise) or compare(*groups))
     judge.judge("residual windows", WindowBootstrap.fit(learnt.noise, learnt.starts))
     (drawn,) = seen
-    assert drawn.shape == (30, 40) and len(np.unique(drawn)) > 0.85 * drawn.size  # with replacement: 63 %
+    assert drawn.shape == (30, 40) and len(np.unique(drawn)) > 0.75 * drawn.size  # with replacement: 63 %
 
 
 @pytest.mark.usefixtures("no_networks")
