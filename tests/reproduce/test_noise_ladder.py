@@ -114,9 +114,11 @@ def test_the_summary_counts_what_a_table_says():
     detectors[-2]["recall"] = 0.46  # at own thresholds; at the real rate it is that of the others
     ratios = {"real": 1.0, "Gaussian": 4.0, "autoregressive network": 4.0}
     realism = [
-        {"family": row["family"], "seed": 1, "rung": row["rung"], "measure": "m", "value": 0.0, "ratio": ratios[row["rung"]]}
+        {"family": row["family"], "seed": 1, "rung": row["rung"], "measure": measure, "value": 0.0, "ratio": ratios[row["rung"]]}
         for row in detectors
+        for measure in ("m", "n")
     ]
+    realism[2]["ratio"] = realism[3]["ratio"] = 2.0  # Gaussian noise on white noise
     choice = [
         {
             "family": row["family"],
@@ -160,6 +162,8 @@ def test_the_summary_counts_what_a_table_says():
     assert figures._message(found["limits"]["within"], "autoregressive network") == (
         "Limits on false alarms are kept on 1 of 2 families with the autoregressive network"
     )
+    assert choice["realism_within"] == 1 and bursts["choices"][0]["realism_within"] == 0
+    assert found["limits"]["realism"]["chosen"] == {"families_with_all": 1, "missed": ["bursts"], "of": 2}
     assert found["limits"]["realism"]["by_model"]["real"] == {"families_with_all": 2, "of": 2, "mean_share": 1.0}
     assert found["limits"]["realism"]["by_model"]["convolutional GAN"] == {"families_with_all": 0, "of": 0, "mean_share": None}
 
@@ -224,6 +228,7 @@ def test_the_page_says_what_the_findings_say(tmp_path):
                 "seed": 7,
                 "rule": "present",
                 "chosen": "gaussian",
+                "realism_within": 0.6,
                 "passing": [],
                 "rates": {"real": 0.028, "gaussian": 0.026, "autoregression": 0.014, "autoregressive network": 0.021},
                 "lost": {"gaussian": 0.05, "autoregression": 0.04, "autoregressive network": 0.0},
@@ -256,8 +261,18 @@ def test_the_page_says_what_the_findings_say(tmp_path):
         "model flag at most -0.2 points more windows than after training on real windows (bursts), and lose at most 5.0 points of recall (bursts). On bursts noise, the chosen"
         in text
     )
+    assert "The noise of the model that the rule chooses keeps the limit on 0 of 1 families; not on bursts noise." in text
     assert "| autoregressive network | 0 of 1 | 50% |" in text
     assert text.count("\nold\n") == 1  # the part of the other experiment
+    simple = measured | {"excess": 0.001, "recall_difference": -0.04}
+    kinds["bursts"] = kinds["bursts"] | {"rungs": about["rungs"] | {"residual windows": simple}}
+    kinds["bursts"]["choices"][0]["realism_within"] = 1.0
+    fill_page(page, noise=found | {"families": kinds, "limits": findings._limits(kinds)})
+    text = page.read_text(encoding="utf-8")
+    assert (
+        "Of the models that keep the limits on false alarms everywhere: with residual windows 0 of 1, not on bursts (-4.0 points)." in text
+    )
+    assert "The noise of the model that the rule chooses keeps the limit on 1 of 1 families." in text
     kinds = {"quantised": kinds["bursts"] | {"half": "revised"}}
     fill_page(page, noise=found | {"families": kinds, "limits": findings._limits(kinds)})
     text = page.read_text(encoding="utf-8")
