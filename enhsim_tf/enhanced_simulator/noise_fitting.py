@@ -7,6 +7,7 @@ A chosen rung without a network is fitted again to all of the time.
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,7 @@ class NoiseWindows:
     clean: np.ndarray
     starts: np.ndarray | None = None
 
-    @property
+    @functools.cached_property
     def disjoint(self) -> "NoiseWindows":
         """Those windows that share no sample."""
         chosen, end = [], -np.inf
@@ -169,6 +170,7 @@ class HeldOutJudge:
         number = min(len(judged), len(learnt), MOST_JUDGED)
         rows, last = (np.linspace(0, len(each) - 1, number).astype(int) for each in (learnt, judged))
         self._learnt, self._held_out, self._training, self._clean = learnt, judged, training, learnt.clean[rows]
+        self._few = classified(self._clean, learnt, judged)
         signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[last])]
         _, *compared = compare(NoiseWindows(learnt.noise[rows], self._clean), learnt, judged)
         self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[last], signals, compared, seed=training.seed)
@@ -180,7 +182,7 @@ class HeldOutJudge:
             option: Name of its rung.
             model: The noise model.
         """
-        training, clean = self._training, self._clean
+        training = self._training
         rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
 
         def noise_on(clean: np.ndarray) -> np.ndarray:
@@ -188,8 +190,9 @@ class HeldOutJudge:
             generated = clean + ladder.generate(model, len(clean), rng, training.to_unit(clean))
             return (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
 
-        few = classified(clean, self._learnt, self._held_out)
-        return self._judge.judge(option, noise_on(clean), compare(NoiseWindows(noise_on(few), few), self._learnt, self._held_out)[0])
+        noise = noise_on(self._clean)
+        seen = compare(NoiseWindows(noise_on(self._few), self._few), self._learnt, self._held_out)[0]
+        return self._judge.judge(option, noise, seen)
 
 
 def classified(clean: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows) -> np.ndarray:
@@ -264,7 +267,9 @@ def auc_of(
         The AUC of `generated` and of `real` noise; empty if there are fewer than 20 pieces of each.
     """
     few = classified(clean, learnt, judged)
-    tried = compare(NoiseWindows(add_noise(few) - few, few), learnt, judged) if len(few) else [few]
+    if not len(few):
+        return {}
+    tried = compare(NoiseWindows(add_noise(few) - few, few), learnt, judged)
     if len(tried[0]) < _LEAST_JUDGED:
         return {}
     return {kind: boosted_trees(features, tried[2], seed).auc for kind, features in (("generated", tried[0]), ("real", tried[1]))}

@@ -26,7 +26,8 @@ class WindowBootstrap:
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
-        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap; models that were saved before say so of all.
+        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap, or it is not known, as in models that were
+            saved before.
 
     Raises:
         InputError: If there is no window, a value is not finite, or `starts` are not a whole number for each window.
@@ -64,7 +65,8 @@ class MatchedWindowBootstrap:
     noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
     whose signal is the same. The distance of two signals is that of their means over 64 segments. The idea, and the number of
     neighbours, are those of the nearest-neighbour bootstrap of Lall and Sharma (1996), which resamples the successors of similar
-    pasts instead. Of these windows, one is drawn as by `WindowBootstrap`. If the signal never repeats, the nearest windows can be few stretches of the record.
+    pasts instead. Of these windows, one is drawn as by `WindowBootstrap`. If the signal never repeats, the nearest windows can be few
+    stretches of the record.
 
     In a longer series, the mean of the candidates, which neighbouring windows have in common, is cross-faded with weights that add
     up to one, and the rest as by `WindowBootstrap`.

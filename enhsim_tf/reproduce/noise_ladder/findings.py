@@ -42,9 +42,10 @@ _FORMS = {
     "matched residual windows": (_REPLACED,),
     _NETWORK: ("third form", "second form", "first form"),
 }
-FORMER = tuple(f"{rung}, {form}" for rung, forms in _FORMS.items() for form in forms)
+_FORMER_OF = {rung: tuple(f"{rung}, {form}" for form in _FORMS.get(rung, ())) for rung in RUNGS}
+FORMER = tuple(name for names in _FORMER_OF.values() for name in names)
 """Rows of models on the seeds of the former rules, before the models were changed."""
-ARMS = tuple(name for rung in RUNGS for name in (rung, *(f"{rung}, {form}" for form in _FORMS.get(rung, ()))))
+ARMS = tuple(name for rung in RUNGS for name in (rung, *_FORMER_OF[rung]))
 """The rungs of the ladder and the former models, the simplest first."""
 
 
@@ -266,9 +267,7 @@ def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
         "excess": excess,
         "lost": lost,
         "none_passes": [name for name, choices in judged.items() if not all(each["passing"] for each in choices)],
-        "learnt_passes": sum(
-            all(any(name.partition(",")[0] == rung for name in each["passing"]) for each in choices) for choices in judged.values()
-        ),
+        "learnt_passes": sum(all({rung, *_FORMER_OF[rung]} & set(each["passing"]) for each in choices) for choices in judged.values()),
     }
 
 

@@ -138,7 +138,7 @@ def _choice(choice: Findings, learnt: str) -> str:
 
 
 def _other_recalls(found: Findings, limit: float) -> str:
-    """Where other present models miss the limit on recall at the real rate. Models that raise far too many alarms are not told."""
+    """Where those other present models miss the limit on recall at the real rate that keep the limits on false alarms on every family."""
     kept, told = found["limits"], []
     for name, about in kept["within"].items():
         if name in FORMER or name == kept["rung"] or about["kept"] < about["of"]:
@@ -146,7 +146,7 @@ def _other_recalls(found: Findings, limit: float) -> str:
         own = {family: about["rungs"][name]["recall_difference"] for family, about in found["families"].items() if name in about["rungs"]}
         missed = {family: value for family, value in own.items() if abs(value) > limit}
         if own:
-            told.append(f"with {name} {len(own) - len(missed)} of {len(own)}{_differences(missed).replace(';', ',')}")
+            told.append(f"with {name} {len(own) - len(missed)} of {len(own)}{_differences(missed, mark=',')}")
     return f" Of the models that keep the limits on false alarms everywhere: {'; '.join(told)}." if told else ""
 
 
@@ -191,11 +191,11 @@ def _families(names: Sequence[str]) -> str:
     return in_list([name.replace("_", " ") for name in names]) + " noise" if names else "no family"
 
 
-def _differences(missed: Findings, digits: int = 1) -> str:
+def _differences(missed: Findings, digits: int = 1, mark: str = ";") -> str:
     """The families that miss a limit, with their differences in points."""
     if not missed:
         return ""
-    return "; not on " + in_list([f"{name.replace('_', ' ')} ({100 * value:+.{digits}f} points)" for name, value in missed.items()])
+    return f"{mark} not on " + in_list([f"{name.replace('_', ' ')} ({100 * value:+.{digits}f} points)" for name, value in missed.items()])
 
 
 def _losses(lost: Findings) -> str:
