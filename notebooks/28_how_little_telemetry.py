@@ -334,28 +334,42 @@ for environment, about in found["environments"].items():
 # The noise models above have few parameters, or none. A network has thousands. What does it learn from as few real windows? The networks
 # take minutes each, so they have fewer seeds than the other methods. They are compared with them on the same seeds.
 
+
 # %%
+def networks_of(group):
+    """The noise networks of a group of methods that have the same seeds."""
+    return [arm for arm in group["names"] if arm.startswith("simulator + ")]
+
+
 for environment, about in found["environments"].items():
-    few = about.get("few_seeds", {"arms": {}, "best_detector": {}, "seeds": []})
-    networks = [arm for arm, other in about["others_pay"].items() if arm.startswith("simulator + ")]
-    numbers = sorted({number for arm in networks for number in about["others_pay"][arm]["tried"]})
-    for number in numbers:
-        rates = {
-            arm: few["arms"][arm]["rate"][str(number)]
-            for arm in ("real", *about["pays"], *networks)
-            if str(number) in few["arms"][arm]["rate"]
-        }
-        best = min((arm for arm in rates if arm not in networks), key=lambda arm: abs(rates[arm] - RATE))
-        say(
-            f"**{environment}**, {number:,} real windows, seeds {', '.join(map(str, few['seeds']))}, false alarms: "
-            + ", ".join(
-                f"{arm.removeprefix('simulator + ')} **{rates[arm]:.1%}**" for arm in networks if arm in rates
+    groups = [group for group in about["few_seeds"] if networks_of(group)]
+    for group in groups:
+        networks = networks_of(group)
+        tried = [
+            number
+            for number in found["numbers"]
+            if any(str(number) in group["arms"][arm]["rate"] for arm in networks)
+        ]
+        for number in tried:
+            rates = {
+                arm: group["arms"][arm]["rate"][str(number)]
+                for arm in ("real", *about["pays"], *networks)
+                if str(number) in group["arms"][arm]["rate"]
+            }
+            best = min((arm for arm in rates if arm not in networks), key=lambda arm: abs(rates[arm] - RATE))
+            say(
+                f"**{environment}**, {number:,} real windows, {'seeds' if len(group['seeds']) > 1 else 'seed'} "
+                f"{', '.join(map(str, group['seeds']))}, false alarms: "
+                + ", ".join(
+                    f"{arm.removeprefix('simulator + ')} **{rates[arm]:.1%}**"
+                    for arm in networks
+                    if arm in rates
+                )
+                + f"; real windows alone {rates['real']:.1%}; nearest to {RATE:.0%} without a network: "
+                + f"{best.removeprefix('simulator + ')} {rates[best]:.1%}."
             )
-            + f"; real windows alone {rates['real']:.1%}; nearest to {RATE:.0%} without a network: "
-            + f"{best.removeprefix('simulator + ')} {rates[best]:.1%}."
-        )
-        assert set(about["pays"]) | {"real"} <= set(rates)
-    if not numbers:
+            assert set(about["pays"]) | {"real"} <= set(rates)
+    if not groups:
         say(f"The published table has no noise network for {environment} noise.")
 
 # %% [markdown]
@@ -368,12 +382,13 @@ for environment, about in found["environments"].items():
 simple, learnt = "simulator + autoregression", "simulator + autoregressive network"
 gaps = {}
 for environment in ("white", "autoregressive"):
-    arms = found["environments"][environment].get("few_seeds", {"arms": {}})["arms"]
-    for number in arms.get(learnt, {}).get("excess", {}):
-        gap = arms[learnt]["excess"][number] - arms[simple]["excess"][number]
-        gaps[f"{environment}, {int(number):,} windows"] = gap
+    for group in found["environments"][environment]["few_seeds"]:
+        if learnt in group["names"]:
+            arms, num_seeds = group["arms"], len(group["seeds"])
+            for number, excess in arms[learnt]["excess"].items():
+                gaps[f"{environment}, {int(number):,} windows"] = excess - arms[simple]["excess"][number]
 say(
-    "Share of flagged nominal windows with the network minus that with the autoregression, one seed: "
+    f"Share of flagged nominal windows with the network minus that with the autoregression, means over {num_seeds} seeds: "
     + "; ".join(f"{name} **{100 * gap:+.1f} points**" for name, gap in gaps.items())
     + "."
 )
@@ -389,9 +404,16 @@ assert all(np.isfinite(gap) for gap in gaps.values())
 # %%
 both = ("classifier", "classifier without simulator")
 gains = []
+
+
+def best_detectors(about):
+    """On the seeds of the classifiers: the detector that finds most of those that have seen no anomaly, by number of windows."""
+    return next((group["best_detector"] for group in about["few_seeds"] if both[0] in group["names"]), {})
+
+
 for environment, about in found["environments"].items():
     with_it, without = (about["arms"].get(arm, {}).get("recall_at_real_rate", {}) for arm in both)
-    single = about.get("few_seeds", {"best_detector": {}})["best_detector"]
+    single = best_detectors(about)
     shared = [number for number in found["numbers"] if str(number) in with_it and str(number) in without]
     for number in shared:
         gains.append(with_it[str(number)] - without[str(number)])
@@ -425,7 +447,7 @@ else:
 
 # %%
 for environment, about in found["environments"].items():
-    for number, best in about.get("few_seeds", {"best_detector": {}})["best_detector"].items():
+    for number, best in best_detectors(about).items():
         classifiers = {
             arm: about["arms"][arm]["recall_at_real_rate"][number]
             for arm in (*both, "domain-adversarial")

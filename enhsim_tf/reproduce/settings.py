@@ -236,16 +236,27 @@ class CurveSettings:
     num_windows: int = setting(1_500, "windows", f"{OUR_CHOICE}: most windows for training, as many as the paper's enhancer", smoke=60)
     num_judged: int = setting(1_000, "windows", f"{OUR_CHOICE}: disjoint test windows, and as many for the matched rate", smoke=40)
     num_anomalous: int = setting(60, "windows", f"{OUR_CHOICE}: test windows with an anomaly of each kind", smoke=6)
+
+
+@dataclasses.dataclass(frozen=True)
+class CurveNetworkSettings:
+    """Networks of the experiment on how few real windows suffice. They take minutes each, so they have fewer seeds than its other arms."""
+
+    num_seeds: int = setting(2, "seeds", f"{OUR_CHOICE}: the first seeds; of the autoregressive network", smoke=1)
+    num_real: tuple[int, ...] = setting(
+        (5, 10, 20, 50, 100),
+        "windows",
+        f"{OUR_CHOICE}: from which the autoregressive network learns; more suffice alone on most noise",
+        smoke=(20,),
+    )
     num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
+    num_slow_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; of the GANs and the classifiers")
+    num_real_gans: tuple[int, ...] = setting((20,), "windows", f"{OUR_CHOICE}: from which the GANs learn")
     gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
-    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
-    num_network_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; classifiers and noise networks take minutes", smoke=1)
     num_real_classifiers: tuple[int, ...] = setting(
         (20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
     )
-    num_real_networks: tuple[int, ...] = setting(
-        (20,), "windows", f"{OUR_CHOICE}: the numbers of real windows from which noise networks learn"
-    )
+    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -306,6 +317,7 @@ class Settings:
     factorial: FactorialSettings = FactorialSettings()
     ladder: LadderSettings = LadderSettings()
     curve: CurveSettings = CurveSettings()
+    curve_networks: CurveNetworkSettings = CurveNetworkSettings()
     labelled: LabelledSettings = LabelledSettings()
     battery: BatterySettings = BatterySettings()
     budget: str = "full"

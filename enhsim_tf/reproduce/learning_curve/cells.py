@@ -75,8 +75,8 @@ class World:
         curve, interval_s = self.settings.curve, self.settings.telemetry.interval_s
         first = self.length - num_real * self.window
         telemetry = Telemetry(self.values[first : self.length], interval_s, name="record", offset_s=first * interval_s)
-        seed = self.settings.seed
-        return Record(telemetry, self.coarse, self.window, curve.num_windows, seed, curve.num_iterations, curve.gan_iterations)
+        seed, networks = self.settings.seed, self.settings.curve_networks
+        return Record(telemetry, self.coarse, self.window, curve.num_windows, seed, networks.num_iterations, networks.gan_iterations)
 
     @functools.cached_property
     def judged(self) -> dict[str, np.ndarray]:
@@ -120,15 +120,21 @@ class Cell:
         """
         import pandas as pd
 
-        chosen, curve, frames = self.world.settings, self.world.settings.curve, []
+        chosen, frames = self.world.settings, []
+        curve, networks = chosen.curve, chosen.curve_networks
         number = chosen.seed - curve.first_seed
         groups: dict[str, Callable[[], list[dict]]] = {"windows": self._without_networks}
-        if number < curve.num_network_seeds and self.num_real in curve.num_real_classifiers:
+        if number < networks.num_slow_seeds and self.num_real in networks.num_real_classifiers:
             groups["classifiers"] = self._classifiers
-        if number < curve.num_network_seeds and self.num_real in curve.num_real_networks:
-            groups |= {rung: functools.partial(self._simulated, (rung,)) for rung in rungs if rung not in CHEAP_RUNGS}
+        for rung in (rung for rung in rungs if rung not in CHEAP_RUNGS):
+            seeds, tried = (networks.num_slow_seeds, networks.num_real_gans) if "GAN" in rung else (networks.num_seeds, networks.num_real)
+            if number < seeds and self.num_real in tried:
+                groups[rung] = functools.partial(self._simulated, (rung,))
         # which seeds and numbers are computed does not affect a cell
-        same = dataclasses.replace(curve, num_seeds=0, first_seed=0, num_network_seeds=0, num_real_classifiers=(), num_real_networks=())
+        same = (
+            dataclasses.replace(curve, num_seeds=0, first_seed=0),
+            dataclasses.replace(networks, num_seeds=0, num_real=(), num_slow_seeds=0, num_real_gans=(), num_real_classifiers=()),
+        )
         for name, compute in groups.items():
             depends = (name, self.num_real, chosen.telemetry, same, chosen.seed, self.rate)
 
@@ -181,7 +187,7 @@ class Cell:
     def _classifiers(self) -> list[dict]:
         from enhsim_tf.reproduce.learning_curve.domain_adversarial import AnomalyClassifier
 
-        real, steps, found = self.record.windows, self.world.settings.curve.num_steps, []
+        real, steps, found = self.record.windows, self.world.settings.curve_networks.num_steps, []
         generated = self.record.generate(WHOLE_WINDOWS, self.number, _FRESH)
 
         def trained(nominal: np.ndarray, adaptation: float = 0.0) -> Detector:

@@ -51,7 +51,8 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         For each environment and arm its curves over the number of real windows; for each environment the numbers of real windows at
         which each simulator arm pays, those at which other methods do by the same rule, and the smallest number from which the real
         windows suffice. With classifiers, also by how much a classifier of injected anomalies finds more if it learns from the
-        simulator instead of the real windows. Arms with fewer seeds than the others also stand beside the others on the same seeds.
+        simulator instead of the real windows. Arms with fewer seeds than the others also stand beside the others on the same seeds, in a
+        group for each set of seeds.
     """
     rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
     numbers = sorted({int(number) for number in rows["num_real"]})
@@ -83,8 +84,10 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         if {CLASSIFIER, CLASSIFIER_ON_REAL} <= set(arms):
             gains = {arm: _gain(own, arm, numbers) for arm in (CLASSIFIER, ADVERSARIAL) if arm in arms}
             environments[environment]["classifiers"] = gains
-        if few := [arm for arm in arms if most_seeds(arms[arm]) < most_seeds(real)]:
-            environments[environment]["few_seeds"] = _few_seeds(own, few, [REAL, *simulators], numbers)
+        few: dict[tuple[int, ...], list[str]] = {}
+        for arm in (arm for arm in arms if most_seeds(arms[arm]) < most_seeds(real)):
+            few.setdefault(tuple(sorted({int(seed) for seed in own[own["arm"] == arm]["seed"]})), []).append(arm)
+        environments[environment]["few_seeds"] = [_few_seeds(own, names, [REAL, *simulators], numbers) for names in few.values()]
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
 

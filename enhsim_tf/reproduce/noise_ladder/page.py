@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.reproduce.learning_curve.arms import CLASSIFIER
 from enhsim_tf.reproduce.noise_gallery import GALLERY
 from enhsim_tf.reproduce.noise_ladder.findings import ARMS, FORMER, FORMER_RULES, MAX_RECALL_DIFFERENCE, PRESENT, REAL, fewer_seeds
 from enhsim_tf.reproduce.publish.results import fill_parts
@@ -277,7 +278,7 @@ def learning_curve(found: Findings) -> str:
 
 def _of_few_seeds(about: Findings) -> list[str]:
     """The arms of an environment that have fewer seeds than the others."""
-    return about["few_seeds"]["names"] if "few_seeds" in about else []
+    return [name for group in about["few_seeds"] for name in group["names"]]
 
 
 def _counted(number: int, what: str) -> str:
@@ -300,19 +301,30 @@ def _curve_table(environments: Mapping[str, Findings], numbers: Sequence[int], w
 
 
 def _few_seeds(found: Findings) -> list[str]:
-    """The arms with fewer seeds, beside the others on the same seeds."""
-    environments = {name: about["few_seeds"] for name, about in found["environments"].items() if "few_seeds" in about}
-    if not environments:
-        return []
-    seeds = sorted({seed for about in environments.values() for seed in about["seeds"]})
-    tried = [number for number in found["numbers"] if any(str(number) in about["best_detector"] for about in environments.values())]
-    rows = _curve_table({name: about["arms"] for name, about in environments.items()}, tried)
-    scope = (
-        f"Noise networks and classifiers take minutes each and have {_counted(len(seeds), 'seed')} ({', '.join(map(str, seeds))}). "
-        f"The same table for {'this seed' if len(seeds) == 1 else 'these seeds'} alone:"
-    )
+    """The arms with fewer seeds, beside the others on the same seeds: a table for each set of seeds."""
+    by_seeds: dict[tuple[int, ...], dict[str, Findings]] = {}
+    for name, about in found["environments"].items():
+        for group in about["few_seeds"]:
+            by_seeds.setdefault(tuple(group["seeds"]), {})[name] = group
+    lines = []
+    for seeds, groups in by_seeds.items():
+        tried = [number for number in found["numbers"] if any(str(number) in group["best_detector"] for group in groups.values())]
+        rows = _curve_table({name: group["arms"] for name, group in groups.items()}, tried)
+        names = list(dict.fromkeys(name for group in groups.values() for name in group["names"]))
+        scope = (
+            f"{_counted(len(seeds), 'seed').capitalize()} ({in_list([str(seed) for seed in seeds])}): {in_list(names)}. "
+            f"The same table for {'this seed' if len(seeds) == 1 else 'these seeds'} alone:"
+        )
+        lines += ["", scope, "", *rows]
+        if CLASSIFIER in names:
+            lines += ["", *_best_detectors(groups)]
+    return lines
+
+
+def _best_detectors(groups: Mapping[str, Findings]) -> list[str]:
+    """Beside the classifiers: the detector that finds most of all that have seen no anomaly."""
     best = []
-    for name, about in environments.items():
+    for name, about in groups.items():
         told = [
             f"{_counted(int(number), 'window')}: {each['name']} {100 * each['recall_at_real_rate']:.0f} %"
             for number, each in about["best_detector"].items()
@@ -321,7 +333,7 @@ def _few_seeds(found: Findings) -> list[str]:
     head = (
         "A row of detectors is a mean. The single detector that finds most, at 1 % false alarms, after training on the real windows alone:"
     )
-    return ["", scope, "", *rows, "", head, "", *best]
+    return [head, "", *best]
 
 
 def _others(found: Findings) -> list[str]:

@@ -95,18 +95,10 @@ def test_a_classifier_finds_what_it_was_taught(adaptation):
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory):
     """The rows of one tiny cell, and of the same cell from the cache."""
-    counts = {
-        "num_real": (6,),
-        "num_real_networks": (6,),
-        "num_real_classifiers": (6,),
-        "first_seed": 3,
-        "num_windows": 30,
-        "num_judged": 20,
-        "num_anomalous": 6,
-        "num_steps": 3,
-        "num_iterations": 2,
-    }
+    counts = {"num_real": (6,), "first_seed": 3, "num_windows": 30, "num_judged": 20, "num_anomalous": 6}
+    networks = {"num_real": (6,), "num_real_classifiers": (6,), "num_real_gans": (), "num_steps": 3, "num_iterations": 2}
     changed = {f"curve__{name}": value for name, value in counts.items()}
+    changed |= {f"curve_networks__{name}": value for name, value in networks.items()}
     settings = make_settings("smoke", 3, telemetry__window=48, telemetry__noise="shot", **changed)
     cache, told = tmp_path_factory.mktemp("cache"), []
     return [Cell(World(settings), 6).rows(("autoregressive network",), Stages(cache, tell=told.append)) for _ in range(2)]
@@ -186,7 +178,7 @@ def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seed
         1,
     )  # on seed 1 the real windows have excesses of 10 and 2 points
     assert other["cannot"] == []
-    few = white["few_seeds"]
+    (few,) = white["few_seeds"]
     assert few["names"] == [SIMULATOR + "autoregressive network"]
     assert few["seeds"] == [1] and list(few["arms"]) == [REAL, SIMULATOR + "Gaussian", SIMULATOR + "autoregressive network"]
     assert few["arms"][REAL]["rate"] == {"5": 0.11, "20": 0.03} and white["arms"][REAL]["rate"] == near({"5": 0.06, "20": 0.02})
@@ -194,8 +186,34 @@ def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seed
     text = page.learning_curve(found)
     assert "simulator + autoregressive network (1 seed). They pay only here:" in text
     assert "| white | real | 6.0 / 60 | 2.0 / 60 |" in text and "| white | real | 11.0 / 60 | 3.0 / 60 |" in text
-    assert text.count("| white | simulator + autoregressive network |") == 1 and "- white: 5 windows: a 60 %; 20 windows: a 60 %." in text
+    assert text.count("| white | simulator + autoregressive network |") == 1
+    assert "1 seed (1): simulator + autoregressive network. The same table for this seed alone:" in text
     assert "With 20 windows and its own thresholds it finds 50 % of the anomalies; training on the real windows alone finds 50 %." in text
+
+
+def test_arms_with_different_seeds_are_compared_with_the_real_windows_of_their_own_seeds(near):
+    rows = table({5: 0.11, 20: 0.03}, {5: 0.06, 20: 0.021})["rows"]
+    parts = []
+    for seed, alarms in ((1, 110), (2, 50), (3, 20)):  # of the real windows, with 5 and with 20 windows
+        own = rows.assign(seed=seed)
+        own.loc[own["arm"] == REAL, "alarms"] = alarms
+        other = own[own["arm"] != REAL]
+        parts.append(own)
+        if seed <= 2:
+            parts.append(other.assign(arm=SIMULATOR + "autoregressive network", alarms=10))
+        if seed == 1:
+            parts.append(other[other["num_real"] == 20].assign(arm=CLASSIFIER, alarms=10))
+    found = findings.summarise({"rows": pd.concat(parts, ignore_index=True)})
+    network, classifier = found["environments"]["white"]["few_seeds"]
+    assert (network["names"], network["seeds"]) == ([SIMULATOR + "autoregressive network"], [1, 2])
+    assert (classifier["names"], classifier["seeds"]) == ([CLASSIFIER], [1])
+    assert network["arms"][REAL]["rate"] == near({"5": 0.08, "20": 0.08})  # the mean of seeds 1 and 2
+    assert classifier["arms"][REAL]["rate"] == near({"20": 0.11})  # seed 1, and only where there is a classifier
+    text = page.learning_curve(found)
+    assert "2 seeds (1 and 2): simulator + autoregressive network. The same table for these seeds alone:" in text
+    assert "1 seed (1): classifier. The same table for this seed alone:" in text
+    assert "| white | real | 8.0 / 60 | 8.0 / 60 |" in text and "| white | real | 11.0 / 60 |" in text
+    assert text.count("The single detector that finds most") == 1 and "- white: 20 windows: a 60 %." in text
 
 
 def test_where_real_windows_suffice_on_the_seeds_of_a_network_the_page_says_that_it_cannot_pay():
