@@ -123,6 +123,7 @@ def limits(found: Findings) -> str:
 def _choice(choice: Findings, learnt: str) -> str:
     """How far the choice of the present rule is from the best model."""
     worst, least = (max(choice[measure], key=choice[measure].__getitem__) for measure in ("excess", "lost"))
+    on_a_seed, on_each_seed = (" on at least one seed", " on each seed") if len(choice["seeds"]) > 1 else ("", "")
     models = f"{' or '.join(map(str, choice['judged']))} models{' in the mean over seeds' * (len(choice['seeds']) > 1)}"
     return (
         f"- Excess of the model that the rule chooses within {100 * choice['limit']:g} points of that of the best of {models} "
@@ -131,8 +132,9 @@ def _choice(choice: Findings, learnt: str) -> str:
         f"{choice['kept_that_finds']} of {choice['of']} families{_found_less(choice)}. If a best model with fewer alarms than "
         f"after training on real windows counts as these: {choice['kept_above_real']} of {choice['of']} families"
         f"{_differences(choice['missed_above_real'])}. On "
-        f"{_families(choice['none_passes'])}, no model passes, and the smallest departure decides. The {learnt} passes on {choice['learnt_passes']} "
-        f"families. Detectors trained with the chosen model flag at most {100 * choice['excess'][worst]:.1f} points more windows than after training on real "
+        f"{_families(choice['none_passes'])}, no model passes{on_a_seed}, and the smallest departure decides. The {learnt} passes on "
+        f"{choice['learnt_passes']} families{on_each_seed}. "
+        f"Detectors trained with the chosen model flag at most {100 * choice['excess'][worst]:.1f} points more windows than after training on real "
         f"windows ({worst.replace('_', ' ')}), and lose at most {100 * choice['lost'][least]:.1f} points of recall ({least.replace('_', ' ')})."
         f"{_below_real(choice)}"
     )

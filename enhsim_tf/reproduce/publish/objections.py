@@ -103,7 +103,7 @@ def _factorial(found: Findings, factorial: Findings | None) -> str:
 def _unseen(noise: Findings | None) -> str:
     said = (
         "Right. The design was chosen on other seeds of the same four processes, so the statements of this report are limited to these processes. "
-        "The [experiment on noise](noise.md) tries all noise models on families of noise for which no design was chosen"
+        "The [experiment on noise](noise.md) tries all noise models on families for which no design was chosen"
     )
     if noise is None:
         return f"{said}; it has not been run."
@@ -135,7 +135,7 @@ def _missing(factorial: Findings | None, labelled: Findings | None) -> str:
     channels = "open" if labelled is None else f"done for {len(labelled['channels'])} of the published channels"
     return (
         f"(1) A pipeline without any network: {first}. (2) Noise that no design was chosen for: done, [noise.md](noise.md). (3) A learning curve over the number of real "
-        f"windows: done, noise networks with 20 windows and one seed only, [noise.md](noise.md). "
+        f"windows: done, noise networks on few seeds only, [noise.md](noise.md). "
         f"(4) The factorial: {runs}. (5) All labelled channels with equal data at matched false-alarm rates: {channels}. "
         "(6) Thresholds set on few real windows: done, [noise.md](noise.md). (7) Several channels with correlated noise: open."
     )
