@@ -362,16 +362,14 @@ def _others(found: Findings) -> list[str]:
 
 def _impossible(found: Findings) -> str:
     """Where noise networks cannot pay, because on their seeds the real windows alone have no excess to halve."""
-    cannot = {
-        f"{name} noise ({_numbers(other['cannot'])} windows)": None
-        for name, about in found["environments"].items()
-        for arm, other in about["others_pay"].items()
-        if arm in _of_few_seeds(about) and other["cannot"]
-    }
-    said = in_list(list(cannot))
-    return (
-        f" On the seeds of the noise networks, the real windows alone suffice on {said}, so that nothing could pay there." if cannot else ""
-    )
+    cannot: dict[tuple[int, ...], dict[str, None]] = {}
+    for name, about in found["environments"].items():
+        for group in about["few_seeds"]:
+            for other in (about["others_pay"][arm] for arm in group["names"] if arm in about["others_pay"]):
+                if other["cannot"]:
+                    cannot.setdefault(tuple(group["seeds"]), {})[f"{name} noise ({_numbers(other['cannot'])} windows)"] = None
+    said = [f"on {_seeds(seeds)}, the real windows alone suffice on {in_list(list(places))}" for seeds, places in cannot.items()]
+    return f" Noise networks cannot pay where real windows suffice: {'; '.join(said)}." if said else ""
 
 
 def _classifiers(found: Findings) -> list[str]:

@@ -222,7 +222,8 @@ def test_where_real_windows_suffice_on_the_seeds_of_a_network_the_page_says_that
     both = _with_another_seed({"rows": pd.concat([tables["rows"], network], ignore_index=True)}, SIMULATOR + "autoregressive network")
     found = findings.summarise(both)
     assert found["environments"]["white"]["others_pay"][SIMULATOR + "autoregressive network"]["cannot"] == [20]
-    assert "the real windows alone suffice on white noise (20 windows), so that nothing could pay there." in page.learning_curve(found)
+    said = "Noise networks cannot pay where real windows suffice: on seed 1, the real windows alone suffice on white noise (20 windows)."
+    assert said in page.learning_curve(found)
 
 
 def test_methods_without_a_simulator_are_held_to_the_same_rule():
