@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from enhsim_tf.common.atomic_files import write_json
-from enhsim_tf.reproduce.publish import results
+from enhsim_tf.reproduce.publish import practice, results
 from enhsim_tf.reproduce.settings import deviations, make_settings
 
 ROOT = Path(__file__).parents[2]
@@ -297,3 +297,13 @@ def test_the_repositorys_pages_are_up_to_date(tmp_path):
     for name in names:
         assert (tmp_path / name).read_text(encoding="utf-8") == (ROOT / name).read_text(encoding="utf-8"), name
     assert json.loads((ROOT / "figures" / "results.json").read_text(encoding="utf-8"))["budget"] == "full"
+
+
+def test_it_is_said_where_only_noise_of_a_network_pays():
+    environments = {
+        "white": {"others_pay": {"simulator + autoregressive network": {"pays": [5], "seeds": 2}}},
+        "shot": {"others_pay": {"CORAL": {"pays": [5], "seeds": 2}, "simulator + autoregressive network": {"pays": [5, 10], "seeds": 2}}},
+    }
+    said = practice._learnt_pays(environments, {"white"})
+    assert said == ". By the same rule, these pay there: simulator + autoregressive network with 5 and 10 windows on shot noise (2 seeds)"
+    assert practice._learnt_pays(environments, {"white", "shot"}) == ""

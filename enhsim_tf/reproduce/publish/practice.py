@@ -5,11 +5,12 @@ sentence says so.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from enhsim_tf.reproduce.caption import in_seeds
 from enhsim_tf.reproduce.factorial.cells import WITHOUT_NETWORK
+from enhsim_tf.reproduce.learning_curve.arms import SIMULATOR
 from enhsim_tf.reproduce.publish.wording import Findings, in_list, interval, mean_of, modes_tried, modes_where_better, per_cent, points
 from enhsim_tf.reproduce.robustness.targets import MARGIN
 from enhsim_tf.reproduce.spacecraft.study import DEGRADED_ARM, GENERATED_ARM
@@ -249,9 +250,22 @@ def _few_windows(curve: Findings | None) -> tuple[str, str]:
     behind = (
         f"The autoregression, which is not a network, pays {where} ({in_seeds(curve['seeds'])}; in brackets the 10 % and 90 % quantiles over seeds; [details](noise.md)). "
         f"With {least} windows of {first} noise, resampled residual windows give {rates[RESAMPLED]}. Recall at a matched false-alarm rate is {in_list(recall)}, so most of "
-        f"the gain is a better threshold.{_simpler(curve['environments'][first], str(least))} On the other noises no simulator pays. "
+        f"the gain is a better threshold.{_simpler(curve['environments'][first], str(least))} On the other noises no simulator with a simple noise model "
+        f"pays{_learnt_pays(curve['environments'], {name for names in pays.values() for name in names})}. "
     )
     return clause, behind
+
+
+def _learnt_pays(environments: Mapping[str, Findings], others: Collection[str]) -> str:
+    """Where a simulator with noise of a network pays by the same rule, except in the environments where a simple model does."""
+    told = [
+        f"{arm} with {in_list([f'{number:,}' for number in other['pays']])} windows on {name} noise ({in_seeds(range(other['seeds']))})"
+        for name, about in environments.items()
+        if name not in others
+        for arm, other in about["others_pay"].items()
+        if arm.startswith(SIMULATOR) and other["pays"]
+    ]
+    return f". By the same rule, these pay there: {in_list(told)}" if told else ""
 
 
 def _simpler(about: Findings, least: str) -> str:
