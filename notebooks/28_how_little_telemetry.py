@@ -341,6 +341,12 @@ def networks_of(group):
     return [arm for arm in group["names"] if arm.startswith("simulator + ")]
 
 
+def group_with(about, arm):
+    """The group of methods that have the same seeds as a method; an empty one if the method was not tried."""
+    empty = {"names": [], "seeds": [], "arms": {}, "best_detector": {}}
+    return next((group for group in about["few_seeds"] if arm in group["names"]), empty)
+
+
 for environment, about in found["environments"].items():
     groups = [group for group in about["few_seeds"] if networks_of(group)]
     for group in groups:
@@ -382,13 +388,11 @@ for environment, about in found["environments"].items():
 simple, learnt = "simulator + autoregression", "simulator + autoregressive network"
 gaps = {}
 for environment in ("white", "autoregressive"):
-    for group in found["environments"][environment]["few_seeds"]:
-        if learnt in group["names"]:
-            arms, num_seeds = group["arms"], len(group["seeds"])
-            for number, excess in arms[learnt]["excess"].items():
-                gaps[f"{environment}, {int(number):,} windows"] = excess - arms[simple]["excess"][number]
+    arms = group_with(found["environments"][environment], learnt)["arms"]
+    for number, excess in arms.get(learnt, {}).get("excess", {}).items():
+        gaps[f"{environment}, {int(number):,} windows"] = excess - arms[simple]["excess"][number]
 say(
-    f"Share of flagged nominal windows with the network minus that with the autoregression, means over {num_seeds} seeds: "
+    "Share of flagged nominal windows with the network minus that with the autoregression, means over the seeds of the network: "
     + "; ".join(f"{name} **{100 * gap:+.1f} points**" for name, gap in gaps.items())
     + "."
 )
@@ -404,16 +408,9 @@ assert all(np.isfinite(gap) for gap in gaps.values())
 # %%
 both = ("classifier", "classifier without simulator")
 gains = []
-
-
-def best_detectors(about):
-    """On the seeds of the classifiers: the detector that finds most of those that have seen no anomaly, by number of windows."""
-    return next((group["best_detector"] for group in about["few_seeds"] if both[0] in group["names"]), {})
-
-
 for environment, about in found["environments"].items():
     with_it, without = (about["arms"].get(arm, {}).get("recall_at_real_rate", {}) for arm in both)
-    single = best_detectors(about)
+    single = group_with(about, both[0])["best_detector"]
     shared = [number for number in found["numbers"] if str(number) in with_it and str(number) in without]
     for number in shared:
         gains.append(with_it[str(number)] - without[str(number)])
@@ -447,7 +444,7 @@ else:
 
 # %%
 for environment, about in found["environments"].items():
-    for number, best in best_detectors(about).items():
+    for number, best in group_with(about, both[0])["best_detector"].items():
         classifiers = {
             arm: about["arms"][arm]["recall_at_real_rate"][number]
             for arm in (*both, "domain-adversarial")

@@ -17,7 +17,7 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import noise_choice
 from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import BY_OPTION, FOLLOWERS, NETWORKS, STREAMS
+from enhsim_tf.noise.rung_names import BY_OPTION, FOLLOWERS, GANS, NETWORKS, STREAMS
 from enhsim_tf.realism.two_sample import boosted_trees
 from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.telemetry.quantisation import Levels
@@ -115,7 +115,7 @@ def fit_noise(option: str, windows: NoiseWindows, training: NoiseTraining, notes
     Raises:
         InputError: If the rung cannot be fitted to this noise.
     """
-    is_adversarial = option in ("paper", "convolutional")
+    is_adversarial = option in GANS
     number = training.num_iterations * (1 if is_adversarial else 3)
     name = "noise GAN, iteration" if is_adversarial else "noise network, iteration"
     count = training.progress.loop(name, number) if option in NETWORKS else None

@@ -11,7 +11,11 @@ BY_OPTION = {
     "convolutional": "convolutional GAN",
 }
 """Maps the value of an option to the name of its rung in `ladder.RUNGS`, the simplest first."""
-NETWORKS = ("autoregressive network", "paper", "convolutional")
+GANS = ("paper", "convolutional")
+"""Options whose rungs are GANs."""
+GAN_RUNGS = tuple(BY_OPTION[option] for option in GANS)
+"""Names of these rungs."""
+NETWORKS = ("autoregressive network", *GANS)
 """Options whose rungs train networks."""
 BEST = "best"
 """The option with which held-out telemetry chooses a rung."""

@@ -300,10 +300,9 @@ def test_the_repositorys_pages_are_up_to_date(tmp_path):
 
 
 def test_it_is_said_where_only_noise_of_a_network_pays():
-    environments = {
-        "white": {"others_pay": {"simulator + autoregressive network": {"pays": [5], "seeds": 2}}},
-        "shot": {"others_pay": {"CORAL": {"pays": [5], "seeds": 2}, "simulator + autoregressive network": {"pays": [5, 10], "seeds": 2}}},
-    }
+    groups = [{"names": ["simulator + autoregressive network"], "seeds": [1, 2]}]
+    pays = {"CORAL": {"pays": [5]}, "simulator + autoregressive network": {"pays": [5, 10]}}
+    environments = {name: {"others_pay": pays, "few_seeds": groups} for name in ("white", "shot")}
     said = practice._learnt_pays(environments, {"white"})
     assert said == ". By the same rule, these pay there: simulator + autoregressive network with 5 and 10 windows on shot noise (2 seeds)"
     assert practice._learnt_pays(environments, {"white", "shot"}) == ""

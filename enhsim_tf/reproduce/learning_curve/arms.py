@@ -29,6 +29,7 @@ import numpy as np
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge, time_blocks
 from enhsim_tf.noise import ladder
+from enhsim_tf.noise.rung_names import GAN_RUNGS
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
 
@@ -38,7 +39,7 @@ CLASSIFIER_ON_REAL = "classifier without simulator"
 SIMULATOR = "simulator + "
 """Beginning of the names of arms with noise of a rung; the name of the rung follows."""
 CHEAP_RUNGS = ("none", "Gaussian", "autoregression", "residual windows")
-NETWORK_RUNGS = ("autoregressive network", "GAN of the paper", "convolutional GAN")
+NETWORK_RUNGS = ("autoregressive network", *GAN_RUNGS)
 WHOLE_WINDOWS = "residual windows"
 """The rung of the arms that also use real windows, chosen before the first run because it is the simplest that needs no assumption."""
 NUM_BLOCKS = 5  # of time, for cross-fitting
@@ -93,7 +94,7 @@ class Record:
     @functools.cache  # noqa: B019  the record lives as long as its arms
     def noise_model(self, rung: str) -> Any:
         """The noise model of a rung, fitted to the residuals."""
-        number = self.gan_iterations if "GAN" in rung else self.num_iterations
+        number = self.gan_iterations if rung in GAN_RUNGS else self.num_iterations
         noise, signal = self.residuals
         return ladder.RUNGS[rung](ladder.FitTask(noise, signal, number, self.seed, self.starts))
 

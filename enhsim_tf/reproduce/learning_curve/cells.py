@@ -14,6 +14,7 @@ from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.enhancer.ridge import time_blocks
+from enhsim_tf.noise.rung_names import GAN_RUNGS
 from enhsim_tf.reproduce.learning_curve.arms import (
     ADVERSARIAL,
     BOTH,
@@ -127,7 +128,8 @@ class Cell:
         if number < networks.num_slow_seeds and self.num_real in networks.num_real_classifiers:
             groups["classifiers"] = self._classifiers
         for rung in (rung for rung in rungs if rung not in CHEAP_RUNGS):
-            seeds, tried = (networks.num_slow_seeds, networks.num_real_gans) if "GAN" in rung else (networks.num_seeds, networks.num_real)
+            is_gan = rung in GAN_RUNGS
+            seeds, tried = (networks.num_slow_seeds, networks.num_real_gans) if is_gan else (networks.num_seeds, networks.num_real)
             if number < seeds and self.num_real in tried:
                 groups[rung] = functools.partial(self._simulated, (rung,))
         # which seeds and numbers are computed does not affect a cell

@@ -5,7 +5,7 @@ false-alarm rate above the one that thresholds were set for. Recall is compared 
 windows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,9 +85,11 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
             gains = {arm: _gain(own, arm, numbers) for arm in (CLASSIFIER, ADVERSARIAL) if arm in arms}
             environments[environment]["classifiers"] = gains
         few: dict[tuple[int, ...], list[str]] = {}
-        for arm in (arm for arm in arms if most_seeds(arms[arm]) < most_seeds(real)):
-            few.setdefault(tuple(sorted({int(seed) for seed in own[own["arm"] == arm]["seed"]})), []).append(arm)
-        environments[environment]["few_seeds"] = [_few_seeds(own, names, [REAL, *simulators], numbers) for names in few.values()]
+        for arm, curve in arms.items():
+            if most_seeds(curve) < most_seeds(real):
+                few.setdefault(tuple(sorted({int(seed) for seed in own[own["arm"] == arm]["seed"]})), []).append(arm)
+        groups = [_few_seeds(own, seeds, names, [REAL, *simulators], numbers) for seeds, names in few.items()]
+        environments[environment]["few_seeds"] = groups
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
 
@@ -133,15 +135,15 @@ def _curves(rows: "pd.DataFrame", numbers: list[int]) -> dict[str, Any]:
     return found
 
 
-def _few_seeds(rows: "pd.DataFrame", few: list[str], others: list[str], numbers: list[int]) -> dict[str, Any]:
-    """Arms with fewer seeds beside others on the same seeds and numbers, and which detector finds most after training on the real windows."""
+def _few_seeds(rows: "pd.DataFrame", seeds: Sequence[int], few: list[str], others: list[str], numbers: list[int]) -> dict[str, Any]:
+    """Arms that have these seeds alone, beside others on the same seeds and numbers, and which detector finds most after training on the real windows."""
     its = rows[rows["arm"].isin(few)]
-    same = rows[rows["seed"].isin(its["seed"].unique()) & rows["num_real"].isin(its["num_real"].unique())]
+    same = rows[rows["seed"].isin(seeds) & rows["num_real"].isin(its["num_real"].unique())]
     recall = same[same["arm"] == REAL].groupby(["num_real", "detector"])["recall_at_real_rate"].mean()
     best = {int(number): recall.loc[number].idxmax() for number in sorted(its["num_real"].unique())}
     return {
         "names": few,
-        "seeds": sorted(int(seed) for seed in its["seed"].unique()),
+        "seeds": list(seeds),
         "arms": {arm: _curves(same[same["arm"] == arm], numbers) for arm in (*others, *few)},
         "best_detector": {
             str(number): {"name": name, "recall_at_real_rate": float(recall.loc[number, name])} for number, name in best.items()

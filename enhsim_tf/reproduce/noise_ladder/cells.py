@@ -16,7 +16,7 @@ from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseTraining, NoiseWindows
 from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import BY_OPTION, STREAMS
+from enhsim_tf.noise.rung_names import BY_OPTION, GAN_RUNGS, STREAMS
 from enhsim_tf.reproduce.noise_ladder.names import PRESENT, REAL
 from enhsim_tf.reproduce.robustness.replicate import Replicate
 from enhsim_tf.reproduce.settings import Settings
@@ -89,7 +89,7 @@ class Cell:
             compared = [held_out]
             choice = []
         else:
-            number_of_iterations = chosen.ladder.gan_iterations if "GAN" in rung else chosen.ladder.num_iterations
+            number_of_iterations = chosen.ladder.gan_iterations if rung in GAN_RUNGS else chosen.ladder.num_iterations
             task = ladder.FitTask(self.learnt["noise"], self.learnt["truth"], number_of_iterations, seed, self.learnt["start"])
             model = ladder.RUNGS[rung](task)
             draws = np.random.default_rng([seed, STREAMS[OPTIONS[rung]], 71])

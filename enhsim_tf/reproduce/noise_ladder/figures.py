@@ -9,6 +9,7 @@ import numpy as np
 from enhsim_tf.common.number_words import in_words
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
 from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.noise.rung_names import GAN_RUNGS
 from enhsim_tf.reproduce.figure import Figure
 from enhsim_tf.reproduce.noise_ladder.findings import fewer_seeds
 from enhsim_tf.reproduce.publish.wording import in_list
@@ -69,7 +70,7 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
 
 def _message(within: Mapping[str, Any], learnt: str) -> str:
     """On how many families the learnt model, resampling and the GANs keep the limits."""
-    first, *others = (learnt, BASELINE, *(name for name in within if "GAN" in name))
+    first, *others = (learnt, BASELINE, *(name for name in within if name in GAN_RUNGS))
     known = [f"on {within[name]['kept']} with {'' if name == BASELINE else 'the '}{name}" for name in others if within[name]["of"]]
     main = f"on {within[first]['kept']} of {within[first]['of']} families with the {first}"
     return f"Limits on false alarms are kept {in_list([main, *known])}"

@@ -314,7 +314,7 @@ def _few_seeds(found: Findings) -> list[str]:
         rows = _curve_table({name: group["arms"] for name, group in groups.items()}, tried)
         names = list(dict.fromkeys(name for group in groups.values() for name in group["names"]))
         scope = (
-            f"{_counted(len(seeds), 'seed').capitalize()} ({in_list([str(seed) for seed in seeds])}): {in_list(names)}. "
+            f"{_counted(len(seeds), 'seed')} ({in_list([str(seed) for seed in seeds])}): {in_list(names)}. "
             f"The same table for {'this seed' if len(seeds) == 1 else 'these seeds'} alone:"
         )
         lines += ["", scope, "", *rows]
@@ -344,7 +344,7 @@ def _others(found: Findings) -> list[str]:
     for name, about in found["environments"].items():
         for arm, other in about["others_pay"].items():
             some = "" if other["tried"] == found["numbers"] else f", {_numbers(other['tried'])} windows"
-            names[arm] = f"{arm} ({other['seeds']} seed{'s' * (other['seeds'] > 1)}{some})"
+            names[arm] = f"{arm} ({_counted(other['seeds'], 'seed')}{some})"
             if other["pays"]:
                 at = str(other["pays"][-1])
                 own, real = (f"{100 * recall:.0f} %" for recall in other["recall"][at])

@@ -259,11 +259,12 @@ def _few_windows(curve: Findings | None) -> tuple[str, str]:
 def _learnt_pays(environments: Mapping[str, Findings], others: Collection[str]) -> str:
     """Where a simulator with noise of a network pays by the same rule, except in the environments where a simple model does."""
     told = [
-        f"{arm} with {in_list([f'{number:,}' for number in other['pays']])} windows on {name} noise ({in_seeds(range(other['seeds']))})"
+        f"{arm} with {in_list([f'{number:,}' for number in numbers])} windows on {name} noise ({in_seeds(group['seeds'])})"
         for name, about in environments.items()
         if name not in others
-        for arm, other in about["others_pay"].items()
-        if arm.startswith(SIMULATOR) and other["pays"]
+        for group in about["few_seeds"]
+        for arm in group["names"]
+        if arm.startswith(SIMULATOR) and (numbers := about["others_pay"][arm]["pays"])
     ]
     return f". By the same rule, these pay there: {in_list(told)}" if told else ""
 

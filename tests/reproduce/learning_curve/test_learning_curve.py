@@ -186,9 +186,16 @@ def test_an_arm_with_fewer_seeds_decides_nothing_and_is_compared_on_its_own_seed
     text = page.learning_curve(found)
     assert "simulator + autoregressive network (1 seed). They pay only here:" in text
     assert "| white | real | 6.0 / 60 | 2.0 / 60 |" in text and "| white | real | 11.0 / 60 | 3.0 / 60 |" in text
-    assert text.count("| white | simulator + autoregressive network |") == 1
+    assert text.count("| white | simulator + autoregressive network |") == 1 and "The single detector that finds most" not in text
     assert "1 seed (1): simulator + autoregressive network. The same table for this seed alone:" in text
     assert "With 20 windows and its own thresholds it finds 50 % of the anomalies; training on the real windows alone finds 50 %." in text
+
+
+def test_beside_classifiers_stands_the_detector_that_finds_most(near):
+    tables = table({5: 0.11, 20: 0.03}, {5: 0.06, 20: 0.021})
+    classifier = tables["rows"][tables["rows"]["arm"] != REAL].assign(arm=CLASSIFIER)
+    both = _with_another_seed({"rows": pd.concat([tables["rows"], classifier], ignore_index=True)}, CLASSIFIER)
+    assert "- white: 5 windows: a 60 %; 20 windows: a 60 %." in page.learning_curve(findings.summarise(both))
 
 
 def test_arms_with_different_seeds_are_compared_with_the_real_windows_of_their_own_seeds(near):
