@@ -14,8 +14,8 @@ from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
-from enhsim_tf.enhancer.ridge import time_blocks
 from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import time_blocks
 
 SQUARE_WAVES, COMMANDS, LEVEL = "square waves", "commands", "constant level"
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500

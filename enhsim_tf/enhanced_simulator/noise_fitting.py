@@ -22,7 +22,7 @@ from enhsim_tf.realism.two_sample import boosted_trees
 from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import first_samples
+from enhsim_tf.telemetry.windows import disjoint_rows, first_samples
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
@@ -51,11 +51,7 @@ class NoiseWindows:
     @functools.cached_property
     def disjoint(self) -> "NoiseWindows":
         """Those windows that share no sample."""
-        chosen, end = [], -np.inf
-        for row in np.argsort(self.starts, kind="stable"):
-            if self.starts[row] >= end:
-                chosen.append(row)
-                end = self.starts[row] + self.noise.shape[1]
+        chosen = disjoint_rows(self.starts, self.noise.shape[1])
         return NoiseWindows(self.noise[chosen], self.clean[chosen], self.starts[chosen])
 
     def __len__(self) -> int:

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.windows import time_blocks
 
 PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))  # of standardised inputs, so they fit every unit
 NUM_NEIGHBOURS = (1, 3, 10, 30, 100, 300)
-_LEAST_SHARE = 0.25  # of the windows outside a block that must remain where those that overlap the block are left out
 _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest value is constant
 _ROWS = 256  # windows predicted at a time, which bounds the memory
 
@@ -178,32 +178,6 @@ def choose_num_neighbours(
             for position, number in enumerate(tried):
                 squares[position] += np.sum((learnt[nearest[:, :number]].mean(axis=1) - wanted) ** 2)
     return tried[int(np.argmin(squares))]
-
-
-def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Splits windows into blocks of time for cross-validation.
-
-    Training windows that overlap the time of the held-out block are left out, if at least a quarter of the windows outside
-    the block remains.
-
-    Args:
-        starts: Position of each window, in samples, shape `(windows,)`.
-        num_blocks: Number of blocks; at most as many as windows.
-        window: Length of a window in samples.
-
-    Returns:
-        `(training, held_out)` for each block: indices of windows in the order of time. Empty for a single window.
-    """
-    order = np.argsort(starts, kind="stable")
-    if len(order) < 2:
-        return []
-    blocks = []
-    for held_out in np.array_split(order, max(2, min(num_blocks, len(order)))):
-        rest = order[~np.isin(order, held_out)]
-        first, last = starts[held_out[0]], starts[held_out[-1]]
-        apart = rest[(starts[rest] <= first - window) | (starts[rest] >= last + window)]
-        blocks.append((apart if len(apart) >= max(1, _LEAST_SHARE * len(rest)) else rest, held_out))
-    return blocks
 
 
 class _Solution:

@@ -11,6 +11,8 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
 
+_LEAST_SHARE = 0.25  # of the windows outside a block that must remain where those that overlap the block are left out
+
 
 def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) -> list[Telemetry]:
     """Splits a series into consecutive parts with gaps between them, so that windows of different parts do not overlap.
@@ -180,3 +182,47 @@ def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, windo
         windows[here] = cut_windows(part.values, own, window)
         time_s[here] = part.offset_s + part.interval_s * own
     return windows, time_s
+
+
+def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Splits windows into blocks of time for cross-validation.
+
+    Training windows that overlap the time of the held-out block are left out, if at least a quarter of the windows outside
+    the block remains.
+
+    Args:
+        starts: Position of each window, in samples, shape `(windows,)`.
+        num_blocks: Number of blocks; at most as many as windows.
+        window: Length of a window in samples.
+
+    Returns:
+        `(training, held_out)` for each block: indices of windows in the order of time. Empty for a single window.
+    """
+    order = np.argsort(starts, kind="stable")
+    if len(order) < 2:
+        return []
+    blocks = []
+    for held_out in np.array_split(order, max(2, min(num_blocks, len(order)))):
+        rest = order[~np.isin(order, held_out)]
+        first, last = starts[held_out[0]], starts[held_out[-1]]
+        apart = rest[(starts[rest] <= first - window) | (starts[rest] >= last + window)]
+        blocks.append((apart if len(apart) >= max(1, _LEAST_SHARE * len(rest)) else rest, held_out))
+    return blocks
+
+
+def disjoint_rows(starts: np.ndarray, window: int) -> np.ndarray:
+    """Chooses windows that share no sample: each is the first that begins after the end of the one before it.
+
+    Args:
+        starts: Position of each window, in samples, shape `(windows,)`.
+        window: Length of a window in samples.
+
+    Returns:
+        Indices of the chosen windows, in the order of time.
+    """
+    chosen, end = [], -np.inf
+    for row in np.argsort(starts, kind="stable").tolist():
+        if starts[row] >= end:
+            chosen.append(row)
+            end = starts[row] + window
+    return np.array(chosen, np.int64)

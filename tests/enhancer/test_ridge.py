@@ -5,7 +5,7 @@ import pytest
 from sklearn.linear_model import Ridge as SklearnRidge
 from sklearn.neighbors import KNeighborsRegressor
 
-from enhsim_tf.enhancer.ridge import PENALTIES, choose_num_neighbours, fit_ridge, nearest_windows, time_blocks
+from enhsim_tf.enhancer.ridge import PENALTIES, choose_num_neighbours, fit_ridge, nearest_windows
 
 
 def _linear(num_windows, noise=0.1, seed=0, samples=12, outputs=7, columns=2):
@@ -113,39 +113,6 @@ def test_the_largest_of_equally_good_penalties_is_chosen():
     assert fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
 
 
-# -- blocks of time ----------------------------------------------------------------------------------------------------------
-
-
-def test_blocks_of_time_by_hand():
-    starts = np.array([30, 0, 10, 20, 40, 50])  # windows of 10 that share no sample, not in order
-    blocks = [(training.tolist(), held_out.tolist()) for training, held_out in time_blocks(starts, 3, 10)]
-    assert blocks == [([3, 0, 4, 5], [1, 2]), ([1, 2, 4, 5], [3, 0]), ([1, 2, 3, 0], [4, 5])]
-
-
-def test_windows_that_overlap_the_held_out_block_are_left_out():
-    starts = np.arange(0, 60, 5)  # windows of 10: neighbours share 5 samples; blocks begin at 0, 20 and 40
-    training, held_out = time_blocks(starts, 3, 10)[1]
-    assert starts[held_out].tolist() == [20, 25, 30, 35] and starts[training].tolist() == [0, 5, 10, 45, 50, 55]
-    training, held_out = time_blocks(starts, 3, 18)[1]
-    assert starts[training].tolist() == [0, 55], "a quarter of eight remains"
-    training, _ = time_blocks(starts, 3, 21)[1]
-    assert len(training) == 8, "where less than a quarter would remain, all are kept"
-
-
-def test_there_are_at_most_as_many_blocks_as_windows():
-    assert time_blocks(np.array([5]), 5, 10) == []
-    assert [held_out.tolist() for _, held_out in time_blocks(np.array([5, 0, 99]), 5, 1)] == [[1], [0], [2]]
-
-
-def test_the_order_in_which_windows_are_given_does_not_matter():
-    inputs, targets, _ = _linear(60, noise=10.0)
-    starts, order = 5 * np.arange(60), np.random.default_rng(3).permutation(60)
-    first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
-    np.testing.assert_allclose(first.errors, second.errors, rtol=1e-9)
-    assert np.abs(first.errors / fit_ridge(inputs, targets).errors - 1).max() > 1e-3, "without starts, no window is left out"
-    assert choose_num_neighbours(inputs, targets, starts) == choose_num_neighbours(inputs[order], targets[order], starts[order])
-
-
 # -- nearest windows ---------------------------------------------------------------------------------------------------------
 
 
@@ -172,6 +139,15 @@ def test_the_number_of_neighbours_grows_with_the_noise_and_does_not_depend_on_un
         assert chosen[noise] == choose_num_neighbours(1e6 * inputs - 3, 1e-6 * targets)
     assert chosen[0.0] < chosen[0.5] < chosen[50.0]
     assert choose_num_neighbours(inputs[:2], targets[:2]) == choose_num_neighbours(inputs[:1], targets[:1]) == 1
+
+
+def test_the_order_in_which_windows_are_given_does_not_matter():
+    inputs, targets, _ = _linear(60, noise=10.0)
+    starts, order = 5 * np.arange(60), np.random.default_rng(3).permutation(60)
+    first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
+    np.testing.assert_allclose(first.errors, second.errors, rtol=1e-9)
+    assert np.abs(first.errors / fit_ridge(inputs, targets).errors - 1).max() > 1e-3, "without starts, no window is left out"
+    assert choose_num_neighbours(inputs, targets, starts) == choose_num_neighbours(inputs[order], targets[order], starts[order])
 
 
 # -- what cannot be used -----------------------------------------------------------------------------------------------------

@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
-from enhsim_tf.enhancer.ridge import fit_ridge, time_blocks
+from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.rung_names import GAN_RUNGS
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
+from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, time_blocks
 
 REAL, BOTH, THRESHOLD_ON_REAL = "real", "real and simulator", "simulator, threshold on real"
 CORAL, CLASSIFIER, ADVERSARIAL, ONE_LINE = "CORAL", "classifier", "domain-adversarial", "moving deviation"

@@ -13,7 +13,6 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.enhancer.ridge import time_blocks
 from enhsim_tf.noise.rung_names import GAN_RUNGS
 from enhsim_tf.reproduce.learning_curve.arms import (
     ADVERSARIAL,
@@ -36,7 +35,7 @@ from enhsim_tf.reproduce.paper.signals import sines
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.telemetry.windows import cut_windows, time_blocks
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,10 +9,10 @@ from scipy.stats import rankdata
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import evaluation, metrics
-from enhsim_tf.enhancer.ridge import time_blocks
 from enhsim_tf.enhancer.training_pairs import cut_windows_from_parts
 from enhsim_tf.reproduce.spacecraft.matched import windows_that_meet
 from enhsim_tf.telemetry.telemanom import LabelledChannel
+from enhsim_tf.telemetry.windows import time_blocks
 
 RULES = {
     "own": "held-out windows of the arm itself",
