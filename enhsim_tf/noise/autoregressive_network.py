@@ -3,8 +3,9 @@
 The probability density of a window is the product of the densities of its samples, each given all samples before it. A network
 that predicts these conditional densities can represent any stationary noise, up to its capacity: no correlation time, no period
 and no pulse is built into the network. The network receives the last samples one by one, and the whole past of the window as
-averages of the value and of its magnitude over the last 2, 4, 8, ... samples, and as linear predictions of the value and of the size of
-its error, which are fitted in closed form (`linear_prediction`). The density of a sample is a mixture of Student's t distributions around
+averages of the value and of its magnitude over the last 2, 4, 8, ... samples, as magnitudes of its changes at several resolutions
+(`changes`), and as linear predictions of the value and of the size of its error, which are fitted in closed form (`linear_prediction`).
+The density of a sample is a mixture of Student's t distributions around
 the linear prediction, so that it can have several modes, a skew and heavy tails.
 
 Training maximises the likelihood. A network with thousands of weights finds a little structure in any noise, even in white noise,
@@ -33,7 +34,9 @@ from enhsim_tf.keras_tools.backend import keras, tf
 from enhsim_tf.keras_tools.training import seeded_initialiser
 from enhsim_tf.noise import ladder
 from enhsim_tf.noise.calibration import Calibration, mixture_probabilities
+from enhsim_tf.noise.changes import LEAST_WINDOW, Changes
 from enhsim_tf.noise.linear_prediction import LinearPrediction
+from enhsim_tf.noise.selection import NUM_CANDIDATES, Selection
 from enhsim_tf.noise.shrinkage import shrink
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
@@ -54,6 +57,8 @@ _LOG_UNIT = 10.0  # of the weights of the degrees of freedom, so that the optimi
 _PREDICTED = (0, 1, 2, 4, 8, 16, 32)  # samples before the present one whose linear prediction the network sees
 _EARLY = (25, 50, 75)  # iterations after which the weights are also compared on held-out windows: few windows are soon learnt by heart
 _LEAST_PAST = 4  # samples of real noise that generated noise continues
+_MOST_ROWS = 1_024 * NUM_CANDIDATES  # that are drawn at a time
+_NUM_PLACES = 40  # of each window, whose past standardises the changes
 _MOST_SHRUNK = 400_000  # samples that the shrinkage and the calibration learn from
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
 
@@ -72,6 +77,7 @@ class AutoregressiveNetwork:
         num_rare: Number of those that start with a small share; networks that were saved before have 2.
         units: Number of units of both hidden layers.
         sees_predictions: Whether the density starts from linear predictions. Networks that were saved before do not.
+        sees_changes: Whether the network sees magnitudes of changes at several resolutions. Networks that were saved before do not.
         seed: Seed for the initial weights and for all random numbers in training.
     """
 
@@ -87,6 +93,7 @@ class AutoregressiveNetwork:
         num_rare: int = 4,
         units: int = 64,
         sees_predictions: bool = True,
+        sees_changes: bool = True,
         seed: int = 0,
     ):
         self.window, self.scale, self.limit, self.seed = int(window), float(scale), float(limit), int(seed)
@@ -97,8 +104,11 @@ class AutoregressiveNetwork:
         self.octaves = 2 ** np.arange(1, int(math.log2(window)) + 1)
         self.sees_predictions = bool(sees_predictions)
         self.prediction = LinearPrediction.of_white_noise(self.window) if self.sees_predictions else None
+        self.sees_changes = bool(sees_changes)
+        self.changes = Changes(self.window) if self.sees_changes and self.window >= LEAST_WINDOW else None
         self.pasts: WindowBootstrap | MatchedWindowBootstrap | None = None
         self.calibration: Calibration | None = None
+        self.selection: Selection | None = None
         self.start_logits = np.where(np.arange(self.num_components) < self.num_rare, -6.0, 0.0).astype(np.float32)
         self.network = self._build()
 
@@ -127,10 +137,11 @@ class AutoregressiveNetwork:
         """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
         num_linear = len(self.lags) + len(self.octaves)
         num_predicted = (len(_PREDICTED) + 1) * self.sees_predictions
-        features = keras.Input((num_linear + len(self.octaves) + 2 + num_predicted + len(_SIGNAL_LAGS) * self.follows_signal,))
+        num_others = 0 if self.changes is None else self.changes.size
+        features = keras.Input((num_linear + len(self.octaves) + 2 + num_predicted + num_others + len(_SIGNAL_LAGS) * self.follows_signal,))
         linear = keras.layers.Dense(1, kernel_initializer="zeros", name="linear")(features[:, :num_linear])
         loudness = 0.0
-        if self.sees_predictions:  # the logarithm of the predicted magnitude is the last feature before the signal
+        if self.sees_predictions:  # the logarithm of the predicted magnitude is the last of the predictions
             place = num_linear + len(self.octaves) + 2 + len(_PREDICTED)
             loudness = keras.layers.Dense(1, kernel_initializer="ones", name="loudness")(features[:, place : place + 1])
         hidden = keras.ops.clip(features, -_CLIP, _CLIP)
@@ -186,7 +197,9 @@ class AutoregressiveNetwork:
         if self.sees_predictions:
             self.prediction = LinearPrediction.fit(values[first], values[last])
             self.pasts = self._pasts(values, signal, starts)
-        data = (values, signal, self._predict(values))
+        if self.changes is not None:
+            self.changes = self.changes.fit(self.changes.sums(values[first]), self._places(_NUM_PLACES))
+        data = (values, signal, self._derived(values))
         training, judged = (tuple(tf.constant(each[rows]) for each in data) for rows in (first, last[:500]))
         judged_positions = tf.constant(self._places(min(100, self.window)))
         schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
@@ -227,6 +240,7 @@ class AutoregressiveNetwork:
         self._shrink(training, judged)
         if first is not last:  # otherwise there is nothing that the calibration could be judged on
             self._calibrate(training, judged)
+            self._select(values, signal, starts)
         self.held_out_loss = float(evaluate())
         return self
 
@@ -284,6 +298,14 @@ class AutoregressiveNetwork:
 
         self.calibration = Calibration.fit(probabilities(training), probabilities(judged))
 
+    def _select(self, values: np.ndarray, signal: np.ndarray, starts: np.ndarray | None) -> None:
+        """Learns by what whole windows differ from generated ones; see `selection`."""
+
+        def generate(rows: np.ndarray) -> np.ndarray:
+            return self._draw(len(rows), self.window, signal[rows], np.random.default_rng([self.seed, 62])) / np.float32(self.scale)
+
+        self.selection = Selection.fit(values, generate, starts)
+
     def _pasts(self, values: np.ndarray, signal: np.ndarray, starts: np.ndarray | None) -> WindowBootstrap | MatchedWindowBootstrap | None:
         """Returns real noise that generated noise continues: the samples before the last half of each window, and the signal after them."""
         half = self.window // 2
@@ -299,9 +321,14 @@ class AutoregressiveNetwork:
         first = 0 if self.pasts is None else self.pasts.windows.shape[1]
         return np.linspace(first, self.window - 1, min(number, self.window - first)).astype(np.int32)
 
-    def _predict(self, values: np.ndarray) -> np.ndarray:
-        """Returns the linear predictions of value and logarithm of the magnitude, or nothing if the network does not see them."""
-        return np.zeros((*values.shape, 0), np.float32) if self.prediction is None else self.prediction.predict(values)
+    def _derived(self, values: np.ndarray) -> np.ndarray:
+        """Returns what is computed once for each sample of windows, as far as the network sees it.
+
+        These are the linear predictions of the value and of the logarithm of the magnitude, and the sums of changes before the sample.
+        """
+        parts = [] if self.prediction is None else [self.prediction.predict(values)]
+        parts += [] if self.changes is None else [self.changes.sums(values)]
+        return np.concatenate([np.zeros((*values.shape, 0), np.float32), *parts], axis=2)
 
     @property
     def _errors(self) -> np.ndarray:
@@ -322,12 +349,12 @@ class AutoregressiveNetwork:
             )
         return np.asarray(signal_windows, np.float32)
 
-    def _loss(self, values: tf.Tensor, signal: tf.Tensor, predicted: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
+    def _loss(self, values: tf.Tensor, signal: tf.Tensor, derived: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
         """Computes the mean negative log-likelihood of the samples at the given positions of each window."""
-        features, targets = self._features(values, signal, predicted, where)
+        features, targets = self._features(values, signal, derived, where)
         return self._negative_log_likelihood(targets, *self.network(features))
 
-    def _features(self, values: tf.Tensor, signal: tf.Tensor, predicted: tf.Tensor, where: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor]:
+    def _features(self, values: tf.Tensor, signal: tf.Tensor, derived: tf.Tensor, where: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor]:
         """Computes what the network sees before the samples at the given positions of each window, and what it is to predict.
 
         Returns:
@@ -350,9 +377,11 @@ class AutoregressiveNetwork:
         errors = tf.repeat(tf.gather(tf.constant(self._errors), where)[None], num_rows, axis=0)
         if self.sees_predictions:
             before = where[:, None] - tf.constant(_PREDICTED, tf.int32)[None, :]
-            earlier = tf.gather(predicted[:, :, 0], tf.maximum(before, 0), axis=1) * tf.cast(before >= 0, tf.float32)
-            parts += [earlier, tf.gather(predicted[:, :, 1], where, axis=1)[:, :, None]]
+            earlier = tf.gather(derived[:, :, 0], tf.maximum(before, 0), axis=1) * tf.cast(before >= 0, tf.float32)
+            parts += [earlier, tf.gather(derived[:, :, 1], where, axis=1)[:, :, None]]
             targets = (targets - earlier[:, :, 0]) / errors
+        if self.changes is not None:
+            parts.append(self.changes.features(derived[:, :, 2 * self.sees_predictions :], where))
         if self.follows_signal:
             around = tf.clip_by_value(where[:, None] + tf.constant(_SIGNAL_LAGS, tf.int32)[None, :], 0, self.window - 1)
             parts.append(tf.gather(signal, around, axis=1))
@@ -416,13 +445,37 @@ class AutoregressiveNetwork:
         return self._draw(1, num_samples, signal, np.random.default_rng(seed))[0]
 
     def _draw(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Draws rows sample by sample, with the network's layers in NumPy: a call of a model takes longer than its products."""
+        """Draws rows in the unit of the telemetry, in batches that bound the memory."""
+        each = 1 if self.selection is None else NUM_CANDIDATES
+        whole = num_samples if each == 1 else -(-num_samples // self.window) * self.window  # whole windows are selected
+        if self.follows_signal and num_samples:
+            signal = np.repeat(signal[:, np.minimum(np.arange(whole), num_samples - 1)], each, axis=0)
+        else:
+            signal = np.zeros((each * num_rows, 0), np.float32)
+        past, drawn = self._draw_pasts(each * num_rows, whole, signal, rng), [np.zeros((0, whole), np.float32)]
+        for begin in range(0, each * num_rows, _MOST_ROWS):
+            rows = slice(begin, begin + _MOST_ROWS)
+            drawn.append(self._continue(past[rows], whole, signal[rows], each, rng))
+        return np.concatenate(drawn)[:, :num_samples]
+
+    def _continue(self, past: np.ndarray, num_samples: int, signal: np.ndarray, each: int, rng: np.random.Generator) -> np.ndarray:
+        """Continues rows sample by sample, with the network's layers in NumPy: a call of a model takes longer than its products.
+
+        Args:
+            past: Real noise that is continued, in units of the standard deviation, shape `(rows, samples)`.
+            num_samples: Number of samples to draw; whole windows if there are several candidates.
+            signal: The signal below them, shape `(rows, num_samples)`.
+            each: Number of neighbouring rows that are candidates for one. After each window, one of them is chosen, and all go on from it.
+            rng: Random numbers.
+
+        Returns:
+            float32 array of shape `(rows / each, num_samples)`, in the unit of the telemetry.
+        """
         layers = ("linear", "first", "second", "last")
         (linear, linear_bias), first_layer, second_layer, last_layer = (self.network.get_layer(name).get_weights() for name in layers)
-        degrees, prediction, errors = self.degrees, self.prediction, self._errors
+        degrees, prediction, changes, errors = self.degrees, self.prediction, self.changes, self._errors
         num_lags, num_linear = len(self.lags), len(linear)
-        past = self._draw_pasts(num_rows, num_samples, signal, rng)
-        known, reach = past.shape[1], max(self.window - 1, num_lags)
+        (num_rows, known), reach = past.shape, max(self.window - 1, num_lags)
         begun = reach + known
         series, loudness = np.zeros((2, num_rows, begun + num_samples), np.float32)
         series[:, reach:begun] = past
@@ -434,6 +487,11 @@ class AutoregressiveNetwork:
         if prediction is not None and known:
             predicted[:, _PREDICTED[-1] : _PREDICTED[-1] + known] = past_predicted = prediction.predict(past)[:, :, 0]
             loudness[:, reach:begun] = prediction.loudness(past, past_predicted)
+        changed = np.zeros((0 if changes is None else len(changes.lengths), num_rows, known + num_samples + 1))
+        if changes is not None:
+            changed[:, :, 1 : known + 1] = np.cumsum(
+                [changes.magnitudes(sums[0], np.arange(1, known + 1), length) for length in changes.lengths], axis=2
+            ).reshape(len(changes.lengths), num_rows, known)
         features = np.zeros((num_rows, len(first_layer[0])), np.float32)
         for place in range(known, known + num_samples):
             begin, now = np.maximum(place - self.octaves, 0), reach + place
@@ -445,6 +503,8 @@ class AutoregressiveNetwork:
                 latest = _PREDICTED[-1] + place
                 predicted[:, latest], loud = prediction.next(series[:, place:now], loudness[:, place:now], place)
                 parts_seen += [predicted[:, latest - np.array(_PREDICTED)], loud[:, None]]
+            if changes is not None:
+                parts_seen.append(changes.before(changed, place))
             if self.follows_signal:
                 parts_seen.append(signal[:, np.clip(place - known + np.array(_SIGNAL_LAGS), 0, num_samples - 1)])
             np.concatenate(parts_seen, axis=1, out=features)
@@ -467,7 +527,21 @@ class AutoregressiveNetwork:
             if prediction is not None:
                 loudness[:, now] = prediction.loudness(value[:, None], predicted[:, latest, None], age)[:, 0]
             sums[:, :, place + 1] = sums[:, :, place] + (value, np.abs(value))
-        return series[:, begun:] * np.float32(self.scale)
+            if changes is not None:
+                changed[:, :, place + 1] = changed[:, :, place] + changes.magnitudes(sums[0], place + 1, changes.lengths).T
+            if each > 1 and (place + 1 - known) % self.window == 0:
+                chosen = self.selection.choose(series[:, now + 1 - self.window : now + 1].reshape(-1, each, self.window), rng)
+                chosen = np.repeat(np.arange(0, num_rows, each) + chosen, each)
+                for state, end in (
+                    (series, now),
+                    (loudness, now),
+                    (predicted, _PREDICTED[-1] + place),
+                    (sums, place + 1),
+                    (changed, place + 1),
+                ):
+                    seen = state[..., max(end - self.window, 0) : end + 1]  # what later samples depend on
+                    seen[...] = seen[..., chosen, :]
+        return series[::each, begun:] * np.float32(self.scale)
 
     def _sample(
         self, logits: np.ndarray, means: np.ndarray, log_scales: np.ndarray, degrees: np.ndarray, rng: np.random.Generator
@@ -507,7 +581,7 @@ class AutoregressiveNetwork:
     def get_config(self) -> dict:
         """Returns the settings that rebuild the network, as JSON types."""
         names = ("window", "scale", "limit", "step", "origin", "follows_signal", "num_components", "num_rare", "units", "sees_predictions")
-        return {name: getattr(self, name) for name in (*names, "seed")}
+        return {name: getattr(self, name) for name in (*names, "sees_changes", "seed")}
 
     def set_weights(self, weights: Sequence[np.ndarray], tails: str = TAILS) -> None:
         """Sets the weights of the network, as `network.get_weights` returned them.

@@ -24,7 +24,9 @@ _KINDS = {
     MatchedWindowBootstrap: "matched residual windows",
 }
 _AUTOREGRESSIVE_NETWORK = "autoregressive network"
-_WEIGHT, _PREDICTION, _PAST, _CALIBRATION = "weight_", "prediction_", "past_", "calibration_"  # beginnings of the names of its arrays
+# beginnings of the names of its arrays
+_WEIGHT, _PREDICTION, _PAST = "weight_", "prediction_", "past_"
+_CALIBRATION, _CHANGES, _SELECTION = "calibration_", "changes_", "selection_"
 _OLD_NAMES = {"resampled": "residual windows"}  # of models that were saved before
 
 
@@ -75,6 +77,10 @@ def state_of(model: Any) -> NoiseState:
         arrays = {f"{_WEIGHT}{number:02}": weight for number, weight in enumerate(model.network.get_weights())}
         if model.prediction is not None:
             arrays |= {_PREDICTION + name: values for name, values in model.prediction.arrays.items()}
+        if model.changes is not None:
+            arrays |= {_CHANGES + name: values for name, values in model.changes.arrays.items()}
+        if model.selection is not None:
+            arrays |= {_SELECTION + name: values for name, values in model.selection.arrays.items()}
         if model.pasts is not None:
             arrays |= {_PAST + name: values for name, values in state_of(model.pasts).arrays.items()}
         if model.calibration is not None:
@@ -114,24 +120,30 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
     if kind == _AUTOREGRESSIVE_NETWORK:
         from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
         from enhsim_tf.noise.calibration import Calibration
+        from enhsim_tf.noise.changes import Changes
         from enhsim_tf.noise.linear_prediction import LinearPrediction
+        from enhsim_tf.noise.selection import Selection
 
         _positive(values["scale"])
         if not (2 <= values["window"] <= 1_000_000 and 0 < values["num_components"] * values["units"] <= 1_000_000):
             raise ValueError("a noise network of an impossible size")
         tails = str(values.pop("tails", "softplus"))  # models that were saved before do not say
-        model = AutoregressiveNetwork(**{"sees_predictions": False, "num_rare": 2} | values)
+        model = AutoregressiveNetwork(**{"sees_predictions": False, "sees_changes": False, "num_rare": 2} | values)
         model.set_weights([arrays[name] for name in sorted(arrays) if name.startswith(_WEIGHT)], tails)
-        predictions, pasts, calibration = (
+        predictions, pasts, calibration, changes, selection = (
             {name.removeprefix(kind): each for name, each in arrays.items() if name.startswith(kind)}
-            for kind in (_PREDICTION, _PAST, _CALIBRATION)
+            for kind in (_PREDICTION, _PAST, _CALIBRATION, _CHANGES, _SELECTION)
         )
         if model.sees_predictions:
             model.prediction = LinearPrediction.from_arrays(predictions, model.window)
+        if model.changes is not None:
+            model.changes = Changes(model.window, changes["centre"], changes["spread"])
         if pasts:
             model.pasts = model_from({"kind": "matched residual windows" if model.follows_signal else "residual windows"}, {}, pasts)
             if model.pasts.windows.shape[1] >= model.window:
                 raise ValueError("a noise network with a past of a window or more")
+        if selection:
+            model.selection = Selection.from_arrays(selection, model.window)
         if calibration:
             model.calibration = Calibration(calibration["edges"], calibration["density"])
         return model

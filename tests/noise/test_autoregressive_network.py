@@ -10,7 +10,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.keras_tools.backend import tf
 from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
 from enhsim_tf.noise.calibration import mixture_probabilities
-from enhsim_tf.realism.measures import autocorrelation, effective_rank
+from enhsim_tf.noise.selection import LEAST_DISJOINT, Selection, window_statistics
+from enhsim_tf.realism.measures import autocorrelation, effective_rank, log_scales
 from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise
 
 SAMPLES = 64
@@ -107,13 +108,63 @@ def test_samples_after_a_past_have_the_density_that_training_sees():
     windows = np.concatenate([past, drawn / network.scale], axis=1).astype(np.float32)
     for place in (16, 17, 24, 31):
         where = tf.constant([place], tf.int32)
-        features, targets = network._features(tf.constant(windows), tf.zeros((2_000, 0)), tf.constant(network._predict(windows)), where)
+        features, targets = network._features(tf.constant(windows), tf.zeros((2_000, 0)), tf.constant(network._derived(windows)), where)
         logits, means, log_scales, _ = (np.asarray(each, np.float64) for each in network.network(features))
         targets = np.asarray(targets, np.float64)[:, 0]
         below = mixture_probabilities(targets, logits, means, log_scales, network.degrees)
         assert kstest(below, "uniform").statistic < 0.04  # 0.036 is exceeded by chance once in a hundred
         below = mixture_probabilities(targets, logits[::-1], means[::-1], log_scales[::-1], network.degrees)
         assert kstest(below, "uniform").statistic > 0.06, "the past of another window would not be noticed"
+
+
+def test_a_series_goes_on_from_the_window_that_was_chosen():
+    """After each window, one of four candidates is chosen: what follows has the density that training sees after this one, not another."""
+    noise = AutoregressiveNoise(0.9, 1.0).draw(1_000 * SAMPLES, np.random.default_rng(4)).reshape(-1, SAMPLES)
+    noise *= np.where(np.random.default_rng(5).random((1_000, 1)) < 0.5, 0.3, 1.2)
+    network = AutoregressiveNetwork.untrained(noise, seed=3).fit(noise, 200)
+    network.calibration = None
+    size = window_statistics(np.zeros((1, SAMPLES))).shape[1]
+    network.selection = Selection(np.zeros(size), np.ones(size), np.zeros(2 * size))  # any candidate, as often
+    series = network.generate_series(600 * SAMPLES, 6) / network.scale
+    starts = 1 + SAMPLES * np.arange(598)
+    for after in (0, 1, 5):  # samples after the beginning of a window; each is the last one of what training would see
+        windows = np.stack([series[start + after :][:SAMPLES] for start in starts])
+        for place in (0, 7):
+            moved = np.roll(windows[:, :-1], place, axis=0)  # with a past of its own, or of another window
+            seen = np.concatenate([moved, windows[:, -1:]], axis=1).astype(np.float32)
+            where = tf.constant([SAMPLES - 1], tf.int32)
+            features, targets = network._features(tf.constant(seen), tf.zeros((598, 0)), tf.constant(network._derived(seen)), where)
+            logits, means, log_scales, _ = (np.asarray(each, np.float64) for each in network.network(features))
+            below = mixture_probabilities(np.asarray(targets, np.float64)[:, 0], logits, means, log_scales, network.degrees)
+            statistic = kstest(below, "uniform").statistic
+            assert statistic < 0.067 if place == 0 else statistic > 0.15  # 0.067 is exceeded by chance once in a hundred
+
+
+def test_candidates_of_which_all_are_alike_change_nothing_of_the_noise(coloured):
+    noise, network = coloured
+    assert network.selection is None, "an autoregression is learnt so well that no window is told apart"
+    assert len(noise) >= LEAST_DISJOINT, "it would have been judged"
+
+
+def test_windows_are_selected_where_the_network_is_wrong():
+    """White noise, and a network that is made too loud by a known factor: the mean logarithm of the loudness of one of four candidates."""
+    noise = np.random.default_rng(8).standard_normal((3_000, SAMPLES)).astype(np.float32)
+    network = AutoregressiveNetwork.untrained(noise, seed=2).fit(noise, 100)
+    assert network.selection is None
+    too_loud = 0.06
+    kernel, bias = network.network.get_layer("last").get_weights()
+    network.network.get_layer("last").set_weights([kernel, bias + too_loud * (np.arange(len(bias)) >= 2 * network.num_components)])
+    network._select(noise / np.float32(network.scale), np.zeros((3_000, 0), np.float32), None)
+    spread = np.std(log_scales(noise))
+    candidates = too_loud / spread + np.random.default_rng(1).standard_normal((100_000, 4))
+    odds = np.exp(-too_loud / spread * candidates)  # of two normal distributions
+    expected = {"selected": spread * np.mean(np.sum(candidates * odds, axis=1) / np.sum(odds, axis=1)), "drawn": too_loud}
+    assert expected["selected"] < 0.4 * too_loud
+    for name, selection in (("selected", network.selection), ("drawn", None)):
+        network.selection = selection
+        windows = network.generate(2_000, 3)
+        assert windows.shape == (2_000, SAMPLES)
+        assert np.mean(log_scales(windows)) - np.mean(log_scales(noise)) == pytest.approx(expected[name], abs=0.012)
 
 
 @pytest.mark.parametrize("window", [2, 7, 9])

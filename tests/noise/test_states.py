@@ -7,6 +7,7 @@ import pytest
 
 from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
 from enhsim_tf.noise.ladder import RUNGS, FitTask, generate, generate_series
+from enhsim_tf.noise.selection import Selection, window_statistics
 from enhsim_tf.noise.states import NoiseState, model_from, state_of
 
 WINDOWS = np.random.default_rng(0).standard_normal((30, 40)).astype(np.float32)
@@ -44,11 +45,34 @@ def test_models_saved_under_the_old_name_are_read():
 
 
 def test_a_network_saved_without_predictions_draws_the_same_noise():
-    network = AutoregressiveNetwork(40, 1.0, num_rare=2, sees_predictions=False, seed=4).fit(WINDOWS, 5)
+    network = AutoregressiveNetwork(40, 1.0, num_rare=2, sees_predictions=False, sees_changes=False, seed=4).fit(WINDOWS, 5)
     state = state_of(network)
-    settings = {name: value for name, value in state.settings.items() if name not in ("sees_predictions", "num_rare")}
+    settings = {name: value for name, value in state.settings.items() if name not in ("sees_predictions", "sees_changes", "num_rare")}
     assert all(name.startswith("weight_") for name in state.arrays)
     np.testing.assert_array_equal(model_from(settings, {}, state.arrays).generate(3, 1), network.generate(3, 1))
+
+
+def test_a_network_saved_without_changes_draws_the_same_noise():
+    network = AutoregressiveNetwork.untrained(WINDOWS, seed=4)
+    before = AutoregressiveNetwork(**network.get_config() | {"sees_changes": False}).fit(WINDOWS, 5)
+    state = state_of(before)
+    settings = {name: value for name, value in state.settings.items() if name != "sees_changes"}
+    assert not any(name.startswith("changes_") for name in state.arrays)
+    np.testing.assert_array_equal(model_from(settings, {}, state.arrays).generate(3, 1), before.generate(3, 1))
+
+
+def test_a_network_that_selects_windows_is_saved():
+    noise = np.random.default_rng(0).standard_normal((30, 64)).astype(np.float32)
+    network = AutoregressiveNetwork.untrained(noise, seed=4).fit(noise, 5)
+    size, rng = window_statistics(noise).shape[1], np.random.default_rng(1)
+    network.selection = Selection(rng.normal(size=size), np.ones(size), rng.normal(size=2 * size))
+    state = state_of(network)
+    again = model_from(state.settings, {}, state.arrays)
+    np.testing.assert_array_equal(again.generate(3, 1), network.generate(3, 1))
+    np.testing.assert_array_equal(again.generate_series(150, 1), network.generate_series(150, 1))
+    assert (again.generate_series(150, 1)[:100] == network.generate_series(100, 1)).all(), "the last window is completed"
+    with pytest.raises(ValueError, match="a selection"):
+        model_from(state.settings, {}, state.arrays | {"selection_spread": np.zeros(size)})
 
 
 def test_a_network_with_a_past_of_a_whole_window_is_refused():
