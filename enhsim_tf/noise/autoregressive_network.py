@@ -58,7 +58,8 @@ _PREDICTED = (0, 1, 2, 4, 8, 16, 32)  # samples before the present one whose lin
 _EARLY = (25, 50, 75)  # iterations after which the weights are also compared on held-out windows: few windows are soon learnt by heart
 _LEAST_PAST = 4  # samples of real noise that generated noise continues
 _MOST_ROWS = 1_024 * NUM_CANDIDATES  # that are drawn at a time
-_NUM_PLACES = 40  # of each window, whose past standardises the changes
+_NUM_STANDARDISED, _NUM_PLACES = 1_000, 40  # windows, and places in each, whose inputs are standardised
+_CONSTANT = 1e-6  # standard deviation up to which an input counts as constant
 _MOST_SHRUNK = 400_000  # samples that the shrinkage and the calibration learn from
 _SIGNAL_LAGS = (-32, -8, -1, 0, 1, 8, 32)  # where the network sees the enhanced signal, around the sample
 
@@ -77,7 +78,8 @@ class AutoregressiveNetwork:
         num_rare: Number of those that start with a small share; networks that were saved before have 2.
         units: Number of units of both hidden layers.
         sees_predictions: Whether the density starts from linear predictions. Networks that were saved before do not.
-        sees_changes: Whether the network sees magnitudes of changes at several resolutions. Networks that were saved before do not.
+        sees_changes: Whether the network sees magnitudes of changes at several resolutions, and its inputs are standardised. Networks that were
+            saved before do not.
         seed: Seed for the initial weights and for all random numbers in training.
     """
 
@@ -144,7 +146,10 @@ class AutoregressiveNetwork:
         if self.sees_predictions:  # the logarithm of the predicted magnitude is the last of the predictions
             place = num_linear + len(self.octaves) + 2 + len(_PREDICTED)
             loudness = keras.layers.Dense(1, kernel_initializer="ones", name="loudness")(features[:, place : place + 1])
-        hidden = keras.ops.clip(features, -_CLIP, _CLIP)
+        standardised = features
+        if self.sees_changes:
+            standardised = _Standardise(name="standardise")(features)
+        hidden = keras.ops.clip(standardised, -_CLIP, _CLIP)
         for name, number in (("first", 600), ("second", 601)):
             kernel = seeded_initialiser("he_uniform", self.seed * 1000 + number)
             hidden = keras.layers.Dense(self.units, "swish", kernel_initializer=kernel, name=name)(hidden)
@@ -197,10 +202,10 @@ class AutoregressiveNetwork:
         if self.sees_predictions:
             self.prediction = LinearPrediction.fit(values[first], values[last])
             self.pasts = self._pasts(values, signal, starts)
-        if self.changes is not None:
-            self.changes = self.changes.fit(self.changes.sums(values[first]), self._places(_NUM_PLACES))
         data = (values, signal, self._derived(values))
         training, judged = (tuple(tf.constant(each[rows]) for each in data) for rows in (first, last[:500]))
+        if self.sees_changes:
+            self._standardise(tuple(each[:: max(1, len(first) // _NUM_STANDARDISED)] for each in training))
         judged_positions = tf.constant(self._places(min(100, self.window)))
         schedule = keras.optimizers.schedules.CosineDecay(learning_rate, max(1, num_iterations), 0.02)
         optimizer = keras.optimizers.AdamW(schedule, weight_decay=_WEIGHT_DECAY, global_clipnorm=1.0)
@@ -243,6 +248,13 @@ class AutoregressiveNetwork:
             self._select(values, signal, starts)
         self.held_out_loss = float(evaluate())
         return self
+
+    def _standardise(self, training: tuple[tf.Tensor, ...]) -> None:
+        """Gives each input of the hidden layers the mean 0 and the standard deviation 1: small differences of slow ones count, too."""
+        features, _ = self._features(*training, tf.constant(self._places(_NUM_PLACES)))
+        spread = np.std(features, axis=0, dtype=np.float64)
+        layer = self.network.get_layer("standardise")
+        layer.set_weights([np.mean(features, axis=0, dtype=np.float64), np.where(spread > _CONSTANT, spread, 1)])
 
     def _shrink(self, training: tuple[tf.Tensor, ...], judged: tuple[tf.Tensor, ...]) -> None:
         """Shrinks what the density takes from the past, and fits what does not depend on it again; see `shrinkage`."""
@@ -474,6 +486,7 @@ class AutoregressiveNetwork:
         layers = ("linear", "first", "second", "last")
         (linear, linear_bias), first_layer, second_layer, last_layer = (self.network.get_layer(name).get_weights() for name in layers)
         degrees, prediction, changes, errors = self.degrees, self.prediction, self.changes, self._errors
+        centre, spread = self.network.get_layer("standardise").get_weights() if self.sees_changes else (0.0, 1.0)
         num_lags, num_linear = len(self.lags), len(linear)
         (num_rows, known), reach = past.shape, max(self.window - 1, num_lags)
         begun = reach + known
@@ -508,7 +521,7 @@ class AutoregressiveNetwork:
             if self.follows_signal:
                 parts_seen.append(signal[:, np.clip(place - known + np.array(_SIGNAL_LAGS), 0, num_samples - 1)])
             np.concatenate(parts_seen, axis=1, out=features)
-            hidden = np.clip(features, -_CLIP, _CLIP)
+            hidden = np.clip((features - centre) / spread, -_CLIP, _CLIP)
             for layer, bias in (first_layer, second_layer):
                 hidden = hidden @ layer + bias
                 hidden /= 1 + np.exp(-np.maximum(hidden, -80))
@@ -591,14 +604,29 @@ class AutoregressiveNetwork:
             tails: What the weights of the degrees of freedom are: `TAILS`, or `softplus` in models that were saved before.
 
         Raises:
-            ValueError: If the shapes or `tails` do not belong to this network.
+            ValueError: If the shapes or `tails` do not belong to this network, or inputs are divided by a spread that is not positive.
         """
         if tails not in (TAILS, "softplus"):
             raise ValueError(f"unknown tails {tails[:40]!r}")
         self.network.set_weights(weights)
+        if self.sees_changes and not (self.network.get_layer("standardise").get_weights()[1] > 0).all():
+            raise ValueError("a noise network whose inputs have no spread")
         if tails == "softplus":
             (degrees,) = self.network.get_layer("degrees").get_weights()
             self.network.get_layer("degrees").set_weights([np.log(np.logaddexp(0, degrees.astype(np.float64))) / _LOG_UNIT])
+
+
+@keras.saving.register_keras_serializable("enhsim_tf")
+class _Standardise(keras.layers.Layer):
+    """Subtracts a constant from each input and divides it by another; both are set before the training."""
+
+    def build(self, input_shape: tuple) -> None:
+        shape = input_shape[-1:]
+        self.centre = self.add_weight(name="centre", shape=shape, initializer="zeros", trainable=False)
+        self.spread = self.add_weight(name="spread", shape=shape, initializer="ones", trainable=False)
+
+    def call(self, features: keras.KerasTensor) -> keras.KerasTensor:
+        return (features - self.centre) / self.spread
 
 
 @keras.saving.register_keras_serializable("enhsim_tf")

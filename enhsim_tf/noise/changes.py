@@ -20,37 +20,16 @@ _TINY = 1e-3  # added to magnitudes before their logarithm is taken
 
 
 class Changes:
-    """Mean magnitudes of the differences of neighbouring averages, as standardised logarithms.
+    """Logarithms of the mean magnitudes of the differences of neighbouring averages.
 
     Args:
         window: Number of samples of a window; lengths and spans of more than a quarter and half of it are left out.
-        centre: Mean of each logarithm, shape `(size,)`; None: 0, for changes that are to be fitted.
-        spread: Standard deviation of each logarithm, same shape; None: 1.
-
-    Raises:
-        ValueError: If these are no means and positive standard deviations of that shape.
     """
 
-    def __init__(self, window: int, centre: np.ndarray | None = None, spread: np.ndarray | None = None):
+    def __init__(self, window: int):
         self.lengths = _LENGTHS[4 * _LENGTHS <= window]
         self.spans = tuple(span for span in _SPANS if 2 * span <= window)
         self.size = len(self.lengths) * len(self.spans)
-        self.centre = np.zeros(self.size, np.float32) if centre is None else np.asarray(centre, np.float32)
-        self.spread = np.ones(self.size, np.float32) if spread is None else np.asarray(spread, np.float32)
-        if not (self.centre.shape == self.spread.shape == (self.size,) and (self.spread > 0).all()):
-            raise ValueError("changes that do not belong to this window")
-
-    def fit(self, sums: np.ndarray, places: np.ndarray) -> "Changes":
-        """Returns changes that are standardised by those of windows of noise.
-
-        Args:
-            sums: As returned by `sums`.
-            places: Places of a window before which the changes are measured.
-        """
-        plain = Changes(sums.shape[1])
-        found = np.concatenate([plain.before(np.moveaxis(sums, 2, 0), place) for place in places])
-        spread = np.std(found, axis=0, dtype=np.float64)
-        return Changes(sums.shape[1], np.mean(found, axis=0, dtype=np.float64), np.where(spread > 0, spread, 1))
 
     def sums(self, windows: np.ndarray) -> np.ndarray:
         """Returns the sums of the magnitudes of the differences before each place of windows.
@@ -80,7 +59,7 @@ class Changes:
         return np.abs(total[:, ends] - 2 * total[:, middles] + total[:, begins]) / lengths
 
     def before(self, sums: np.ndarray, place: int) -> np.ndarray:
-        """Returns the standardised logarithms of the mean magnitudes before a place.
+        """Returns the logarithms of the mean magnitudes before a place.
 
         Args:
             sums: Sums of the magnitudes before each place, shape `(lengths, windows, places)`.
@@ -91,8 +70,7 @@ class Changes:
         """
         begins = [max(place - span, 0) for span in self.spans]
         means = np.stack([(sums[:, :, place] - sums[:, :, begin]) / max(place - begin, 1) for begin in begins], axis=2)
-        logs = np.log(np.moveaxis(means, 0, 1).reshape(sums.shape[1], self.size) + _TINY)
-        return (logs - self.centre) / self.spread
+        return np.log(np.moveaxis(means, 0, 1).reshape(sums.shape[1], self.size) + _TINY)
 
     def features(self, sums: tf.Tensor, where: tf.Tensor) -> tf.Tensor:
         """Computes the same in TensorFlow before several places.
@@ -110,10 +88,4 @@ class Changes:
             length = tf.cast(tf.maximum(where - begin, 1), tf.float32)[:, None]
             means.append((now - tf.gather(sums, begin, axis=1)) / length)
         logs = tf.math.log(tf.stack(means, axis=3) + _TINY)
-        flat = tf.reshape(logs, (tf.shape(sums)[0], tf.shape(where)[0], self.size))
-        return (flat - self.centre) / self.spread
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """What is saved."""
-        return {"centre": self.centre, "spread": self.spread}
+        return tf.reshape(logs, (tf.shape(sums)[0], tf.shape(where)[0], self.size))

@@ -26,7 +26,7 @@ _KINDS = {
 _AUTOREGRESSIVE_NETWORK = "autoregressive network"
 # beginnings of the names of its arrays
 _WEIGHT, _PREDICTION, _PAST = "weight_", "prediction_", "past_"
-_CALIBRATION, _CHANGES, _SELECTION = "calibration_", "changes_", "selection_"
+_CALIBRATION, _SELECTION = "calibration_", "selection_"
 _OLD_NAMES = {"resampled": "residual windows"}  # of models that were saved before
 
 
@@ -77,8 +77,6 @@ def state_of(model: Any) -> NoiseState:
         arrays = {f"{_WEIGHT}{number:02}": weight for number, weight in enumerate(model.network.get_weights())}
         if model.prediction is not None:
             arrays |= {_PREDICTION + name: values for name, values in model.prediction.arrays.items()}
-        if model.changes is not None:
-            arrays |= {_CHANGES + name: values for name, values in model.changes.arrays.items()}
         if model.selection is not None:
             arrays |= {_SELECTION + name: values for name, values in model.selection.arrays.items()}
         if model.pasts is not None:
@@ -120,7 +118,6 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
     if kind == _AUTOREGRESSIVE_NETWORK:
         from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
         from enhsim_tf.noise.calibration import Calibration
-        from enhsim_tf.noise.changes import Changes
         from enhsim_tf.noise.linear_prediction import LinearPrediction
         from enhsim_tf.noise.selection import Selection
 
@@ -130,14 +127,12 @@ def model_from(settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]
         tails = str(values.pop("tails", "softplus"))  # models that were saved before do not say
         model = AutoregressiveNetwork(**{"sees_predictions": False, "sees_changes": False, "num_rare": 2} | values)
         model.set_weights([arrays[name] for name in sorted(arrays) if name.startswith(_WEIGHT)], tails)
-        predictions, pasts, calibration, changes, selection = (
+        predictions, pasts, calibration, selection = (
             {name.removeprefix(kind): each for name, each in arrays.items() if name.startswith(kind)}
-            for kind in (_PREDICTION, _PAST, _CALIBRATION, _CHANGES, _SELECTION)
+            for kind in (_PREDICTION, _PAST, _CALIBRATION, _SELECTION)
         )
         if model.sees_predictions:
             model.prediction = LinearPrediction.from_arrays(predictions, model.window)
-        if model.changes is not None:
-            model.changes = Changes(model.window, changes["centre"], changes["spread"])
         if pasts:
             model.pasts = model_from({"kind": "matched residual windows" if model.follows_signal else "residual windows"}, {}, pasts)
             if model.pasts.windows.shape[1] >= model.window:

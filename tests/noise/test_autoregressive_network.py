@@ -117,6 +117,24 @@ def test_samples_after_a_past_have_the_density_that_training_sees():
         assert kstest(below, "uniform").statistic > 0.06, "the past of another window would not be noticed"
 
 
+def test_inputs_of_the_hidden_layers_are_standardised(coloured):
+    noise, network = coloured
+    windows = (noise[:1_000] / network.scale).astype(np.float32)
+    where = tf.constant(network._places(20))
+    features, _ = network._features(tf.constant(windows), tf.zeros((1_000, 0)), tf.constant(network._derived(windows)), where)
+    found = network.network.get_layer("standardise")(features).numpy()
+    assert np.abs(found.mean(axis=0)).max() < 0.1 and np.abs(found.std(axis=0) - 1).max() < 0.1
+
+
+def test_a_saved_network_whose_inputs_have_no_spread_is_refused(coloured):
+    _, network = coloured
+    weights, names = network.network.get_weights(), [each.path for each in network.network.weights]
+    (place,) = [number for number, name in enumerate(names) if name.endswith("spread")]
+    weights[place] = 0 * weights[place]
+    with pytest.raises(ValueError, match="spread"):
+        AutoregressiveNetwork(**network.get_config()).set_weights(weights)
+
+
 def test_a_series_goes_on_from_the_window_that_was_chosen():
     """After each window, one of four candidates is chosen: what follows has the density that training sees after this one, not another."""
     noise = AutoregressiveNoise(0.9, 1.0).draw(1_000 * SAMPLES, np.random.default_rng(4)).reshape(-1, SAMPLES)

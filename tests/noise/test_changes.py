@@ -31,23 +31,13 @@ def test_white_noise_has_changes_of_known_size():
         assert np.mean(np.exp(before[:, number, 2])) == pytest.approx(expected, rel=0.01)
 
 
-def test_fitted_changes_are_standardised():
-    changes = Changes(64)
-    sums = changes.sums(NOISE)
-    fitted = changes.fit(sums, np.array([40, 63]))
-    found = np.concatenate([fitted.before(np.moveaxis(sums, 2, 0), place) for place in (40, 63)])
-    assert_allclose(found.mean(axis=0), 0, atol=1e-4)
-    assert_allclose(found.std(axis=0), 1, atol=1e-4)
-
-
 def test_training_sees_what_generation_sees():
     changes = Changes(64)
     sums, places = changes.sums(NOISE), np.array([0, 1, 17, 63])
-    fitted = changes.fit(sums, places)
-    seen = fitted.features(tf.constant(sums), tf.constant(places, tf.int32)).numpy()
+    seen = changes.features(tf.constant(sums), tf.constant(places, tf.int32)).numpy()
     for number, place in enumerate(places):
-        assert_allclose(seen[:, number], fitted.before(np.moveaxis(sums, 2, 0).astype(np.float64), place), atol=2e-4)
-    assert seen.shape == (50, 4, fitted.size) and np.ptp(seen[:, 2:], axis=0).min() > 0
+        assert_allclose(seen[:, number], changes.before(np.moveaxis(sums, 2, 0).astype(np.float64), place), atol=2e-4)
+    assert seen.shape == (50, 4, changes.size) and np.ptp(seen[:, 2:], axis=0).min() > 0
 
 
 def test_changes_of_the_next_sample_are_those_of_the_window_that_contains_it():
@@ -56,9 +46,3 @@ def test_changes_of_the_next_sample_are_those_of_the_window_that_contains_it():
     sums = changes.sums(NOISE)
     next_one = changes.magnitudes(total, 40, changes.lengths)
     assert_allclose(sums[:, 39] + next_one, sums[:, 40], rtol=1e-5)
-
-
-@pytest.mark.parametrize(("centre", "spread"), [(np.zeros(3), None), (None, np.zeros(15)), (None, np.ones(4))])
-def test_changes_that_do_not_belong_to_the_window_are_refused(centre, spread):
-    with pytest.raises(ValueError, match="do not belong"):
-        Changes(64, centre, spread)
