@@ -385,7 +385,10 @@ for environment, about in found["environments"].items():
 # noise that an autoregression describes?
 
 # %%
-simple, learnt = "simulator + autoregression", "simulator + autoregressive network"
+simple = "simulator + autoregression"
+learnt = next(  # its name says which form of the network was tried
+    arm for arm in found["environments"]["white"]["arms"] if arm.startswith("simulator + autoregressive network")
+)
 gaps = {}
 for environment in ("white", "autoregressive"):
     arms = group_with(found["environments"][environment], learnt)["arms"]
@@ -393,7 +396,7 @@ for environment in ("white", "autoregressive"):
         gaps[f"{environment}, {int(number):,} windows"] = excess - arms[simple]["excess"][number]
 say(
     "Share of flagged nominal windows with the network minus that with the autoregression, means over the seeds of the network: "
-    + "; ".join(f"{name} **{100 * gap:+.1f} points**" for name, gap in gaps.items())
+    + "; ".join(f"{name} **{round(100 * gap, 1) + 0.0:+.1f} points**" for name, gap in gaps.items())
     + "."
 )
 assert all(np.isfinite(gap) for gap in gaps.values())
