@@ -387,7 +387,9 @@ for environment, about in found["environments"].items():
 # %%
 simple = "simulator + autoregression"
 learnt = next(  # its name says which form of the network was tried
-    arm for arm in found["environments"]["white"]["arms"] if arm.startswith("simulator + autoregressive network")
+    arm
+    for arm in found["environments"]["white"]["arms"]
+    if arm.startswith("simulator + autoregressive network")
 )
 gaps = {}
 for environment in ("white", "autoregressive"):

@@ -5,13 +5,15 @@ that predicts these conditional densities can represent any stationary noise, up
 and no pulse is built into the network. The network receives the last samples one by one, and the whole past of the window as
 averages of the value and of its magnitude over the last 2, 4, 8, ... samples, as magnitudes of its changes at several resolutions
 (`changes`), and as linear predictions of the value and of the size of its error, which are fitted in closed form (`linear_prediction`).
-The density of a sample is a mixture of Student's t distributions around
-the linear prediction, so that it can have several modes, a skew and heavy tails.
+The density of a sample is a mixture of Student's t distributions around the linear prediction, so that it can have several modes, a skew and
+heavy tails.
 
 Training maximises the likelihood. A network with thousands of weights finds a little structure in any noise, even in white noise,
 whose samples then get heavier tails than they have. What the density takes from the past is therefore shrunk after training, as far
 as the likelihood of held-out windows asks for it (`shrinkage`). If one normal distribution around the linear prediction is as likely, the
-density becomes that. What is left of the difference between predicted and true shape is counted on the training data (`calibration`).
+density becomes that. What is left of the difference between predicted and true shape is counted on the training data (`calibration`). And
+where whole generated windows differ from real ones, one of several is drawn in proportion to how much more often such windows are real
+(`selection`).
 
 Generated noise continues real noise of half a window, unless windows have fewer than eight samples. This noise is drawn at random; where
 the noise may follow the signal, it is drawn from the windows in which the most similar signal came next. Slow states of the noise, such as
@@ -196,6 +198,8 @@ class AutoregressiveNetwork:
             on_iteration: Called after each iteration with the number of completed iterations.
         """
         values = (np.asarray(noise_windows, np.float64) / self.scale).astype(np.float32)
+        starts = None if starts is None else np.asarray(starts)
+        self.calibration = self.selection = None
         rng = np.random.default_rng([self.seed, 61])
         signal = self._signal(signal_windows, values.shape)
         first, last = _split(starts, len(values), self.window, held_out)
@@ -312,6 +316,7 @@ class AutoregressiveNetwork:
 
     def _select(self, values: np.ndarray, signal: np.ndarray, starts: np.ndarray | None) -> None:
         """Learns by what whole windows differ from generated ones; see `selection`."""
+        self.selection = None  # what it learns from must not be selected
 
         def generate(rows: np.ndarray) -> np.ndarray:
             return self._draw(len(rows), self.window, signal[rows], np.random.default_rng([self.seed, 62])) / np.float32(self.scale)
@@ -457,7 +462,10 @@ class AutoregressiveNetwork:
         return self._draw(1, num_samples, signal, np.random.default_rng(seed))[0]
 
     def _draw(self, num_rows: int, num_samples: int, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Draws rows in the unit of the telemetry, in batches that bound the memory."""
+        """Draws rows in the unit of the telemetry; candidates in batches, which bound the memory.
+
+        Each candidate of a first window continues a past of its own.
+        """
         each = 1 if self.selection is None else NUM_CANDIDATES
         whole = num_samples if each == 1 else -(-num_samples // self.window) * self.window  # whole windows are selected
         if self.follows_signal and num_samples:
@@ -465,8 +473,9 @@ class AutoregressiveNetwork:
         else:
             signal = np.zeros((each * num_rows, 0), np.float32)
         past, drawn = self._draw_pasts(each * num_rows, whole, signal, rng), [np.zeros((0, whole), np.float32)]
-        for begin in range(0, each * num_rows, _MOST_ROWS):
-            rows = slice(begin, begin + _MOST_ROWS)
+        most = _MOST_ROWS if each > 1 else max(1, num_rows)  # without candidates, saved models draw what they have always drawn
+        for begin in range(0, each * num_rows, most):
+            rows = slice(begin, begin + most)
             drawn.append(self._continue(past[rows], whole, signal[rows], each, rng))
         return np.concatenate(drawn)[:, :num_samples]
 

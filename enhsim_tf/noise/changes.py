@@ -2,7 +2,7 @@
 
 The best prediction of noise depends on its state: how loud each of its components is, and how large the amplitude of a period. The
 magnitude of the samples tells the loudness of the loudest component only. The magnitudes of the differences between neighbouring averages
-(Haar wavelets) of 1, 2, 4, ... samples tell it for one octave of the spectrum each; they are averaged over the last 16, 64 and 256 samples.
+(Haar wavelets) of 1, 2, 4, ... samples tell it for one octave of the spectrum each; they are averaged over the last 16, 64 and, in windows of at least 512 samples, 256 samples.
 
 References:
     Haar, "Zur Theorie der orthogonalen Funktionensysteme", 1910.
@@ -23,7 +23,7 @@ class Changes:
     """Logarithms of the mean magnitudes of the differences of neighbouring averages.
 
     Args:
-        window: Number of samples of a window; lengths and spans of more than a quarter and half of it are left out.
+        window: Number of samples of a window; lengths above a quarter of it, and spans above half of it, are left out.
     """
 
     def __init__(self, window: int):

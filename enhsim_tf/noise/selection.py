@@ -2,11 +2,14 @@
 
 A model that predicts one sample at a time can be nearly right for each sample and still be off for whole windows: the amplitude of a period
 wanders too far, or quiet stretches are too rare. A classifier of whole windows sees this. A logistic regression tells real from generated
-windows by spectra at three resolutions, quantiles, and how loudness and level vary; its odds estimate how much more often a window is real
-than generated. A window is then drawn from a few candidates in proportion to these odds (sampling importance resampling). The penalty of the
-regression is chosen on held-out blocks of time, and without a gain there nothing is selected.
+windows by spectra at up to three resolutions, quantiles, and how loudness and level vary; its odds estimate how much more often a window is
+real than generated. A window is then drawn from a few candidates in proportion to these odds (sampling importance resampling). The penalty of
+the regression is chosen on held-out blocks of time, and without a gain there nothing is selected.
 
-The features are not those of `realism.window_features`, by which generated noise is judged.
+The odds are those of a window alone. The windows of a long series continue one another, and noise may follow a signal, which the regression
+does not see: there, the selection is a heuristic that moves the noise in the right direction, but not all the way.
+
+Some of the statistics, for example the loudness, are also among those by which `realism` judges generated noise, or are nearly equal to them.
 
 References:
     Rubin, "The calculation of posterior distributions by data augmentation: comment: a noniterative sampling/importance resampling
@@ -19,6 +22,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from enhsim_tf.realism.window_features import DECIMALS
 from enhsim_tf.telemetry.windows import disjoint_rows, time_blocks
 
 NUM_CANDIDATES = 4
@@ -31,13 +35,14 @@ _LEAST_SEGMENT = 16  # samples
 _BANDS_PER_OCTAVE = 4 / 3
 _QUANTILES = (0.0, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0)
 _LARGEST = (1, 5, 25)  # ranks among the magnitudes of a window
+_CONSTANT = 1e-3  # standard deviation up to which a feature counts as constant
 _CLIP = 4.0  # largest standardised feature, in standard deviations: rare windows get no extreme odds
 _TINY_POWER, _TINY = 1e-6, 1e-3  # added to powers and magnitudes before their logarithm is taken
 _MOST_GENERATED = 6_000  # windows that the regression learns from
 
 
 class Selection:
-    """The logarithm of the odds that a window is real, up to a constant.
+    """The logarithm of how much more often a window is real than generated, up to a constant.
 
     Args:
         centre: Mean of each feature of real windows, shape `(features,)`.
@@ -57,11 +62,11 @@ class Selection:
 
     @classmethod
     def fit(cls, real: np.ndarray, generate: Callable[[np.ndarray], np.ndarray], starts: np.ndarray | None = None) -> "Selection | None":
-        """Fits the regression, with the penalty whose gain on held-out blocks of time is surely the largest.
+        """Fits the regression, with the penalty whose gain on held-out blocks of time is the largest after its standard error is subtracted.
 
         The gain is the lower bound of Donsker and Varadhan on the Kullback-Leibler divergence of generated from real windows: by so much
-        the divergence falls if generated windows are weighted with the odds. It is computed for each block, and its standard error is
-        subtracted from its mean.
+        the divergence falls if generated windows are weighted with the odds. It is computed for each block; the standard error is that of the
+        mean over the blocks.
 
         Args:
             real: Real windows in units of their standard deviation, shape `(windows, samples)`.
@@ -78,7 +83,7 @@ class Selection:
         generated = generate(np.linspace(0, len(real) - 1, min(len(real), _MOST_GENERATED)).astype(int))
         features = window_statistics(real)
         spread = np.std(features, axis=0)
-        plain = cls(np.mean(features, axis=0), np.where(spread > 0, spread, 1), np.zeros(2 * features.shape[1]))
+        plain = cls(np.mean(features, axis=0), np.where(spread > _CONSTANT, spread, 1), np.zeros(2 * features.shape[1]))
         wanted, had = plain._expand(features), plain._expand(window_statistics(generated))
         blocks, folds = time_blocks(starts, _NUM_BLOCKS, window), np.arange(len(had)) % _NUM_BLOCKS
         best, chosen = 0.0, None
@@ -131,8 +136,8 @@ class Selection:
 def window_statistics(windows: np.ndarray) -> np.ndarray:
     """Computes what the regression sees of each window.
 
-    Spectra are Hann-tapered periodograms of segments of a whole, a quarter and a sixteenth of a window, in bands of three quarters of an
-    octave: the mean logarithm over the segments, and its standard deviation. Of the loudness and the level of the segments, the features
+    Spectra are Hann-tapered periodograms of segments of a whole, a quarter and a sixteenth of a window, in bands of about two thirds of
+    an octave: the mean logarithm over the segments, and its standard deviation. Of the loudness and the level of the segments, the features
     are the extremes and how much they vary. Further features are quantiles, large magnitudes, and the loudness of values and steps.
 
     Args:
@@ -141,7 +146,7 @@ def window_statistics(windows: np.ndarray) -> np.ndarray:
     Returns:
         float64 array of shape `(windows, features)`.
     """
-    values = np.asarray(windows, np.float32)
+    values = np.round(np.asarray(windows, np.float32), DECIMALS)
     samples = values.shape[1]
     columns = []
     for length in (samples // divisor for divisor in _DIVISORS if samples // divisor >= _LEAST_SEGMENT):

@@ -162,7 +162,7 @@ def test_a_series_goes_on_from_the_window_that_was_chosen():
             assert statistic < 0.067 if place == 0 else statistic > 0.15  # 0.067 is exceeded by chance once in a hundred
 
 
-def test_candidates_of_which_all_are_alike_change_nothing_of_the_noise(coloured):
+def test_nothing_is_selected_where_the_network_is_right(coloured):
     noise, network = coloured
     assert network.selection is None, "an autoregression is learnt so well that no window is told apart"
     assert len(noise) >= LEAST_DISJOINT, "it would have been judged"

@@ -48,6 +48,18 @@ def test_windows_that_do_not_differ_are_not_selected():
     assert Selection.fit(_windows(2_000, 0.3, 1)[0], lambda rows: _windows(len(rows), 0.3, 2)[0]) is None
 
 
+def test_rounding_errors_of_telemetry_are_no_difference():
+    """Noise of two levels, of which the real one is a difference of 32-bit numbers, and the generated one exactly on the levels."""
+
+    def levels(number: int, seed: int) -> np.ndarray:
+        return np.where(np.random.default_rng(seed).random((number, SAMPLES)) < 0.5, -1.0, 1.0).astype(np.float32)
+
+    signal = np.float32(20) * np.sin(np.arange(SAMPLES, dtype=np.float32))
+    real = (levels(1_000, 1) + signal) - signal
+    assert 0 < np.abs(real - levels(1_000, 1)).max() < 1e-5
+    assert Selection.fit(real, lambda rows: levels(len(rows), 2)) is None
+
+
 def test_too_little_telemetry_is_not_judged():
     def generate(rows: np.ndarray) -> np.ndarray:
         raise AssertionError("nothing has to be generated")
@@ -94,7 +106,7 @@ def test_a_saved_selection_chooses_the_same_candidates(fitted):
         ({}, 32, "this window"),
     ],
 )
-def test_a_selection_that_is_none_is_refused(fitted, changed, window, words):
+def test_a_damaged_selection_is_refused(fitted, changed, window, words):
     arrays = fitted.arrays
     changed = {name: 0 * arrays[name] if values is None else values for name, values in changed.items()}
     with pytest.raises(ValueError, match=words):
