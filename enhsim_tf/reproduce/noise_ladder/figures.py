@@ -43,7 +43,7 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         _message(kept["within"], rung),
         f"Mean over {in_words(len(DETECTORS))} detectors whose thresholds are set for 1 % (vertical line); {in_words(seeds)} seed"
         f"{'s' * (seeds > 1)}{fewer}. The scale is linear below 1 % and logarithmic above. Limits: {100 * kept['looked at']['limit']:.0f} point above real "
-        f"windows on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the others. "
+        f"windows of the same seeds on the families that the design may look at, {100 * kept['unseen']['limit']:.0f} points on the others. "
         f"Families within {100 * kept['looked at']['limit']:.0f} point: {', '.join(strict)}. "
         "Not shown: without noise, detectors flag nearly all windows.",
     )

@@ -91,7 +91,7 @@ def limits(found: Findings) -> str:
         )
     for family, excess in kept["revised"].items():
         lines.append(
-            f"- {family.replace('_', ' ').capitalize()} noise, for which the {kept['rung']} was changed after its first result: {100 * excess:.1f} points."
+            f"- {family.replace('_', ' ').capitalize()} noise, for which the {kept['rung']} was changed after its first result: {round(100 * excess, 1) + 0.0:.1f} points."
         )
     others = [f"{name} {about['kept']} of {about['of']}" for name, about in kept["within"].items() if about["of"] and name != kept["rung"]]
     lines.append(f"- Families on which each of the other models keeps these limits: {', '.join(others)}.")
