@@ -64,7 +64,6 @@ COUNTS = {
     "labelled.num_folds",
     "labelled.num_seeds",
     "ladder.num_windows",
-    "ladder.num_seeds",
     "curve.num_seeds",
     "curve.num_real",
     "curve.num_windows",
