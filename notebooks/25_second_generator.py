@@ -194,15 +194,17 @@ def negative_log_likelihood(network, degrees, past, sample):
 
 # %% [markdown]
 # Training makes this number small, with Adam and nothing else: no second network, no equilibrium, and a loss that says how good the model
-# is. The package's network does four things more. Its density starts from the best linear prediction of the sample, which is that of an
-# autoregression as above, and from one of the size of its error. After training, what it takes from the past is shrunk until held-out
+# is. The package's network does six things more. Its density starts from the best linear prediction of the sample, which is that of an
+# autoregression as above, and from one of the size of its error. It also sees how loud each octave of the spectrum has recently been, with
+# all inputs standardised. After training, what it takes from the past is shrunk until held-out
 # windows gain from it: a network with thousands of weights finds a little structure even in white noise. The shape of the density is
-# corrected by how often real samples lie below each of its quantiles. And generated noise continues a piece of real noise, from which it
-# takes slow states such as its loudness. On a small instance without all this, with the package's weights, the loss at some positions must
-# be that of the package:
+# corrected by how often real samples lie below each of its quantiles. Generated noise continues a piece of real noise, from which it takes
+# slow states such as its loudness. And of four generated windows, one is drawn in proportion to how much more often such windows are real,
+# if there are enough windows to learn this. On a small instance without all this, with the package's weights, the loss at some positions
+# must be that of the package:
 
 # %%
-tiny = AutoregressiveNetwork.untrained(example[:100, :40], seed=1, sees_predictions=False)
+tiny = AutoregressiveNetwork.untrained(example[:100, :40], seed=1, sees_predictions=False, sees_changes=False)
 tiny.fit(example[:100, :40], 20)
 names = ("linear", "first", "second", "last")
 first_input = past_of(example[:1, :40], 0, 40)

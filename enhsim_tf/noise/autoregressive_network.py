@@ -118,7 +118,12 @@ class AutoregressiveNetwork:
 
     @classmethod
     def untrained(
-        cls, noise_windows: np.ndarray, signal_windows: np.ndarray | None = None, seed: int = 0, sees_predictions: bool = True
+        cls,
+        noise_windows: np.ndarray,
+        signal_windows: np.ndarray | None = None,
+        seed: int = 0,
+        sees_predictions: bool = True,
+        sees_changes: bool = True,
     ) -> "AutoregressiveNetwork":
         """Creates an untrained network for noise windows of shape `(windows, samples)`, with their scale, limit and step.
 
@@ -127,6 +132,7 @@ class AutoregressiveNetwork:
             signal_windows: Enhanced signal of the same shape, if the noise may depend on it.
             seed: Seed for the initial weights and for all random numbers in training.
             sees_predictions: Whether the density starts from linear predictions.
+            sees_changes: Whether the network sees changes at several resolutions, and its inputs are standardised.
         """
         noise = np.asarray(noise_windows, np.float64)
         scale = float(np.std(noise))
@@ -135,7 +141,17 @@ class AutoregressiveNetwork:
         limit = _LIMIT * float(np.max(np.abs(noise))) / scale
         levels = Levels.find(noise)
         step, origin = (0.0, 0.0) if levels is None else (levels.step, levels.origin)
-        return cls(noise.shape[1], scale, limit, step, origin, signal_windows is not None, sees_predictions=sees_predictions, seed=seed)
+        return cls(
+            noise.shape[1],
+            scale,
+            limit,
+            step,
+            origin,
+            signal_windows is not None,
+            sees_predictions=sees_predictions,
+            sees_changes=sees_changes,
+            seed=seed,
+        )
 
     def _build(self) -> keras.Model:
         """Builds the network: features of the past to logits, means and logarithms of the scales of the components."""
