@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
 WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_adam keras_tools.blockwise_training keras_tools.convolution_maximum
     enhancer.network enhancer.ladder enhancer.rung_networks noise.generator noise.discriminator noise.gan noise.latent noise.convolutional_gan
-    noise.autoregressive_network noise.shrinkage noise.linear_noise noise.guarded_training
+    noise.autoregressive_network noise.changes noise.shrinkage noise.linear_noise noise.guarded_training
     enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting enhanced_simulator.choosing
     enhanced_simulator.updating
     enhanced_simulator.runs.model enhanced_simulator.runs.fitting enhanced_simulator.runs.residuals""".split()
