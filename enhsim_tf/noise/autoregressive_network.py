@@ -529,7 +529,7 @@ class AutoregressiveNetwork:
         if changes is not None:
             changed[:, :, 1 : known + 1] = np.cumsum(
                 [changes.magnitudes(sums[0], np.arange(1, known + 1), length) for length in changes.lengths], axis=2
-            ).reshape(len(changes.lengths), num_rows, known)
+            )
         features = np.zeros((num_rows, len(first_layer[0])), np.float32)
         for place in range(known, known + num_samples):
             begin, now = np.maximum(place - self.octaves, 0), reach + place
