@@ -12,8 +12,7 @@ does not see: there, the selection is a heuristic that moves the noise in the ri
 Some of the statistics, for example the loudness, are also among those by which `realism` judges generated noise, or are nearly equal to them.
 
 References:
-    Rubin, "The calculation of posterior distributions by data augmentation: comment: a noniterative sampling/importance resampling
-        alternative", 1987.
+    Rubin, "A noniterative sampling/importance resampling alternative to the data augmentation algorithm", 1987.
     Donsker and Varadhan, "Asymptotic evaluation of certain Markov process expectations for large time", 1975.
     Azadi et al., "Discriminator rejection sampling", 2019.
 """
