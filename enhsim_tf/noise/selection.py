@@ -21,13 +21,13 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from enhsim_tf.noise.block_means import NUM_BLOCKS, margin
 from enhsim_tf.realism.window_features import DECIMALS
 from enhsim_tf.telemetry.windows import disjoint_rows, time_blocks
 
 NUM_CANDIDATES = 4
 LEAST_WINDOW = 64  # samples; shorter windows have no spectra at several resolutions
 LEAST_DISJOINT = 200  # windows of the telemetry, below which nothing is selected: twenty in each held-out block
-_NUM_BLOCKS = 10
 _PENALTIES = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01)  # of the squared weights of standardised features
 _DIVISORS = (1, 4, 16)  # of a window: the lengths of the segments whose spectra are seen
 _LEAST_SEGMENT = 16  # samples
@@ -61,7 +61,7 @@ class Selection:
 
     @classmethod
     def fit(cls, real: np.ndarray, generate: Callable[[np.ndarray], np.ndarray], starts: np.ndarray | None = None) -> "Selection | None":
-        """Fits the regression, with the penalty whose gain on held-out blocks of time is the largest after its standard error is subtracted.
+        """Fits the regression with the penalty that gains most on held-out blocks of time, after two standard errors are subtracted.
 
         The gain is the lower bound of Donsker and Varadhan on the Kullback-Leibler divergence of generated from real windows: by so much
         the divergence falls if generated windows are weighted with the odds. It is computed for each block; the standard error is that of the
@@ -84,14 +84,14 @@ class Selection:
         spread = np.std(features, axis=0)
         plain = cls(np.mean(features, axis=0), np.where(spread > _CONSTANT, spread, 1), np.zeros(2 * features.shape[1]))
         wanted, had = plain._expand(features), plain._expand(window_statistics(generated))
-        blocks, folds = time_blocks(starts, _NUM_BLOCKS, window), np.arange(len(had)) % _NUM_BLOCKS
+        blocks, folds = time_blocks(starts, NUM_BLOCKS, window), np.arange(len(had)) % NUM_BLOCKS
         best, chosen = 0.0, None
         for penalty in _PENALTIES:
             gains = []
             for number, (training, held_out) in enumerate(blocks):
                 weights = _regress(wanted[training], had[folds != number], penalty)
                 gains.append(_gain(wanted[held_out] @ weights, had[folds == number] @ weights))
-            surely = float(np.mean(gains) - np.std(gains, ddof=1) / np.sqrt(len(gains)))
+            surely = float(np.mean(gains)) - margin(gains)
             if surely > best:
                 best, chosen = surely, penalty
         return None if chosen is None else cls(plain.centre, plain.spread, _regress(wanted, had, chosen))

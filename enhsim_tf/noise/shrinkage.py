@@ -15,8 +15,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from enhsim_tf.keras_tools.backend import tf
+from enhsim_tf.noise.block_means import block_slices, margin
 
-_NEARLY_LEAST = 1e-4  # held-out loss above the least one up to which constants are as good
+_NEARLY_LEAST = 1e-4  # held-out loss above the least one up to which constants are as good in any case
 _MOST_LEARNT = 0.01  # loss above that of shrunk outputs on the training data up to which this counts: little held-out data can be alike
 _ROUNDS = 2  # trusts and constants in turn
 _STOP = {"ftol": 1e-10, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
@@ -47,13 +48,14 @@ def shrink(
 ) -> Shrunk:
     """Finds the trust of each group of outputs, and their constants.
 
-    The result is the first of the following whose held-out loss is nearly the least: the simplest constants, constants that are fitted,
-    and outputs that are shrunk. Constants must not lose much on the training data either.
+    The result is the first of the following whose held-out loss is not surely above the least: the simplest constants, constants that are
+    fitted, and outputs that are shrunk. Differences that chance explains do not count (`block_means`), because trusts are
+    fitted to the held-out data and always gain a little. Constants must not lose much on the training data either.
 
     Args:
         loss: Mean loss, given targets, outputs and `weights`.
         learnt: Outputs of shape `(samples, outputs)` and targets of the training data.
-        held_out: The same for held-out data.
+        held_out: The same for held-out data, in the order of time.
         sizes: Numbers of outputs of each group.
         weights: Other numbers that depend on no input and are fitted together with the constants.
         simplest: Constants and weights that would be preferred, or None.
@@ -102,10 +104,18 @@ def shrink(
     if without_trust(fitted)[0] <= of_constants(constants, trust)[0] + _MOST_LEARNT:
         fitted = minimize(without_trust, fitted, (), "L-BFGS-B", jac=True, options=_STOP | {"maxiter": _MORE_STEPS}).x
     tried = [(none, fitted), (trust, constants)] if simplest is None else [(none, simplest), (none, fitted), (trust, constants)]
-    held, own = ([evaluate(*each, some)[0] for each in tried] for some in (held_out, learnt))
+    blocks = [tuple(part[block] for part in held_out) for block in block_slices(len(held_out[0]))]
+    held = np.array([[evaluate(*each, block)[0] for block in blocks] for each in tried])
+    own = [evaluate(*each, learnt)[0] for each in tried]
+    best = held[np.argmin(held.mean(axis=1))]
     for each, on_held_out, on_learnt in zip(tried, held, own, strict=True):
-        if on_held_out <= min(held) + _NEARLY_LEAST and on_learnt <= own[-1] + _MOST_LEARNT:
+        if _nearly_least(on_held_out - best) and on_learnt <= own[-1] + _MOST_LEARNT:
             trust, constants = each
             break
     each = trust @ spread
     return Shrunk(each, constants[:number] - each * centre, constants[number:])
+
+
+def _nearly_least(differences: np.ndarray) -> bool:
+    """Tells whether losses, given as differences from the least one in each block of time, are not surely above it."""
+    return bool(np.mean(differences) <= max(_NEARLY_LEAST, margin(differences)))

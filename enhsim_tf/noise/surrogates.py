@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.noise.block_means import block_slices, margin
 
 _NEARLY_LEAST = 5e-4  # relative excess of the held-out error up to which a larger order is as good
 
@@ -64,7 +65,8 @@ class GaussianAutoregression:
 
         AIC counts all samples as different ones, and chooses orders that are too high where windows of a short record overlap. Held-out
         windows choose the largest order whose squared error there is within 0.05 % of the least one: what a high order adds hardly helps
-        to predict the next sample, but it makes the slow variation of noise with a long memory.
+        to predict the next sample, but it makes the slow variation of noise with a long memory. If no order predicts surely better than none,
+        the noise is white: many coefficients that are nearly zero would change its spectrum.
 
         Args:
             windows: Noise windows of shape `(windows, samples)`.
@@ -82,7 +84,14 @@ class GaussianAutoregression:
         variance, coefficients = np.mean(forward**2), np.zeros(0)
         if not variance > 0:
             raise InputError("Expected noise that varies. Received: windows of one value.")
-        orders, criteria, errors = [(coefficients, variance)], [windows.size * np.log(variance)], [np.sum(ahead[:, max_order:] ** 2)]
+        orders, criteria = [(coefficients, variance)], [windows.size * np.log(variance)]
+        blocks = block_slices(len(ahead))
+
+        def squares() -> list[float]:  # in each block of held-out time; of the same samples for all orders
+            rows = np.sum(ahead[:, max_order + 1 - len(orders) :] ** 2, axis=1)
+            return [float(np.sum(rows[block])) for block in blocks]
+
+        errors = [squares()]
         for order in range(1, max_order + 1):
             forward, backward, ahead, behind = forward[:, 1:], backward[:, :-1], ahead[:, 1:], behind[:, :-1]
             power = np.sum(forward**2) + np.sum(backward**2)
@@ -95,11 +104,15 @@ class GaussianAutoregression:
             variance *= 1 - reflection**2
             orders.append((coefficients, variance))
             criteria.append(windows.size * np.log(variance) + 2 * order)
-            errors.append(np.sum(ahead[:, max_order - order :] ** 2))  # the same samples for all orders
+            errors.append(squares())
         if held_out is None:
             chosen = int(np.argmin(criteria))
         else:
-            chosen = int(np.flatnonzero(np.array(errors) <= (1 + _NEARLY_LEAST) * min(errors))[-1])
+            by_block = np.array(errors)
+            total = np.sum(by_block, axis=1)
+            gains = by_block[0] - by_block[np.argmin(total)]
+            is_predicted = np.mean(gains) > margin(gains)
+            chosen = int(np.flatnonzero(total <= (1 + _NEARLY_LEAST) * np.min(total))[-1]) if is_predicted else 0
         coefficients, variance = orders[chosen]
         return cls(coefficients, np.sqrt(variance), windows.shape[1])
 

@@ -45,6 +45,16 @@ def test_held_out_windows_choose_the_order_where_windows_overlap():
     assert chosen.coefficients[0] == pytest.approx(0.7, abs=0.06)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_white_noise_is_predicted_by_its_mean(seed):
+    """Held-out windows cannot tell many coefficients near zero from none: less than 0.05 % of the squared error."""
+    noise = np.random.default_rng(seed).standard_normal((10_000, 100))
+    assert len(GaussianAutoregression.fit(noise[:9_000], 50, noise[9_000:]).coefficients) == 0
+    weak = AutoregressiveNoise(0.05, 1.0).draw(1_000_000, np.random.default_rng(seed)).reshape(-1, 100)
+    found = GaussianAutoregression.fit(weak[:9_000], 50, weak[9_000:]).coefficients
+    assert found[0] == pytest.approx(0.05, abs=0.004)  # four standard errors of a coefficient: 4 / sqrt(900,000)
+
+
 def test_noise_with_a_long_memory_keeps_its_slow_variation():
     noise = FractionalGaussianNoise(0.8, 1.0).draw(400_000, np.random.default_rng(2)).reshape(-1, 200)
     model = GaussianAutoregression.fit(noise[:1_800], 100, noise[1_800:])

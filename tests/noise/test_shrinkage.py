@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.keras_tools.backend import tf
-from enhsim_tf.noise.shrinkage import shrink
+from enhsim_tf.noise.shrinkage import _nearly_least, shrink
 
 NUMBER = 4_000
 
@@ -63,6 +63,28 @@ def test_constants_that_the_training_data_contradict_are_not_preferred():
     simplest = np.array([0.0, 0.0, 3.0])
     assert shrink(squares, learnt, alike, (1, 1), np.full(1, 3, np.float32), simplest).trust[0] > 0.9
     assert shrink(squares, alike, alike, (1, 1), np.full(1, 3, np.float32), simplest).trust[0] == 0
+
+
+@pytest.mark.parametrize(("told_in", "is_trusted"), [(range(10), True), ((0, 5), False)])
+def test_outputs_are_trusted_if_they_help_in_most_blocks_of_time(told_in, is_trusted):
+    """The first output tells as much of the targets in the mean over ten blocks, but either in each block, or in two of them only."""
+    rng = np.random.default_rng(3)
+    told, chance = rng.standard_normal((2, 10, NUMBER // 10))
+    share = np.isin(np.arange(10), told_in) / len(told_in)  # its mean over the blocks is a tenth
+    targets = 5 + share[:, None] * told + 0.02 * rng.standard_normal(told.shape)
+    held_out = tf.constant(np.stack([told, chance], axis=2).reshape(-1, 2), tf.float32), tf.constant(targets.reshape(-1, 1), tf.float32)
+    learnt = held_out[0], tf.constant(targets.reshape(-1, 1)[rng.permutation(NUMBER)], tf.float32)  # in which nothing is told
+    found = shrink(squares, learnt, held_out, (1, 1), np.zeros(1, np.float32))
+    assert (found.trust[0] > 0.05) == is_trusted
+    assert (found.trust[0] == 0) == (not is_trusted)
+
+
+def test_a_difference_is_sure_from_two_standard_errors_on():
+    differences = np.array([0.0, 0.0, 0.002, 0.002])  # mean 0.001, standard deviation 0.002 / sqrt(3), standard error 0.001 / sqrt(3)
+    assert _nearly_least(differences)
+    assert _nearly_least(differences + 0.00015)  # 0.00115 is below 2 * 0.000577 = 0.001155
+    assert not _nearly_least(differences + 0.00016)
+    assert _nearly_least(np.array([0.0001])) and not _nearly_least(np.array([0.0002]))  # one block has no standard error
 
 
 def test_a_trust_is_never_beyond_one():
