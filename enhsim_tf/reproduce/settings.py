@@ -216,7 +216,7 @@ class LadderSettings:
 
     num_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: fourteen families take hours for each seed; --seeds asks for more")
     first_seed: int = setting(
-        3_007, "seed", f"{OUR_CHOICE}: models and rule were fixed before it; former ones were judged on seeds from 3000 on"
+        3_008, "seed", f"{OUR_CHOICE}: models and rule were fixed before it; former ones were judged on seeds from 3000 on"
     )
     num_windows: int = setting(5_000, "windows", f"{OUR_CHOICE}: windows of true noise that the models learn", smoke=120)
     num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)

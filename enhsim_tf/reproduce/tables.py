@@ -67,3 +67,23 @@ class KeptTables:
             for column in set(self.labels) & set(table.columns):
                 table[column] = table[column].astype(str)  # categories back to strings
         return tables
+
+    def with_earlier_seeds(self, tables: "Mapping[str, pd.DataFrame]", folder: Path, first_seed: int) -> "dict[str, pd.DataFrame]":
+        """Adds the rows of a folder's tables whose seed is before the first one of a run.
+
+        Published results of former models cannot be computed again with the present code; a new run must not lose them.
+
+        Args:
+            tables: The tables of the run by name, each with the column `seed`.
+            folder: A folder that may hold such tables.
+            first_seed: First seed of the run.
+
+        Returns:
+            The tables, those rows first.
+        """
+        import pandas as pd
+
+        if not all((folder / f"{name}.parquet").is_file() for name in self.names):
+            return dict(tables)
+        kept = self.read(folder)
+        return {name: pd.concat([kept[name][kept[name]["seed"] < first_seed], table], ignore_index=True) for name, table in tables.items()}

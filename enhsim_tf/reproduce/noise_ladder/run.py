@@ -19,7 +19,7 @@ FOLDER = "noise"  # below the folder of the figures
 def run(
     settings: Settings, cache: Path, out: Path, families: Sequence[str], rungs: Sequence[str], fresh: bool, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Runs the experiment and writes its results; finished rungs are read from the cache.
+    """Runs the experiment and writes its results; finished rungs are read from the cache, and rows of former seeds in `out` are kept.
 
     Args:
         settings: All settings; `ladder.num_seeds` says how many seeds.
@@ -45,6 +45,7 @@ def run(
     first = settings.ladder.first_seed
     seeds = range(first, first + settings.ladder.num_seeds)
     tables = collect("noise", seed_by_seed(replicate, families, seeds), cache, fresh, tell)
+    tables = KEPT.with_earlier_seeds(tables, out, first)
     return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
 
 
