@@ -231,10 +231,11 @@ def _limits(families: dict[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
 def _choices(families: dict[str, Any], rule: str, rung: str) -> dict[str, Any]:
     """How far the detectors of what a rule chooses are from those of the best rung.
 
-    The best rung of a family has the fewest false alarms in the mean over the seeds that the rule judged: the best of each seed would be
-    the luckiest. A rung with few false alarms can be one whose detectors miss anomalies; the best rung is therefore also found among those
-    that lose at most `MAX_RECALL_DIFFERENCE` (`that_finds`; among all rungs if there is none). And since fewer alarms than after training
-    on real windows come from thresholds that are too high, such a best rung is also counted as real windows (`above_real`).
+    Excess is what detectors alarm more than after training on real windows. Fewer alarms come from thresholds that are too high, so that a
+    rung with fewer has no excess (`above_real`; the limit since seed 3008). Before that seed, the best rung was the one with the fewest alarms
+    (`kept`), which is counted, too. It is found in the mean over the seeds that the rule judged: the best of each seed would be the luckiest.
+    A rung with few false alarms can be one whose detectors miss anomalies; the best rung is therefore also found among those that lose at
+    most `MAX_RECALL_DIFFERENCE` (`that_finds`; among all rungs if there is none).
     """
     judged = {name: [each for each in about["choices"] if each["rule"] == rule] for name, about in families.items()}
     judged = {name: each for name, each in judged.items() if each}
