@@ -1,17 +1,21 @@
-"""Means over blocks of time, and how far chance moves them (used by the noise models of section 2.3).
+"""How far chance moves a mean over blocks of time (used by the noise models of section 2.3).
 
-Noise is often correlated over many samples, so that samples and overlapping windows are no independent observations. A difference between
-two models is therefore computed for each of ten blocks of held-out time, and counts if its mean is above two standard errors, which are
-estimated from the blocks.
+Noise is often correlated over many samples, so that neighbouring samples, and windows that overlap, are not independent observations. A
+difference between two models is therefore computed for each of ten blocks of held-out time. It counts only if its mean is above two standard
+errors, which are estimated from the blocks; with fewer blocks, above as many as are exceeded equally rarely. A gain that comes from less
+than four of ten blocks does not count, however large it is.
 
 References:
+    Student, "The probable error of a mean", 1908.
     Breiman, Friedman, Olshen and Stone, "Classification and regression trees", 1984: the simplest model within one standard error.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 NUM_BLOCKS = 10
-_STANDARD_ERRORS = 2.0  # one lets chance decide too often where the best of several models is compared
+_STANDARD_ERRORS = 2.0  # for ten blocks
 
 
 def block_slices(number: int) -> list[slice]:
@@ -20,8 +24,16 @@ def block_slices(number: int) -> list[slice]:
     return [slice(begin, end) for begin, end in zip(edges[:-1], edges[1:], strict=True)]
 
 
-def margin(differences: np.ndarray) -> float:
-    """Returns two standard errors of the mean of differences, one for each block; of a single block nothing is known, and it is 0."""
-    if len(differences) < 2:
-        return 0.0
-    return float(_STANDARD_ERRORS * np.std(differences, ddof=1) / np.sqrt(len(differences)))
+def margin(differences: Sequence[float] | np.ndarray) -> float:
+    """Returns what the mean of the differences of blocks exceeds by chance with a probability of 4 %: two standard errors for ten blocks.
+
+    Args:
+        differences: One number for each block. From a single one, chance cannot be estimated, and the margin is infinite.
+    """
+    from scipy.special import stdtr, stdtrit
+
+    number = len(differences)
+    if number < 2:
+        return np.inf
+    times = stdtrit(number - 1, stdtr(NUM_BLOCKS - 1, _STANDARD_ERRORS))  # exceeded equally rarely, by Student's t distribution
+    return float(times * np.std(differences, ddof=1) / np.sqrt(number))

@@ -42,7 +42,7 @@ class LinearPrediction:
 
         Args:
             windows: Noise windows in units of their standard deviation, shape `(windows, samples)`.
-            held_out: Other noise windows, which choose the orders.
+            held_out: Other noise windows, in the order of time, which choose the orders.
         """
         order = min(_MAX_ORDER, windows.shape[1] // 2)
         values = GaussianAutoregression.fit(windows, order, held_out)

@@ -4,7 +4,7 @@ A model that predicts one sample at a time can be nearly right for each sample a
 wanders too far, or quiet stretches are too rare. A classifier of whole windows sees this. A logistic regression tells real from generated
 windows by spectra at up to three resolutions, quantiles, and how loudness and level vary; its odds estimate how much more often a window is
 real than generated. A window is then drawn from a few candidates in proportion to these odds (sampling importance resampling). The penalty of
-the regression is chosen on held-out blocks of time, and without a gain there nothing is selected.
+the regression is chosen on held-out blocks of time, and without a gain there that is beyond chance nothing is selected.
 
 The odds are those of a window alone. The windows of a long series continue one another, and noise may follow a signal, which the regression
 does not see: there, the selection is a heuristic that moves the noise in the right direction, but not all the way.
@@ -61,11 +61,11 @@ class Selection:
 
     @classmethod
     def fit(cls, real: np.ndarray, generate: Callable[[np.ndarray], np.ndarray], starts: np.ndarray | None = None) -> "Selection | None":
-        """Fits the regression with the penalty that gains most on held-out blocks of time, after two standard errors are subtracted.
+        """Fits the regression with the penalty that gains most on held-out blocks of time, after the margin of chance is subtracted.
 
         The gain is the lower bound of Donsker and Varadhan on the Kullback-Leibler divergence of generated from real windows: by so much
-        the divergence falls if generated windows are weighted with the odds. It is computed for each block; the standard error is that of the
-        mean over the blocks.
+        the divergence falls if generated windows are weighted with the odds. It is computed for each block; the margin is
+        two standard errors of the mean over the blocks (`block_means`).
 
         Args:
             real: Real windows in units of their standard deviation, shape `(windows, samples)`.
@@ -73,7 +73,7 @@ class Selection:
             starts: First sample of each real window, shape `(windows,)`. None: no two overlap, and they are in the order of time.
 
         Returns:
-            The selection, or None if no penalty has a gain, or there is too little telemetry to judge.
+            The selection, or None if no penalty has a gain beyond chance, or there is too little telemetry to judge.
         """
         window = real.shape[1]
         starts = window * np.arange(len(real)) if starts is None else starts

@@ -65,13 +65,13 @@ class GaussianAutoregression:
 
         AIC counts all samples as different ones, and chooses orders that are too high where windows of a short record overlap. Held-out
         windows choose the largest order whose squared error there is within 0.05 % of the least one: what a high order adds hardly helps
-        to predict the next sample, but it makes the slow variation of noise with a long memory. If no order predicts surely better than none,
-        the noise is white: many coefficients that are nearly zero would change its spectrum.
+        to predict the next sample, but it makes the slow variation of noise with a long memory. If the best order does not surely predict better
+        than none (`block_means`), the noise is white: many coefficients that are nearly zero would change its spectrum.
 
         Args:
             windows: Noise windows of shape `(windows, samples)`.
             max_order: The largest order that may be chosen.
-            held_out: Noise windows of the same length that share no sample with the others, or None for AIC.
+            held_out: Noise windows of the same length that share no sample with the others, in the order of time, or None for AIC.
 
         Raises:
             InputError: If the windows are not longer than `max_order`, or if they are constant.
@@ -85,11 +85,11 @@ class GaussianAutoregression:
         if not variance > 0:
             raise InputError("Expected noise that varies. Received: windows of one value.")
         orders, criteria = [(coefficients, variance)], [windows.size * np.log(variance)]
-        blocks = block_slices(len(ahead))
+        blocks = block_slices(ahead[:, max_order:].size)
 
         def squares() -> list[float]:  # in each block of held-out time; of the same samples for all orders
-            rows = np.sum(ahead[:, max_order + 1 - len(orders) :] ** 2, axis=1)
-            return [float(np.sum(rows[block])) for block in blocks]
+            squared = np.ravel(ahead[:, max_order + 1 - len(orders) :]) ** 2
+            return [float(np.sum(squared[block])) for block in blocks]
 
         errors = [squares()]
         for order in range(1, max_order + 1):
@@ -108,9 +108,9 @@ class GaussianAutoregression:
         if held_out is None:
             chosen = int(np.argmin(criteria))
         else:
-            by_block = np.array(errors)
-            total = np.sum(by_block, axis=1)
-            gains = by_block[0] - by_block[np.argmin(total)]
+            by_block, total = np.array(errors), np.sum(errors, axis=1)
+            without, best = np.maximum(by_block[[0, np.argmin(total)]], np.finfo(float).tiny)
+            gains = np.log(without / best)  # of the errors, not their difference: a louder block counts no more
             is_predicted = np.mean(gains) > margin(gains)
             chosen = int(np.flatnonzero(total <= (1 + _NEARLY_LEAST) * np.min(total))[-1]) if is_predicted else 0
         coefficients, variance = orders[chosen]

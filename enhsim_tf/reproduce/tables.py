@@ -80,10 +80,13 @@ class KeptTables:
 
         Returns:
             The tables, those rows first.
+
+        Raises:
+            InputError: If the folder holds some of the tables only: writing would lose what they hold.
         """
         import pandas as pd
 
-        if not all((folder / f"{name}.parquet").is_file() for name in self.names):
+        if not any((folder / f"{name}.parquet").is_file() for name in self.names):
             return dict(tables)
         kept = self.read(folder)
         return {name: pd.concat([kept[name][kept[name]["seed"] < first_seed], table], ignore_index=True) for name, table in tables.items()}

@@ -52,7 +52,26 @@ def test_white_noise_is_predicted_by_its_mean(seed):
     assert len(GaussianAutoregression.fit(noise[:9_000], 50, noise[9_000:]).coefficients) == 0
     weak = AutoregressiveNoise(0.05, 1.0).draw(1_000_000, np.random.default_rng(seed)).reshape(-1, 100)
     found = GaussianAutoregression.fit(weak[:9_000], 50, weak[9_000:]).coefficients
-    assert found[0] == pytest.approx(0.05, abs=0.004)  # four standard errors of a coefficient: 4 / sqrt(900,000)
+    assert found[0] == pytest.approx(0.05, abs=0.0045)  # four standard errors of a coefficient: 1 / sqrt(900,000)
+    assert np.abs(found[1:]).max() < 0.0045
+
+
+@pytest.mark.parametrize("times", [1, 3, 30])
+def test_a_loud_part_of_the_held_out_time_does_not_hide_what_can_be_predicted(times):
+    noise = AutoregressiveNoise(0.9, 1.0).draw(100_000, np.random.default_rng(5)).reshape(-1, 100)
+    noise[930:940] *= times
+    found = GaussianAutoregression.fit(noise[:900], 20, noise[900:]).coefficients
+    assert found[0] == pytest.approx(0.9, abs=0.02)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.7])
+def test_one_held_out_window_tells_white_noise_from_an_autoregression(coefficient):
+    """Chance calls white noise correlated as often as the margin says, about one time in 25: at most 6 of 60 here (probability 1 %)."""
+    counts = 0
+    for seed in range(60):
+        noise = AutoregressiveNoise(coefficient, 1.0).draw(5_000, np.random.default_rng(seed)).reshape(10, 500)
+        counts += len(GaussianAutoregression.fit(noise[:9], 50, noise[9:]).coefficients) > 0
+    assert counts <= 6 if coefficient == 0 else counts == 60
 
 
 def test_noise_with_a_long_memory_keeps_its_slow_variation():

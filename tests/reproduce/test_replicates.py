@@ -5,6 +5,7 @@ import json
 import pandas as pd
 import pytest
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.reproduce.caption import experiment_caption
 from enhsim_tf.reproduce.replicates import collect, seed_by_seed, write_results
 from enhsim_tf.reproduce.tables import KeptTables
@@ -55,6 +56,9 @@ def test_a_new_run_keeps_the_rows_of_earlier_seeds(tmp_path):
     assert run([1, 2], 0.1) == [first, first]
     again = [first[0], ("a", 2, pytest.approx(0.2)), ("a", 3, pytest.approx(0.2))]
     assert run([2, 3], 0.2) == run([2, 3], 0.2) == [again, again]
+    (tmp_path / "others.parquet").unlink()
+    with pytest.raises(InputError, match="no others.parquet"):
+        run([3], 0.3)
 
 
 def test_a_caption_names_each_seed_where_one_is_missing():

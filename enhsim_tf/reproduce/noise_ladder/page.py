@@ -111,13 +111,15 @@ def limits(found: Findings) -> str:
     if kept["choice"][PRESENT]["of"]:
         lines.append(_choice(kept["choice"][PRESENT], kept["rung"]))
     former = [
-        f"{said} on {kept['choice'][rule]['kept_above_real']} (if the fewest alarms are best: {kept['choice'][rule]['kept']}) of "
-        f"{kept['choice'][rule]['of']} families ({_seeds(kept['choice'][rule]['seeds'])})"
+        f"{said} on {kept['choice'][rule]['kept']} of {kept['choice'][rule]['of']} families "
+        f"({_seeds(kept['choice'][rule]['seeds'])}; by the present count on {kept['choice'][rule]['kept_above_real']})"
         for rule, said in FORMER_RULES.items()
         if kept["choice"][rule]["of"]
     ]
     if former:
-        lines.append(f"- What was tried before kept the limit on the choice as follows: {'; '.join(former)}.")
+        lines.append(
+            f"- What was tried before kept the limit on the choice, with the fewest alarms as the best, as follows: {'; '.join(former)}."
+        )
     return "\n".join([*lines, "", *_realism(realism["by_model"])])
 
 
