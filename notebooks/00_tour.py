@@ -257,9 +257,10 @@ if experiment.settings.budget == "full":  # noise of the wrong size would teach 
 # | sum | adds the two | the noise does not depend on the signal; the PCA residual separates the sum from telemetry (C8) |
 
 # %% [markdown]
-# The verdicts below are those of the one seed that this book shows. The table of all claims decides over ten seeds where a claim depends
-# on the seed. (*AUC*: the area under the curve of a classifier that tries to tell generated from real: 0.5 if it cannot, 1 if it always
-# can.)
+# The verdicts below are those of the one seed that this book shows. (The lessons were not all executed on the same machine. On another
+# processor, the same seed trains a GAN whose measures differ a little.) The table of all claims decides over ten seeds where a claim
+# depends on the seed. (*AUC*: the area under the curve of a classifier that tries to tell generated from real: 0.5 if it cannot, 1 if it
+# always can.)
 
 # %%
 claim("C6", "C8", "C9")

@@ -228,7 +228,7 @@ check_answer(
 #
 # Windows of real noise cancel in the mean; generated windows share a pattern that remains. The effective rank separates them as well. A
 # discriminator that is given such a number beside each window ("minibatch standard deviation" in the literature) would force the
-# generator to vary more. The second noise model of this package (`noise/convolutional_gan.py`) goes another way: its generator gets a
-# random number for every sample, and its discriminator sees statistics of the whole window instead of pieces.
+# generator to vary more. The convolutional GAN of this package (`noise/convolutional_gan.py`) goes another way: its generator gets a
+# random number for every sample, and its discriminator also sees statistics and the spectrum of the whole window.
 #
 # </details>

@@ -192,8 +192,9 @@ with drawing(alt, height=2.6, title=title) as panel:
 # %% [markdown]
 # *What to see:* the black bars are at nearly the same place in all rows: they are the real noise, of which 20 directions describe hardly
 # anything. What differs is the dotted threshold, which the *training* noise sets. A simulator without noise, however perfect, sets it at
-# nothing. (Notebooks 00, 13 and 21 draw other windows and other noise, and their rates differ a little.) The GAN's noise has the right
-# size but few directions (notebook 09); the detector learns those and sets the threshold too low.
+# nothing. (Notebooks 00, 13 and 21 draw other windows and other noise, and were executed on different machines, on which the same seed
+# trains a different GAN, so that their rates differ.) The GAN's noise has the right size but few directions (notebook 09); the detector
+# learns those and sets the threshold too low.
 
 # %%
 say("False alarms: " + ", ".join(f"{name} **{rate:.1%}**" for name, rate in alarms.items()) + ".")
@@ -268,9 +269,10 @@ with drawing(alt, height=2.3, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the bars show what was learned. The truth without noise teaches this detector as much as real windows do. The coarse
-# windows teach it less. Added noise costs recall: some of the 20 directions are spent on it, and most so with the GAN's noise, which has
-# large directions of its own. The diamonds show what one gets without real windows: three arms find everything because they *flag*
-# everything, and the coarse arm is quiet and blind. A threshold that is only slightly too high also costs recall:
+# windows teach it less. Gaussian noise and the GAN's noise cost recall, whole residual windows do not: some of the 20 directions are
+# spent on the noise, and most so with the GAN's, which has large directions of its own. The diamonds show what one gets without real
+# windows: three arms find everything because they *flag* everything, and the coarse arm is quiet and blind. A threshold that is only
+# slightly too high also costs recall:
 
 # %%
 say(

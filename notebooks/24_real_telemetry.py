@@ -428,10 +428,10 @@ for each in errors.values():
 # Then: what do detectors find? Seven detectors were trained on nine kinds of windows: the channel's own past (*real*), the coarse
 # simulation, enhanced windows with five kinds of noise or none, and windows from ridge regression with its residuals drawn again. All of
 # it comes from the same past. *Nominal + degraded* is one classifier that learned simulated faults. Scores of *one line* learn nothing
-# but, for the limit check, two limits. The *residual* is the detector of this lesson; *scale followed* lets its threshold follow slow
-# growth of nominal residuals. *Left discord* is the distance of a window to the most similar earlier one. Means over detectors, channels
-# and three seeds. One reservation: two bounds of the residual detector were set after the results of one seed on the judged time had been
-# seen.
+# but, for the limit check, two limits. The *ridge residual* is the detector of this lesson, and the *residual* the same with the paper's
+# network as its enhancer; *scale followed* lets the threshold follow slow growth of nominal residuals. *Left discord* is the distance of
+# a window to the most similar earlier one. Means over detectors, channels and three seeds. One reservation: two bounds of the residual
+# detector were set after the results of one seed on the judged time had been seen.
 
 # %%
 residual_rows = open_residual()
@@ -452,9 +452,10 @@ say("\n".join(lines))
 
 # %% [markdown]
 # *What to see:* whatever windows the seven detectors were trained on, they alarm on a third of the nominal time or more, because the
-# channels have moved on, and their AUC-PR hardly depends on the kind of noise. Two scores of one line have a better one than every
-# trained arm. What helps is to use the simulator as a model of the signal instead of a source of training data. Beware of the column
-# *found*: a window that touches a long anomaly counts, so that even random scores find many.
+# channels have moved on or because their past is too short for a threshold of 1 %, and their AUC-PR hardly depends on the kind of noise.
+# Two scores of one line have a better one than every trained arm. What helps is to use the simulator as a model of the signal instead of
+# a source of training data. Beware of the column *found*: a window that touches a long anomaly counts, so that even random scores find
+# many.
 
 # %%
 area_of = {name: area for name, (_, _, area) in summary.items()}

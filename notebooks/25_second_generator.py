@@ -106,8 +106,9 @@ say("AUC and floor: " + "; ".join(f"{name} **{a:.2f}** ({b:.2f})" for name, (a, 
 assert not is_full or (found["outside 20 directions"][0] > 0.95 and alike > 0.5)
 
 # %% [markdown]
-# There are two ways out. One is a better judge; the package's convolutional GAN adds discriminators that see spectra and statistics of many
-# windows ([docs/noise.md](../docs/noise.md)). The other is no judge at all, and that is what the rest of this lesson does.
+# There are two ways out. One is a better judge; the package's convolutional GAN has a discriminator that also sees the spectrum and
+# summary statistics of the whole window (`noise/convolutional_gan.py`). The other is no judge at all, and that is what the rest of this
+# lesson does.
 #
 # ## The strong simple baseline: an autoregression by least squares
 #

@@ -181,8 +181,7 @@ assert rms["enhanced"] < rms["coarse"] and outside[labels].mean() > outside[~lab
 # ## A detector that knows what should happen
 #
 # Without a fault, telemetry minus enhanced run should be noise. So the detector looks at this residual only: its root mean square in
-# windows, with a conformal threshold from residuals of held-out nominal time. It compares the vehicle with the *nominal* run of the same
-# commands.
+# windows, with a conformal threshold from residuals of nominal time. It compares the vehicle with the *nominal* run of the same commands.
 
 # %%
 nominal_residual = target - model.enhance(run.values)
@@ -206,8 +205,8 @@ say(
 
 # %% [markdown]
 # The rate on later time is above the one that was set: the residuals that set the threshold come from time on which ridge regression was
-# fitted, so they are a little too small, and neighbouring windows are not independent. `score --coarse` uses residuals of blocks that
-# its enhancer had not seen.
+# fitted, so they are a little too small, and neighbouring windows are not independent. `score --coarse` trains its detector on generated
+# noise instead, which is learnt from residuals of blocks that the enhancer had not seen.
 #
 # What does the detector see of the fault, if the vehicle has it and the simulator is run without it? The battery's fault run has other
 # orbits than the nominal one, so the run of the same commands *with* the fault stands in: the difference between telemetry and enhanced

@@ -2,6 +2,7 @@
 
 Each notebook is stamped with the checksums of its source and of the findings that it shows, and the budget it ran at.
 `--check` executes nothing and says which notebooks are no longer what these are; exit code 1 if there is one.
+`--prose` takes new prose into executed notebooks whose code is unchanged, and executes nothing either.
 """
 
 import argparse
@@ -174,6 +175,48 @@ def faults(source: Path) -> list[str]:
     return found
 
 
+def take_prose(source: Path) -> bool:
+    """Takes the prose of a source into the executed notebook beside it, whose outputs stay.
+
+    Args:
+        source: One of `sources()`.
+
+    Returns:
+        Whether the notebook has changed.
+
+    Raises:
+        ValueError: If its code or the findings that it shows have changed, so that it must be executed.
+    """
+    path = source.with_suffix(".ipynb")
+    executed, wanted = nbformat.read(path, as_version=4), read(source)
+    old, new = ([cell for cell in each.cells if cell.cell_type == "code"] for each in (executed, wanted))
+    if [cell.source for cell in old] != [cell.source for cell in new]:
+        raise ValueError("its code has changed: execute it")
+    if executed.metadata[STAMP].get("findings", {}) != findings(source):
+        raise ValueError("the findings that it shows have changed: execute it")
+    for before, after in zip(old, new, strict=True):
+        after.outputs, after.execution_count = before.outputs, before.execution_count
+    wanted.metadata = executed.metadata
+    wanted.metadata[STAMP]["sha256"] = sha256(source)
+    if wanted == executed:
+        return False
+    with replace_file(path) as temporary:
+        nbformat.write(wanted, temporary)
+    return True
+
+
+def take_all_prose() -> int:
+    """Takes the prose of all sources, prints what became of each, and returns the exit code."""
+    failed = False
+    for source in sources():
+        try:
+            said = "new prose" if take_prose(source) else "unchanged"
+        except ValueError as error:
+            said, failed = str(error), True
+        print(f"{source.stem:32} {said}")
+    return int(failed)
+
+
 def check() -> int:
     """Prints what is wrong with each notebook and returns the exit code."""
     wrong = {source.stem: faults(source) for source in sources()}
@@ -240,10 +283,17 @@ def main(arguments: list[str] | None = None) -> int:
         "--check", action="store_true", help="say which notebooks are stale, and execute nothing"
     )
     parser.add_argument(
+        "--prose",
+        action="store_true",
+        help="take new prose into notebooks whose code is unchanged, and execute nothing",
+    )
+    parser.add_argument(
         "--solved", action="store_true", help="with the exercises solved, for lecturers; writes into solved/"
     )
     options = parser.parse_args(arguments)
-    return check() if options.check else build(options.budget, options.only, options.solved)
+    if options.check:
+        return check()
+    return take_all_prose() if options.prose else build(options.budget, options.only, options.solved)
 
 
 if __name__ == "__main__":

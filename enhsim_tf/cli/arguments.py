@@ -64,7 +64,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--window",
         type=int,
         metavar="N",
-        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods, limited to 64 to 500 and to an eighth of the record)",
+        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods of a square wave, otherwise a twentieth of the record; "
+        "limited to 64 to 500 and to an eighth of the record)",
     )
     fit.add_argument(
         "--enhancer",

@@ -38,6 +38,6 @@ def run_fit(options: argparse.Namespace) -> int:
     cleaning = cleaning_options(options, options.window or 32)
     series = read_source(options.source, options.column, options.time, cleaning)
     is_terminal = sys.stdout.isatty()
-    commands = None if run is not None else read_commands(options.source)
+    commands = None if run is not None else read_commands(options.source, options.column)
     failed = fit_channels(series, options.out, chosen, cleaning, workers, tell, is_terminal, options.engine, not is_terminal, run, commands)
     return tell_failed(failed)

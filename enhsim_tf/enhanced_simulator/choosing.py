@@ -36,7 +36,7 @@ def choose_enhancer(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], 
         standard error of the best, and `is_chosen`. Empty for a constant level, which needs no enhancer.
 
     Raises:
-        InputError: If the telemetry is too short to hold out a third of it.
+        InputError: If the telemetry is too short to hold out blocks of it.
     """
     starts = random_window_starts(parts, settings.window, settings.num_windows, np.random.default_rng(settings.seed))
     pairs = cut_pairs(parts, simulator.coarse, starts, settings.window, settings.follow)

@@ -13,13 +13,11 @@ from enhsim_tf.coarse_simulator.commands import CommandTraces
 from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
+from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, LEAST_LEARNT, LEAST_WINDOW, MOST_WINDOW, default_window
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import time_blocks
 
 SQUARE_WAVES, COMMANDS, LEVEL = "square waves", "commands", "constant level"
-LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
-LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 LEAST_SAMPLES = LEAST_LEARNT * FEWEST_SAMPLES  # a shorter record is refused
 _LEAST_EXPLAINED = 0.05  # minimum share of the variance that the coarse simulator explains
 _CHANCE = 30.0  # divided by the number of samples: the share of the variance of white noise that the best of all square waves may explain
@@ -28,7 +26,6 @@ _NUM_BLOCKS = 5  # of time, on which it is measured what commands explain
 _NUM_SHIFTS = 19  # of the commands in time, which show what they explain by chance
 _PENALTIES = (0.01, 0.1, 1.0, 10.0)  # of the ridge regression on traces, relative to the number of samples
 _NEGLIGIBLE = 1e-6  # standard deviation of a trace
-_WINDOWS_IN_RECORD = 20  # without a period, the default window is this share of the record
 _LEAST_STEPS = 3  # with fewer changes of the value, the record shows only that the channel can change
 
 
@@ -87,7 +84,7 @@ def choose_coarse(
         if fitting:
             return CoarseChoice(SQUARE_WAVES, fitting, f"coarse simulator: {about_wave}.", coarse)
         about_wave = f"{LEAST_LEARNT} windows of half the period of its best square wave, {period:.0f} samples, do not fit into {len(values):,} samples"
-    wanted = window or int(np.clip(len(values) // _WINDOWS_IN_RECORD, LEAST_WINDOW, MOST_WINDOW))
+    wanted = window or default_window(len(values))
     fitting = _fitting_window(parts, wanted, wanted if window else FEWEST_SAMPLES)
     if not fitting:
         what = f"at least {LEAST_LEARNT} windows of {window or FEWEST_SAMPLES} samples to learn from"

@@ -99,7 +99,7 @@ def fit_channels(
         engine: How worker processes are run: `local` or `ray`. The engine does not change the results.
         speaks: Whether each local worker prints a line of progress about every fifteen seconds.
         run: The recorded run of a coarse simulator, for run models; None for simulators of square waves.
-        commands: Commands of the samples, for channels that are not periodic, shape `(samples, commands)`; None if there are none.
+        commands: Commands of the samples, shape `(samples, commands)`, see `fitting.fit_channel`; None if there are none.
 
     Returns:
         A dictionary from the name of each channel that could not be fitted to the reason.

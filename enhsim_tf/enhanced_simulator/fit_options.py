@@ -8,6 +8,9 @@ from enhsim_tf.noise.rung_names import BEST, BY_OPTION
 ENHANCERS = ("coarse", "ridge", "ridge and network", "network")  # rungs of `enhancer.ladder` for windows at their own level and gain
 NOISES = (BEST, *BY_OPTION)
 FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
+LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
+LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
+_WINDOWS_IN_RECORD = 20  # without a period, the default window is this share of the record
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,10 +18,11 @@ class FitOptions:
     """Settings for fitting a simulator to a channel. The defaults are those of the command `fit`.
 
     Args:
-        window: Length of a window in samples. None uses two periods, limited to 64 to 500 samples.
+        window: Length of a window in samples. None uses two periods of a square wave and otherwise a twentieth of the record, limited to 64
+            to 500 samples, or fewer if eight windows would not fit into the record.
         num_windows: Number of training windows, cut at random starts.
         epochs: Passes of the enhancer over the training windows, with a learning rate that falls to zero.
-        num_iterations: Adversarial iterations of the noise networks.
+        num_iterations: Adversarial iterations of the GANs of noise; the autoregressive network takes three times as many.
         noise: Model of the noise: one of `NOISES`, or `best`, the simplest that held-out telemetry does not tell from real noise
             (see `noise_choice`).
         held_out: Share of the telemetry, taken from its end, that is reserved for the report. 0 trains and reports on all
@@ -52,3 +56,12 @@ class FitOptions:
         for name, least in (("num_windows", 1), ("epochs", 1), ("num_iterations", 0)):
             if getattr(self, name) < least:
                 raise InputError(f"Expected {name} to be at least {least}. Received: {name}={getattr(self, name)}.")
+
+
+def default_window(num_samples: float) -> int:
+    """Returns the window length in samples for a record without a period that is known.
+
+    Args:
+        num_samples: Length of the record in samples.
+    """
+    return int(min(max(num_samples // _WINDOWS_IN_RECORD, LEAST_WINDOW), MOST_WINDOW))

@@ -40,7 +40,7 @@ def fit_channel(
         verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
         progress: Reports the progress of the trainings as lines of text.
         commands: Commands of the samples, shape `(samples, commands)`, as returned by `commands.read_commands`. They are used if
-            the telemetry is not periodic. None: there are none.
+            they explain more of the telemetry than a square wave does, or if the wave occurs too rarely. None: there are none.
 
     Returns:
         The simulator and the report. A channel whose coarse run are its commands gets a run model and its report.

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from enhsim_tf.enhanced_simulator.checks import check_finite
 from enhsim_tf.noise import ladder
 from enhsim_tf.telemetry.quantisation import Levels
 
@@ -27,10 +28,13 @@ class NoisyOutput:
 
         Returns:
             float32 array of the shape of `clean`, in the telemetry's unit.
+
+        Raises:
+            InputError: If a value is not finite.
         """
         draw = ladder.generate if np.ndim(clean) == 2 else ladder.generate_series
         signal = self.in_unit(clean) if getattr(self.noise, "follows_signal", False) else None
-        return draw(self.noise, len(clean), seed, signal)
+        return check_finite(draw(self.noise, len(clean), seed, signal))
 
     def add_noise(self, clean: np.ndarray, seed: int | np.random.Generator) -> np.ndarray:
         """Adds noise to enhanced windows or to an enhanced series, and rounds to the levels of a quantised channel."""

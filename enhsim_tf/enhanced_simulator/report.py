@@ -45,7 +45,7 @@ class ChannelReport:
         ladder: For each enhancer that was judged on held-out time, its `name`, `error`, `standard_error`, `is_within` (one
             standard error of the best) and `is_chosen`. Empty if the paper's network was used without a choice.
         noise_model: Name of the noise model that was asked for, or `best`.
-        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for.
+        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for, or if there was too little to judge on.
         noise_auc: AUC of a classifier that separates `generated` noise from that of the evaluation telemetry, and of one that
             separates `real` noise of the training telemetry from it. Empty if there is too little telemetry.
         coarse: Which coarse simulator was chosen and why; the first line of the report.

@@ -36,7 +36,7 @@ class ScoreOptions:
     """Settings for scoring telemetry.
 
     Args:
-        detector: Name of a detector in `detectors.DETECTORS`, or `RESIDUAL`, which judges the difference between the telemetry and the
+        detector: Name of a detector in `registry.DETECTORS`, or `RESIDUAL`, which judges the difference between the telemetry and the
             simulator that is aligned with it.
         num_windows: Number of generated nominal windows for training the detector.
         false_alarm_rate: Share of generated nominal samples that the threshold flags. The threshold is set on a generated
@@ -69,7 +69,7 @@ def score_channel(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], op
         options: Settings of the scoring. None uses the defaults.
 
     Returns:
-        A data frame with the index of `sources.to_series` and the columns `value`, `score` (scaled so that the threshold is
+        A data frame with the index of `pandas_series.to_series` and the columns `value`, `score` (scaled so that the threshold is
         1; NaN in parts shorter than a window) and `flag` (whether the score is above 1). `frame.attrs` contains
         `expected_false_alarm_rate` (the rate of the options, or 1 / 1,001 if that is larger), `events` (the rows of
         `events_table`), and `false_alarms_per_day`: the number that is expected on nominal telemetry, with the limits of its
@@ -205,4 +205,4 @@ def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
         if Path(path).suffix == ".csv":
             frame.to_csv(temporary)
         else:
-            frame.to_parquet(temporary)
+            frame.to_parquet(temporary, index=True)  # sample numbers, too, are a column for every reader

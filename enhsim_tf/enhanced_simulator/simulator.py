@@ -18,7 +18,7 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import add_changed, complete_batch, complete_labelled_batch
 from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of, is_finite
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, check_saved_numbers, config_of, is_finite
 from enhsim_tf.enhanced_simulator.noise_fitting import noise_windows
 from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
 from enhsim_tf.enhanced_simulator.saving import noise_file, read_noise, read_saved, write_saved
@@ -121,12 +121,12 @@ class EnhancedSimulator(NoisyOutput):
         verbose: int | str = "auto",
         progress: Progress = SILENT,
     ) -> "EnhancedSimulator":
-        """Trains both networks on nominal telemetry.
+        """Trains the enhancer on nominal telemetry, and fits its noise.
 
         The defaults differ from the paper's settings, which are `fit(telemetry, **PAPER)`. The paper's generator repeats
         one pattern, and the paper's moving average removes slow noise together with the signal, so detectors trained on
-        its output flag real telemetry as anomalous. With the defaults, and as many adversarial iterations, detectors
-        flag real telemetry about as rarely as detectors trained on real telemetry do; see docs/REPORT.md.
+        its output flag real telemetry as anomalous. By default, the noise model is chosen by held-out telemetry; how
+        rarely detectors then flag real telemetry is in docs/noise.md.
 
         Args:
             telemetry: Nominal telemetry, or the parts between its gaps on a common clock. Its length must be at least eight
@@ -135,14 +135,16 @@ class EnhancedSimulator(NoisyOutput):
             seed: Random seed of the training.
             num_windows: Number of training windows, cut at random starts.
             epochs: Passes of the enhancer over the training windows.
-            num_iterations: Adversarial iterations of the noise networks; 0 leaves them untrained.
+            num_iterations: Adversarial iterations of a GAN of noise; the autoregressive network takes three times as many. 0 leaves
+                networks untrained.
             moving_average: Width in samples of the moving average that separates the noise from the signal.
-            normalise: Whether both networks are trained on normalised values: the enhancer in units of the coarse
-                simulator's levels, the noise networks at the paper's noise amplitude. False passes the values unchanged,
-                as in the paper.
+            normalise: Whether the paper's networks are trained on normalised values: the enhancer in units of the coarse
+                simulator's levels, the GAN at the paper's noise amplitude. False passes the values unchanged, as in the
+                paper. Other noise models always normalise.
             window: Length of a window in samples.
-            noise: Model of the noise, a key of `noise.rung_names.BY_OPTION`: for example the networks of the `paper`, or
-                `convolutional`, whose generator has full-rank output; or `best`, which held-out telemetry chooses.
+            noise: Model of the noise: `best`, the simplest that held-out telemetry does not tell from real noise; or a key of
+                `noise.rung_names.BY_OPTION`, for example the networks of the `paper`, or `convolutional`, whose generator has
+                full-rank output. `best` needs extraction by the enhancer.
             extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
                 telemetry, as in the paper; `enhancer` subtracts the enhanced signal and so keeps slow noise.
             held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction
@@ -152,8 +154,9 @@ class EnhancedSimulator(NoisyOutput):
             decay: Whether the enhancer's learning rate falls to zero along a cosine. With a constant rate, as in the paper,
                 the weights keep the noise of the last batches.
             follow: Whether the coarse simulator is aligned in time, offset and gain with each window before the enhancer
-                learns from that window. This is for telemetry that drifts away from a fixed simulator. The epochs are
-                split into up to three rounds; from the second round on, windows are aligned using the enhanced waveform.
+                learns from that window. This is for telemetry that drifts away from a fixed simulator. The epochs of the
+                enhancer `network` are split into up to three rounds; from the second round on, windows are aligned using the
+                enhanced waveform. For other enhancers, windows are aligned with the waveform of ridge regression.
                 Offsets and gains are stored, and generated windows sample from them.
             enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than
                 the best one on held-out time; or the name of a rung.
@@ -491,18 +494,14 @@ class EnhancedSimulator(NoisyOutput):
         """
         noise = state_of(self.noise)
         numbers = np.array([self.interval_s, self.offset, self.scale, *([] if self.quantisation is None else [self.quantisation.step])])
-        parts = {
-            "enhancer": is_finite(self.enhancer.get_weights()),
-            **{name: is_finite(network.get_weights()) for name, network in noise.networks.items()},
-            "noise": bool(noise.networks) or noise.is_finite,
-            "units or levels": is_finite([numbers, *([] if self.levels is None else [self.levels])]),
-        }
-        bad = [name for name, is_good in parts.items() if not is_good]
-        if bad:
-            raise InputError(
-                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. "
-                "It was not saved. Fit it again."
-            )
+        check_saved_numbers(
+            {
+                "enhancer": is_finite(self.enhancer.get_weights()),
+                **{name: is_finite(network.get_weights()) for name, network in noise.networks.items()},
+                "noise": bool(noise.networks) or noise.is_finite,
+                "units or levels": is_finite([numbers, *([] if self.levels is None else [self.levels])]),
+            }
+        )
         settings = {
             "coarse": config_of(self.coarse),
             "noise": dict(noise.settings),

@@ -52,13 +52,15 @@ class TrainingSettings:
         seed: Random seed of the training.
         num_windows: Number of training windows, cut at random starts.
         epochs: Passes of the enhancer over the training windows.
-        num_iterations: Adversarial iterations of the noise networks; 0 leaves them untrained.
+        num_iterations: Adversarial iterations of a GAN of noise; the autoregressive network takes three times as many. 0 leaves networks
+            untrained.
         moving_average: Width in samples of the moving average that separates the noise from the signal.
-        normalise: Whether both networks are trained on normalised values: the enhancer in units of the coarse simulator's
-            levels, the noise networks at the paper's noise amplitude. False passes the values unchanged, as in the paper.
+        normalise: Whether the paper's networks are trained on normalised values: the enhancer in units of the coarse simulator's
+            levels, the GAN at the paper's noise amplitude. False passes the values unchanged, as in the paper. Other noise models always
+            normalise.
         window: Length of a window in samples.
-        noise: Model of the noise, a key of `noise.rung_names.BY_OPTION`: for example the networks of the `paper`, or `convolutional`,
-            whose generator has full-rank output; or `best`, which held-out telemetry chooses (see `noise_choice`).
+        noise: Model of the noise: `best`, the simplest that held-out telemetry does not tell from real noise (see `noise_choice`); or a key
+            of `noise.rung_names.BY_OPTION`, for example the networks of the `paper`.
         extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
             telemetry, as in the paper; `enhancer` subtracts the enhanced signal.
         held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction only
@@ -70,7 +72,8 @@ class TrainingSettings:
             best one on held-out time; or the name of a rung.
 
     Raises:
-        InputError: If a count is too small, a choice is unknown or `held_out` is out of range.
+        InputError: If a count is too small, noise or extraction is unknown or `held_out` is out of range. An unknown enhancer is refused
+            by the fit.
     """
 
     seed: int = 0
@@ -80,7 +83,7 @@ class TrainingSettings:
     moving_average: int = 25
     normalise: bool = True
     window: int = 500
-    noise: str = "convolutional"
+    noise: str = BEST
     extraction: str = "enhancer"
     held_out: float = 0.0
     decay: bool = True
@@ -99,7 +102,7 @@ class TrainingSettings:
         if self.noise in (BEST, *FOLLOWERS) and self.extraction != "enhancer":
             raise InputError(
                 f"Expected noise={self.noise!r} with extraction by the enhancer, because it is judged with the enhanced signal. "
-                f"Received: extraction={self.extraction!r}."
+                f"Received: extraction={self.extraction!r}. Name another noise model, or another extraction."
             )
 
 

@@ -42,7 +42,7 @@ class UpdateReport:
         channel: Name of the channel.
         num_samples: Number of samples of the new telemetry.
         num_windows: Number of held-out windows; they may overlap.
-        num_disjoint: Number of held-out windows that share no sample.
+        num_disjoint: How many of them share no sample.
         before: The old simulator.
         after: The updated simulator.
         notes: What was kept and why, one sentence each.

@@ -78,11 +78,12 @@ def update_simulator(
     seen = new.pairs(learnt, evenly_spaced_starts(learnt, window, _NUM_LEVELS)).drop_flat()
     new.levels = np.stack([seen.shift, seen.gain], axis=1)
     _update_noise(new, learnt, options.seed, notes)
+    num_judged = min(_NUM_JUDGED, num_window_starts(held_out, window))
     report = UpdateReport(
         parts[0].name,
         sum(map(len, parts)),
-        min(_NUM_JUDGED, num_window_starts(held_out, window)),
-        sum(len(part) // window for part in held_out),
+        num_judged,
+        min(num_judged, sum(len(part) // window for part in held_out)),
         _state(simulator, held_out, options.seed),
         _state(new, held_out, options.seed),
         tuple(notes),

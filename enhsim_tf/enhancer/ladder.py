@@ -137,7 +137,7 @@ def fit_ladder(
 ) -> Ladder:
     """Judges rungs on held-out time and fits them to all windows.
 
-    One third of the time, in interleaved blocks, is held out once for all rungs. Training windows that overlap it are left
+    Every third of up to nine blocks of time is held out once for all rungs. Training windows that overlap it are left
     out, see `held_out_blocks`.
 
     Args:

@@ -47,7 +47,7 @@ class OutOfRange:
 
     Example:
     >>> out_of_range = OutOfRange().fit(coarse_training_windows)
-    >>> limit = detection.threshold(out_of_range.score(coarse_held_out_windows), rate=0.01)
+    >>> limit = metrics.threshold(out_of_range.score(coarse_held_out_windows), rate=0.01)
     >>> trusted = out_of_range.score(coarse_degraded_windows) <= limit
     """
 

@@ -17,7 +17,7 @@ import numpy as np
 from enhsim_tf.keras_tools.backend import tf
 from enhsim_tf.noise.block_means import block_slices, margin
 
-_NEARLY_LEAST = 1e-4  # held-out loss above the least one up to which constants are as good in any case
+_NEGLIGIBLE = 1e-4  # mean held-out loss in nats above the least one up to which constants are as good in any case
 _MOST_LEARNT = 0.01  # loss above that of shrunk outputs on the training data up to which this counts: little held-out data can be alike
 _ROUNDS = 2  # trusts and constants in turn
 _STOP = {"ftol": 1e-10, "gtol": 1e-7}  # of L-BFGS; losses are means over samples, so that a small difference counts
@@ -118,4 +118,4 @@ def shrink(
 
 def _nearly_least(differences: np.ndarray) -> bool:
     """Tells whether losses, given as differences from the least one in each block of time, are not surely above it."""
-    return bool(np.mean(differences) <= max(_NEARLY_LEAST, margin(differences)))
+    return bool(np.mean(differences) <= max(_NEGLIGIBLE, margin(differences)))

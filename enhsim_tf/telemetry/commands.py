@@ -5,6 +5,7 @@ at all others.
 """
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +26,20 @@ def has_commands(array: np.ndarray) -> bool:
     return bool(np.isin(array[:, 1:], (0, 1)).all())
 
 
-def read_commands(source: str | os.PathLike) -> np.ndarray | None:
+def read_commands(source: str | os.PathLike, columns: Sequence[str] | None = None) -> np.ndarray | None:
     """Reads the commands of a source of telemetry.
 
     Args:
         source: A source as for `sources.read_source`.
+        columns: Columns that are read as channels. None: all that the source has.
 
     Returns:
-        float32 array of shape `(samples, commands)`, or None if the source is not an array of this layout.
+        float32 array of shape `(samples, commands)`, or None if the source is not an array of this layout, or if a column of commands is
+        read as a channel: it would be explained by itself.
     """
     path = Path(source)
+    if columns is not None and any(str(each) != "0" for each in columns):
+        return None
     if path.suffix.lower() != ".npy" or not path.is_file():
         return None
     try:

@@ -26,7 +26,7 @@ def channel(num_samples=2_000):
 
 
 def fit(**options):
-    settings = {"num_windows": 200, "window": 64, "epochs": 1, "num_iterations": 0, "follow": True, "verbose": 0}
+    settings = {"num_windows": 200, "window": 64, "epochs": 1, "noise": "none", "follow": True, "verbose": 0}
     return EnhancedSimulator.fit(channel(), WAVES, **settings | options)
 
 

@@ -243,7 +243,9 @@ def test_the_columns_of_commands_are_not_channels(array, tmp_path):
     series = read_source(array)
     assert list(series) == ["S-1.0"] and series["S-1.0"].attrs["findings"][0]["kind"] == "commands"
     assert list(read_source(array, ["3"])) == ["S-1.3"]  # named columns are read as before
-    np.testing.assert_array_equal(read_commands(array), np.load(array)[:, 1:])
+    for columns in (None, ["0"]):
+        np.testing.assert_array_equal(read_commands(array, columns), np.load(array)[:, 1:])
+    assert read_commands(array, ["3"]) is None and read_commands(array, ["0", "3"]) is None, "column 3 would explain itself"
     other = np.load(array)
     other[7, 4] = 0.5
     assert has_commands(np.load(array)) and not has_commands(other) and not has_commands(other[:, :20])

@@ -3,6 +3,7 @@
 import keras
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
@@ -159,6 +160,14 @@ def test_written_scores_can_be_read(known, short, tmp_path, suffix):
     np.testing.assert_allclose(read["score"], frame["score"], rtol=1e-12)
     np.testing.assert_allclose(read["value"], frame["value"], rtol=1e-6)
     assert sorted(each.name for each in tmp_path.iterdir()) == sorted([path.name, "scores.events.csv"])
+
+
+def test_the_sample_number_is_a_column_for_every_reader_of_parquet(known, short, tmp_path):
+    values = known.generate_series(300, seed=1)
+    frame = score_channel(known, [Telemetry(values, interval_s=2.0)], ScoreOptions(num_windows=50))
+    write_scores(tmp_path / "scores.parquet", frame)
+    table = pq.read_table(tmp_path / "scores.parquet")
+    assert table.column("sample").to_pylist() == list(range(300))
 
 
 def test_events_are_the_flags_with_their_times(known, short, tmp_path):

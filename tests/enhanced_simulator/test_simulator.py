@@ -23,6 +23,7 @@ from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.rung_names import BEST
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.reproduce.settings import make_settings
 from enhsim_tf.telemetry.quantisation import Levels
@@ -373,9 +374,9 @@ def test_the_settings_of_the_paper_equal_those_of_the_reproduction():
     assert (PAPER["noise"], PAPER["extraction"], PAPER["decay"]) == ("paper", "moving average", False)
 
 
-def test_the_defaults_are_the_second_pipeline():
+def test_the_defaults_take_noise_from_the_enhancer_and_choose_its_model():
     defaults = inspect.signature(EnhancedSimulator.fit).parameters
-    assert [defaults[name].default for name in ("noise", "extraction", "decay")] == ["convolutional", "enhancer", True]
+    assert [defaults[name].default for name in ("noise", "extraction", "decay")] == [BEST, "enhancer", True]
 
 
 def test_fit_to_short_telemetry_end_to_end(small_batches):
@@ -450,7 +451,7 @@ def drifting(number=4_000):
 def followers():
     """Simulators with and without `follow`, fitted to the first half of the telemetry."""
     coarse, counts = SquareWaveSimulator([SquareWave(40, low=99, high=101)]), {"window": 80, "num_windows": 300, "epochs": 6}
-    settings = {"num_iterations": 2, "verbose": 0}
+    settings = {"noise": "convolutional", "num_iterations": 2, "verbose": 0}
     learnt = drifting().part(0, 2_000)
     parts = [learnt.part(0, 1_100), learnt.part(1_150, 2_000)]
     return {follow: EnhancedSimulator.fit(parts, coarse, 0, **counts, **settings, follow=follow) for follow in (True, False)}

@@ -1,11 +1,13 @@
 """Tests that no channel ends in a model that is not finite, and that such a model is refused wherever it comes from."""
 
+import copy
 import dataclasses
 import warnings
 
 import numpy as np
 import pytest
 
+from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.plan import Model, Plan
 from enhsim_tf.datasets.scenario_file import Mix
@@ -13,10 +15,15 @@ from enhsim_tf.datasets.shard import make_windows
 from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.fitting import fit_simulator
+from enhsim_tf.enhanced_simulator.runs.fitting import fit_run_model
+from enhsim_tf.enhanced_simulator.runs.options import RunOptions
+from enhsim_tf.enhanced_simulator.runs.scoring import score_run
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
+from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.linear_noise import linear_noise
+from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
@@ -103,6 +110,46 @@ def test_what_is_not_finite_is_neither_generated_nor_scored_nor_written(which, r
         with refused("finite", "Fit it again"):
             use()
     assert not list(tmp_path.iterdir())
+
+
+RUN = Recording((Run(np.random.default_rng(1).standard_normal((1_500, 1)).astype(np.float32)),), ("watts",))
+
+
+@pytest.fixture(scope="module")
+def run_model():
+    """A run model whose enhancer is ridge regression."""
+    values = np.convolve(RUN.parts[0].values[:, 0], [0.3, 0.4, 0.3], "same") + NOISE
+    options = RunOptions(window=64, num_windows=60, noise="autoregression", enhancer="ridge", epochs=1)
+    return fit_run_model(channel(values), RUN, options)[0]
+
+
+@pytest.mark.parametrize("which", ["enhancer", "noise"])
+def test_a_run_model_that_is_not_finite_is_neither_used_nor_saved(which, run_model, refused, tmp_path):
+    model = copy.copy(run_model)
+    if which == "enhancer":
+        network = keras.models.clone_model(model.rung.network)
+        network.set_weights([weight * np.nan for weight in model.rung.network.get_weights()])
+        model.rung = dataclasses.replace(model.rung, network=network)
+    else:
+        model.noise = GaussianNoise(np.nan, 64)
+    for use in (
+        lambda: list(model.generate_copies(RUN, 1)),
+        lambda: model.generate(3),
+        lambda: model.generate_series(200),
+        lambda: score_run(model, channel(WAVE), RUN, ScoreOptions(num_windows=20)),
+    ):
+        with refused("finite", "Fit it again"):
+            use()
+    with refused(which, "not saved"):
+        model.save(tmp_path / "model")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["values of 1e-30", "one value of 1e30"])
+def test_a_run_model_learns_no_channel_that_is_too_large_or_small(name, refused):
+    values, word = REFUSED[name]
+    with refused(word):
+        fit_run_model(channel(values), RUN, RunOptions(window=64))
 
 
 @pytest.mark.parametrize("which", ["enhancer", "generator", "discriminator"])

@@ -125,8 +125,10 @@ def test_inputs_of_the_hidden_layers_are_standardised(coloured):
     )
     found = network.network.get_layer("standardise")(features).numpy()
     plain = np.std(features, axis=0, dtype=np.float64)
-    varies = plain > 1e-6  # not the lag of a whole window, before its beginning; nor the size of the errors, which this noise does not tell
-    assert varies.sum() >= len(varies) - 2 and (plain[varies] < 0.5).any(), "some inputs vary little"
+    varies, samples = plain > 1e-6, len(network.lags) + 2 * len(network.octaves)
+    whole_window, size_of_errors = len(network.lags) - 1, samples + 2 + 7  # after the two ages, and the predictions of seven samples
+    assert set(np.flatnonzero(~varies)) == {whole_window, size_of_errors}, "before the window's beginning; which this noise does not tell"
+    assert (plain[varies] < 0.5).any(), "some inputs vary little"
     assert np.abs(found.mean(axis=0)).max() < 0.1 and np.abs(found.std(axis=0)[varies] - 1).max() < 0.1
 
 

@@ -243,6 +243,21 @@ def test_an_edited_notebook_is_found(tiny):
     assert build.faults(tiny) == ["stale: its source has changed"]
 
 
+def test_new_prose_is_taken_and_new_code_is_not(tiny):
+    rewrite(tiny, lambda notebook: notebook.cells[1].update(outputs=[nbformat.v4.new_output("stream", text="1\n")]))
+    assert not build.take_prose(tiny)
+    tiny.write_text(tiny.read_text(encoding="utf-8").replace("# # Tiny", "# # Small"), encoding="utf-8")
+    assert build.faults(tiny) == ["stale: its source has changed"]
+    assert build.take_prose(tiny) and build.faults(tiny) == []
+    taken = nbformat.read(tiny.with_suffix(".ipynb"), as_version=4)
+    assert taken.cells[0].source == "# Small" and taken.cells[1].outputs[0].text == "1\n"
+    tiny.write_text(tiny.read_text(encoding="utf-8").replace("print(1)", "print(2)"), encoding="utf-8")
+    kept = tiny.with_suffix(".ipynb").read_bytes()
+    with pytest.raises(ValueError, match="execute it"):
+        build.take_prose(tiny)
+    assert tiny.with_suffix(".ipynb").read_bytes() == kept
+
+
 def test_findings_that_changed_since_are_found(tiny, tmp_path):
     figures = tmp_path / "figures"
     for name in ("robustness", "labelled"):

@@ -12,7 +12,8 @@ from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.checks import check_parts
+from enhsim_tf.enhanced_simulator.checks import check_parts, check_size
+from enhsim_tf.enhanced_simulator.fit_options import LEAST_LEARNT, default_window
 from enhsim_tf.enhanced_simulator.noise_fitting import (
     JUDGED_SHARE,
     MOST_JUDGED,
@@ -38,9 +39,6 @@ from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, first_samples, random_window_starts
 
-_LEAST_WINDOW, _MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
-_WINDOWS_IN_TRAINING = 20  # the default window is this share of the training telemetry
-_LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 _EXAMPLE = 2  # length of the example for the figure, in windows
 _NUM_NOISE = 50  # length of the generated noise that is compared with the real one, in windows
 
@@ -65,17 +63,19 @@ def fit_run_model(
         The model and the report.
 
     Raises:
-        InputError: If telemetry and run share too little time, or if either is constant.
+        InputError: If telemetry and run share too little time, if either is constant, or if values are too large or small for networks.
     """
     options, parts = options or RunOptions(), check_parts(telemetry)
-    check_values(np.concatenate([part.values for part in parts]), parts[0].name)
+    values = np.concatenate([part.values for part in parts])
+    check_values(values, parts[0].name)
+    check_size(values, parts[0].name)
     recording, notes = _recorded(coarse, parts)
     samples = sum(map(len, parts))
-    guess = options.window or _default_window((1 - options.held_out) * samples)
+    guess = options.window or default_window((1 - options.held_out) * samples)
     delay = _delay(parts, recording, options.delay_s, guess)
     pairs = pair_with_recording(parts, recording, delay.seconds)
     shared = sum(map(len, pairs))
-    window = options.window or _default_window((1 - options.held_out) * shared)
+    window = options.window or default_window((1 - options.held_out) * shared)
     notes += [_on_delay(delay, parts[0], options.delay_s is not None)]
     if shared < samples:
         notes.append(f"{shared:,} of {samples:,} samples of the telemetry have a coarse run of the same time; the others are not used")
@@ -83,9 +83,9 @@ def fit_run_model(
     notes += left_out
     learnt, end = split_pairs([pair for pair in pairs if len(pair) >= window], options.held_out)
     learnt, end = ([pair for pair in some if len(pair) >= window] for some in (learnt, end))
-    if sum(map(len, learnt)) < _LEAST_LEARNT * window:
+    if sum(map(len, learnt)) < LEAST_LEARNT * window:
         raise InputError(
-            f"Expected at least {_LEAST_LEARNT} windows of {window} samples to learn from. Received: {sum(map(len, learnt)):,} samples that "
+            f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {sum(map(len, learnt)):,} samples that "
             f"{parts[0].name} and {recording.name} share, in stretches at least as long as a window. Give longer runs or a smaller --window."
         )
     windows = windows_of(learnt, window, options.num_windows)
@@ -111,10 +111,6 @@ def fit_run_model(
     )
     judged = end if options.held_out and end else learnt
     return model, _report(model, ladder, judged, bool(options.held_out and end), below, notes, options, windows)
-
-
-def _default_window(num_samples: float) -> int:
-    return int(np.clip(num_samples // _WINDOWS_IN_TRAINING, _LEAST_WINDOW, _MOST_WINDOW))
 
 
 def _recorded(coarse: CoarseSimulator, parts: Sequence[Telemetry]) -> tuple[Recording, list[str]]:

@@ -11,7 +11,7 @@ from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import Pair, pair_with_recording
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.checks import check_counts
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_finite
 from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
 from enhsim_tf.enhanced_simulator.runs import saving
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
@@ -107,14 +107,14 @@ class RunModel(NoisyOutput):
             float32 array of shape `(samples,)`, in the telemetry's unit.
 
         Raises:
-            InputError: If the shape is wrong.
+            InputError: If the shape is wrong, or if the enhancer's output is not finite.
         """
         coarse = np.asarray(coarse)
         if coarse.ndim != 2 or coarse.shape[1] != len(self.columns) or len(coarse) < self.window:
             raise InputError(
                 f"Expected a run of shape (samples, {len(self.columns)}) with at least {self.window} samples. Received: shape {coarse.shape}."
             )
-        return enhance_run(self.rung.predict, coarse, self.window)
+        return check_finite(enhance_run(self.rung.predict, coarse, self.window))
 
     def generate_copies(self, run: Recording, num_copies: int, seed: int = 0) -> Iterator[list[np.ndarray]]:
         """Yields copies of a run: the enhanced run plus another draw of noise in each copy.
@@ -211,7 +211,7 @@ class RunModel(NoisyOutput):
             for number in np.unique(which):
                 here = which == number
                 coarse[here] = cut_run(parts[number].values, chosen[here] - firsts[number], self.window)
-            yield self.rung.predict(coarse)
+            yield check_finite(self.rung.predict(coarse))
 
     def generate_labelled_chunks(self, num_windows: int, scenario: Any = None, seed: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yields the windows of `generate_chunks` with masks of changed samples, which are False because the windows are nominal."""
@@ -276,7 +276,8 @@ class RunModel(NoisyOutput):
             folder: The folder. A model that was saved there before is replaced.
 
         Raises:
-            InputError: If the folder contains something other than a saved model; it is left unchanged.
+            InputError: If the folder contains something other than a saved model, or if a number of the model is not finite; the
+                folder is left unchanged.
         """
         saving.save_run_model(self, folder)
 

@@ -4,6 +4,7 @@ import dataclasses
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, NOISES
+from enhsim_tf.noise.rung_names import BEST
 
 RUNGS = ("coarse", "level and gain", "ridge", "ridge and network", "network")  # as in `enhancer.ladder`, which imports TensorFlow
 
@@ -16,7 +17,7 @@ class RunOptions:
         window: Length of a window in samples. None: a twentieth of the training telemetry, from 64 to 500 samples.
         num_windows: Number of training windows, evenly spaced over the time.
         epochs: Passes of the networks over the training windows.
-        num_iterations: Adversarial iterations of the noise networks.
+        num_iterations: Adversarial iterations of the GANs of noise; the autoregressive network takes three times as many.
         noise: Model of the noise, as in `FitOptions`.
         enhancer: One of `RUNGS`, or None, which chooses the simplest rung that is not measurably worse than the best one.
         delay_s: How much later the telemetry is than the coarse run, in seconds. None: it is estimated.
@@ -31,7 +32,7 @@ class RunOptions:
     num_windows: int = 2_500
     epochs: int = 6
     num_iterations: int = 1_000
-    noise: str = "convolutional"
+    noise: str = BEST
     enhancer: str | None = None
     delay_s: float | None = None
     held_out: float = 0.2

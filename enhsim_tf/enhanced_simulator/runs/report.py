@@ -32,7 +32,7 @@ class RunReport:
         noise: Standard deviation (`sd`) and correlation of neighbouring samples (`lag_1`), for `real` residuals and `generated` noise.
         false_alarms: Share of these samples that the residual detector flags, at a threshold set for `RATE`.
         outside: Share of these samples whose coarse run is outside the training range.
-        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for.
+        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for, or if there was too little to judge on.
         noise_model: Name of the noise model that was asked for, or `best`.
         noise_auc: AUC of a classifier that separates `generated` noise from the residuals of the judged telemetry, and of one that
             separates `real` residuals of the training telemetry from them. Empty if there is too little telemetry.

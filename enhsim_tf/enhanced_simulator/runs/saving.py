@@ -10,6 +10,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.enhanced_simulator.checks import check_saved_numbers, is_finite
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, noise_file, read_arrays, read_noise, read_saved, write_arrays, write_saved
 from enhsim_tf.enhancer.out_of_range import OutOfRange
@@ -30,7 +31,8 @@ def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
         folder: The folder. A model that was saved there before is replaced.
 
     Raises:
-        InputError: If the folder contains something other than a saved model; it is left unchanged.
+        InputError: If the folder contains something other than a saved model, or if a number of the model is not finite; the folder is left
+            unchanged.
     """
     networks = {"enhancer": model.rung.network}
     others = {
@@ -39,6 +41,9 @@ def save_run_model(model: "RunModel", folder: str | os.PathLike) -> None:
     }
     noise = state_of(model.noise)
     networks |= noise.networks
+    check_saved_numbers(
+        {name: is_finite(network.get_weights()) for name, network in networks.items()} | {"noise": bool(noise.networks) or noise.is_finite}
+    )
     others |= noise_file(noise)
     settings = {
         "rung": model.rung.name,

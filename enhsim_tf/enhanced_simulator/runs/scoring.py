@@ -70,7 +70,7 @@ def score_run(model: "RunModel", parts: Sequence[Telemetry], recording: Recordin
         options: Settings of the scoring. None uses the defaults.
 
     Returns:
-        A data frame with the index of `sources.to_series` and the columns `value`, `enhanced`, `score` (scaled so that the
+        A data frame with the index of `pandas_series.to_series` and the columns `value`, `enhanced`, `score` (scaled so that the
         threshold is 1), `flag` (whether the score is above 1) and `out_of_range` (above 1, the coarse run is outside the
         training range). Samples without a coarse run, or in stretches shorter than a window, have NaN in place of numbers.
         `frame.attrs` is that of `scoring.score_channel`.

@@ -118,8 +118,8 @@ class Pipelines:
             self.seed,
             chosen.num_windows,
             chosen.epochs,
-            num_iterations=0,  # the noise networks of the cells are trained by `generator`
             window=self.window,
+            noise="none",  # that of the cells is fitted by `generator`
             held_out=chosen.held_out,
             verbose=0,
         ).save(folder / "simulator")

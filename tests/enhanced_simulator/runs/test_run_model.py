@@ -9,6 +9,7 @@ import pytest
 from enhsim_tf.coarse_simulator.interface import FunctionSimulator
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.runs import fitting
 from enhsim_tf.enhanced_simulator.runs.fitting import fit_run_model, split_pairs
 from enhsim_tf.enhanced_simulator.runs.model import RunModel
@@ -17,7 +18,9 @@ from enhsim_tf.enhanced_simulator.runs.scoring import score_run
 from enhsim_tf.enhanced_simulator.saving import check_saved
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.enhanced_simulator.training import TrainingSettings
 from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, RIDGE
+from enhsim_tf.noise.rung_names import BEST
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
@@ -358,6 +361,10 @@ def test_telemetry_without_a_run_is_not_scored(refused, fitted):
 def test_options_out_of_range_are_refused(refused, options):
     with refused(next(iter(options)).split("_")[0]):
         RunOptions(**options)
+
+
+def test_the_noise_model_is_chosen_unless_one_is_named():
+    assert RunOptions().noise == FitOptions().noise == TrainingSettings().noise == BEST
 
 
 def test_too_little_shared_time_is_refused(refused):
