@@ -236,7 +236,7 @@ def test_the_page_says_what_the_findings_say(tmp_path):
         ],
     }
     kinds = {"bursts": about | {"seeds": [7]}}
-    found = {"families": kinds, "limits": findings._limits(kinds), "seeds": [7], "budget": "full"}
+    found = {"families": kinds, "limits": findings._limits(kinds), "alone": {}, "seeds": [7], "budget": "full"}
     page = tmp_path / "noise.md"
     names = ("families", "limits", "unrealistic", "learning curve")
     page.write_text("".join(f"<!-- {name}: generated -->\nold\n<!-- end of {name} -->\n" for name in names), encoding="utf-8")
@@ -340,6 +340,22 @@ def test_models_are_compared_with_real_windows_of_their_own_seeds():
     ]
     first, second = (found["limits"]["choice"][rule] for rule in ("first", "second"))
     assert second["missed"] == {"bursts": pytest.approx(0.01)} and first["kept"] == 1
+    # the network's excess is one point on the first seed and none on the second; its recall at the real rate is 20 points higher on the first
+    first, second = found["alone"]["3000"], found["alone"]["3001"]
+    assert first["alarms"] == second["alarms"] == {"kept": 1, "of": 1, "missed": {}}
+    assert first["recall"] == {"kept": 0, "of": 1, "missed": {"bursts": pytest.approx(0.2)}} and second["recall"]["kept"] == 1
+    told = [line for line in limits(found).splitlines() if line.startswith("- Seed ")]
+    assert len(told) == 2 and told[0].startswith(
+        "- Seed 3000 alone: false alarms of the autoregressive network within the limits on 1 of 1 families. Recall at the real rate within 3 points "
+        "on 0; not on bursts (+20.00 points). Recall at own thresholds more than 3 points lower: none. Families with every measure of realism within "
+        "the limit: real 1, autoregressive network 1."
+    )
+    loud = [row | {"alarms": row["alarms"] + 31 * (row["rung"] != "real" and row["seed"] == 3001)} for row in detectors]
+    loud = {name: pd.DataFrame(table) for name, table in zip(findings.KEPT.names, (loud, realism, choice), strict=True)}
+    alone = findings.summarise(loud)["alone"]
+    assert (
+        alone["3001"]["alarms"] == {"kept": 0, "of": 1, "missed": {"bursts": pytest.approx(0.031)}} and alone["3000"]["alarms"]["kept"] == 1
+    )
     text = families(found | {"budget": "full"})
     assert "(seeds 3000 and 3001, budget full; Gaussian and matched residual windows: seed 3001 alone):" in text
     assert "| 2.0% | 4.0% | 3.7% | 2.5% | Gaussian (second rule), autoregressive network (first rule) |" in text

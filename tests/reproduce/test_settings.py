@@ -75,6 +75,7 @@ COUNTS = {
     "curve_networks.gan_iterations",
     "curve_networks.num_real_classifiers",
     "curve_networks.num_steps",
+    "ladder.num_seeds",
     "ladder.num_iterations",
     "ladder.gan_iterations",
     "ladder.num_anomalous",

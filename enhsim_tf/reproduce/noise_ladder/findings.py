@@ -61,9 +61,16 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
     Returns:
         For each family, its half, its seeds, each rung's seeds, false-alarm rate, excess, recall, share of realism measures within
         `MAX_REALISM_RATIO` times their floor and those beyond it (means over seeds); and for each seed, the rule
-        that judged it, the chosen rung, and those that pass. And whether each limit is kept. Rungs are compared with
-        real windows of their own seeds.
+        that judged it, the chosen rung, and those that pass. And whether each limit is kept, in the mean over the seeds and on each seed of
+        the learnt rung alone. Rungs are compared with real windows of their own seeds.
     """
+    families = _families(tables)
+    seeds = sorted({seed for about in families.values() for seed in about["seeds"]})
+    return {"families": families, "limits": _limits(families), "alone": _alone(tables, families), "seeds": seeds}
+
+
+def _families(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
+    """The part of the summary that is about each family."""
     detectors, realism, choice = (tables[name] for name in ("detectors", "realism", "choice"))
     families = {}
     for family in (name for name in GALLERY if name in set(detectors["family"])):
@@ -111,8 +118,7 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
             "rungs": rungs,
             "choices": choices,
         }
-    seeds = sorted({seed for about in families.values() for seed in about["seeds"]})
-    return {"families": families, "limits": _limits(families), "seeds": seeds}
+    return families
 
 
 def fewer_seeds(found: Mapping[str, Any]) -> dict[tuple[int, ...], list[str]]:
@@ -226,6 +232,28 @@ def _limits(families: dict[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
         "chosen": _realism_of_chosen(families),
     }
     found["choice"] = {rule: _choices(families, rule, rung) for rule in (PRESENT, *FORMER_RULES)}
+    return found
+
+
+def _alone(tables: "Mapping[str, pd.DataFrame]", families: Mapping[str, Any], rung: str = _NETWORK) -> dict[str, Any]:
+    """What each limit would be on each seed of the learnt rung alone, by seed: a mean hides on how many seeds it is kept."""
+    seeds = sorted({seed for about in families.values() for seed in about["rungs"].get(rung, {"seeds": []})["seeds"]})
+    found = {}
+    for seed in seeds:
+        own = _families({name: table[table["seed"] == seed] for name, table in tables.items()})
+        limits = _limits(own, rung)
+        excess = {
+            name: about["rungs"][rung]["excess"]
+            for name, about in own.items()
+            if rung in about["rungs"] and about["rungs"][rung]["excess"] > MAX_EXCESS.get(about["half"], MAX_EXCESS["unseen"])
+        }
+        found[str(seed)] = {
+            "alarms": limits["within"][rung] | {"missed": excess},
+            "recall": {name: limits["recall"][name] for name in ("kept", "of", "missed")},
+            "lost": limits["recall"]["lost_by_model"][rung],
+            "realism": {name: about for name, about in limits["realism"]["by_model"].items() if about["of"]},
+            "choice": limits["choice"][PRESENT],
+        }
     return found
 
 

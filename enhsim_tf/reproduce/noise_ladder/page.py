@@ -106,7 +106,8 @@ def limits(found: Findings) -> str:
         f"- Recall at own thresholds more than {100 * recall['limit']:g} points below that after training on real windows"
         f"{_losses(recall['lost_by_model'][kept['rung']])}{_other_losses(recall['lost_by_model'], kept['rung'])}.",
         f"- Every measure of realism within {realism['limit']:g} times its floor: {realism['families_with_all']} of {realism['of']} families "
-        f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it.{_of_chosen(realism['chosen'])}",
+        f"(required: two thirds). On average, {realism['mean_share']:.0%} of the measures of a family are within it."
+        f"{_of_chosen(realism['chosen'], kept['choice'][PRESENT]['seeds'])}",
     ]
     if kept["choice"][PRESENT]["of"]:
         lines.append(_choice(kept["choice"][PRESENT], kept["rung"]))
@@ -120,7 +121,27 @@ def limits(found: Findings) -> str:
         lines.append(
             f"- What was tried before kept the limit on the choice, with the fewest alarms as the best, as follows: {'; '.join(former)}."
         )
+    lines += [_alone(seed, about, kept["rung"]) for seed, about in found["alone"].items() if len(found["alone"]) > 1]
     return "\n".join([*lines, "", *_realism(realism["by_model"])])
+
+
+def _alone(seed: str, about: Findings, learnt: str) -> str:
+    """What became of the limits on one seed alone."""
+    alarms, recall, choice = about["alarms"], about["recall"], about["choice"]
+    realism = ", ".join(f"{name} {values['families_with_all']}" for name, values in about["realism"].items())
+    chosen = (
+        f" The choice within its limit on {choice['kept_above_real']} of {choice['of']}{_differences(choice['missed_above_real'])}; with the fewest "
+        f"alarms as the best on {choice['kept']}{_differences(choice['missed'])}. Among the models that find as much: "
+        f"{choice['kept_that_finds']}{_found_less(choice)}."
+        if choice["of"]
+        else ""
+    )
+    return (
+        f"- Seed {seed} alone: false alarms of the {learnt} within the limits on {alarms['kept']} of {alarms['of']} families"
+        f"{_differences(alarms['missed'], 2)}. Recall at the real rate within {100 * MAX_RECALL_DIFFERENCE:g} points on {recall['kept']}"
+        f"{_differences(recall['missed'], 2)}. Recall at own thresholds more than {100 * MAX_RECALL_DIFFERENCE:g} points lower{_losses(about['lost'])}. "
+        f"Families with every measure of realism within the limit: {realism}.{chosen}"
+    )
 
 
 def _choice(choice: Findings, learnt: str) -> str:
@@ -156,12 +177,16 @@ def _other_recalls(found: Findings, limit: float) -> str:
     return f" Of the models that keep the limits on false alarms everywhere: {'; '.join(told)}." if told else ""
 
 
-def _of_chosen(realism: Findings) -> str:
-    """The same for the noise of the chosen models."""
+def _of_chosen(realism: Findings, seeds: Sequence[int]) -> str:
+    """The same for the noise of the models that are chosen on some seeds."""
     if not realism["of"]:
         return ""
     missed = f"; not on {_families(realism['missed'])}" if realism["missed"] else ""
-    return f" The noise of the model that the rule chooses keeps the limit on {realism['families_with_all']} of {realism['of']} families{missed}."
+    on_each_seed = " on each seed" if len(seeds) > 1 else ""
+    return (
+        f" The noise of the model that the rule chooses keeps the limit{on_each_seed} on {realism['families_with_all']} of {realism['of']} "
+        f"families{missed}."
+    )
 
 
 def _found_less(choice: Findings) -> str:
