@@ -7,6 +7,7 @@ holds the checksums of the files: a stage that was damaged since is reported and
 """
 
 import ast
+import functools
 import hashlib
 import importlib.metadata
 import inspect
@@ -26,6 +27,9 @@ from enhsim_tf.common.console import SILENT, Progress, time_left
 
 _PACKAGE = Path(__file__).parents[1]
 _LAZY_IMPORT = re.compile(r"enhsim_tf(\.\w+)+:\w+")
+# The stages of a run share most of their modules. Parsing these again for each stage would take seconds; sources, not names, are the keys
+# of what is remembered, so that a changed file is read again.
+_remembered = functools.lru_cache(maxsize=1_024)
 VERSIONS = {name: importlib.metadata.version(name) for name in ("tensorflow", "keras", "numpy", "pandas", "scikit-learn")}
 
 
@@ -211,6 +215,7 @@ def _file_of(module: str) -> Path:
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
+@_remembered
 def what_runs(source: str) -> str:
     """The syntax tree of a source as text, without comments and docstrings, because these do not affect results."""
     try:
@@ -232,11 +237,19 @@ def imports_of(source: str) -> list[str]:
     The path of a class that is imported by its name, such as `enhsim_tf.detection.detectors:LimitCheck`, counts as an import.
     """
     found = []
+    for module, names in _import_statements(source):
+        is_folder = not module or (_PACKAGE / module.replace(".", "/")).is_dir()
+        found += [f"{module}.{name}".strip(".") for name in names] if names and is_folder else [module]
+    return found
+
+
+@_remembered
+def _import_statements(source: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The modules of the package from which a source imports, without the package's own name, and the names that each statement imports."""
+    found: list[tuple[str, tuple[str, ...]]] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "enhsim_tf":
-            module = node.module.partition(".")[2]
-            is_folder = not module or (_PACKAGE / module.replace(".", "/")).is_dir()
-            found += [f"{module}.{alias.name}".strip(".") for alias in node.names] if is_folder else [module]
+            found.append((node.module.partition(".")[2], tuple(alias.name for alias in node.names)))
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _LAZY_IMPORT.fullmatch(node.value):
-            found.append(node.value.partition(":")[0].removeprefix("enhsim_tf."))
-    return found
+            found.append((node.value.partition(":")[0].removeprefix("enhsim_tf."), ()))
+    return tuple(found)
