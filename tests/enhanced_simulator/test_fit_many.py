@@ -25,6 +25,7 @@ from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
 TINY = {"window": 64, "num_windows": 30, "epochs": 1, "num_iterations": 2, "noise": "convolutional", "seed": 3, "enhancer": "network"}
+NO_GAN = {"noise": "autoregression"}  # for tests of folders and processes: a GAN takes most of the time of a small fit
 REPORTS = []  # reports of the first fit
 HOSTILE = ["../x", "a/b", "<b>", ".", "..", ".hidden", "%2E", "a%2Fb", " ", "ä 漢", "C:\\x", "[!.]*", "~", "-rf", "a\nb", "manifest.json"]
 
@@ -191,7 +192,7 @@ def test_ray_fits_the_same_simulators(in_one_process, tmp_path, monkeypatch):
 
 
 def test_a_worker_that_is_always_killed_does_not_stop_the_command(tmp_path, monkeypatch):
-    failed, _ = fit(tmp_path, {"a": series(num_samples=600), "b": Deadly()}, workers=2, window=32)
+    failed, _ = fit(tmp_path, {"a": series(num_samples=600), "b": Deadly()}, workers=2, window=32, **NO_GAN)
     assert list(failed) == ["b"] and "were killed" in failed["b"] and list(models_of(tmp_path)) == ["a"]
 
 
@@ -226,16 +227,16 @@ def test_a_file_of_the_same_name_is_left_unchanged(refused, tmp_path):
 
 
 def test_the_folder_of_a_model_is_refused_as_output(refused, tmp_path, quick):
-    fit(tmp_path, {"volts": series()})
+    fit(tmp_path, {"volts": series()}, **NO_GAN)
     with refused("a model itself"):
-        fit(tmp_path / "volts", {"amps": series()})
+        fit(tmp_path / "volts", {"amps": series()}, **NO_GAN)
 
 
 def test_an_earlier_fit_or_an_empty_folder_is_replaced(tmp_path, quick):
     folder_of(tmp_path, "volts").mkdir()
-    assert fit(tmp_path, {"volts": series()})[0] == {}
+    assert fit(tmp_path, {"volts": series()}, **NO_GAN)[0] == {}
     before = files(tmp_path)
-    assert fit(tmp_path, {"volts": series()}, seed=4)[0] == {}
+    assert fit(tmp_path, {"volts": series()}, seed=4, **NO_GAN)[0] == {}
     after = files(tmp_path)
     assert set(before) == set(after) and before["volts/enhancer.keras"] != after["volts/enhancer.keras"]
 
@@ -243,7 +244,7 @@ def test_an_earlier_fit_or_an_empty_folder_is_replaced(tmp_path, quick):
 @pytest.mark.parametrize("there_before", [False, True])
 def test_a_failure_leaves_no_partial_output(tmp_path, quick, monkeypatch, refused, there_before):
     if there_before:
-        fit(tmp_path, {"volts": series()})
+        fit(tmp_path, {"volts": series()}, **NO_GAN)
     before = files(tmp_path)
 
     def fail(report):
@@ -251,19 +252,19 @@ def test_a_failure_leaves_no_partial_output(tmp_path, quick, monkeypatch, refuse
 
     monkeypatch.setattr(report_figure, "channel_figure", fail)
     with refused("no space"):
-        fit(tmp_path, {"volts": series()}, seed=5)
+        fit(tmp_path, {"volts": series()}, seed=5, **NO_GAN)
     assert files(tmp_path) == before and [path.name for path in tmp_path.iterdir()] == ["volts"] * there_before
 
 
 def test_temporary_folders_of_killed_processes_are_removed(tmp_path, quick):
     left = tmp_path / f".volts.{fit_many.remove_leftovers.__globals__['_host']()}.4194305.0123abcd.tmp"  # no process has this number
     left.mkdir()
-    fit(tmp_path, {"volts": series()})
+    fit(tmp_path, {"volts": series()}, **NO_GAN)
     assert [path.name for path in tmp_path.iterdir()] == ["volts"]
 
 
 def test_other_content_written_during_the_fit_is_left_unchanged(tmp_path, quick, refused, monkeypatch):
-    job = fit_many.Job("volts", series(), tmp_path / "volts", FitOptions(**TINY), Cleaning())
+    job = fit_many.Job("volts", series(), tmp_path / "volts", FitOptions(**(TINY | NO_GAN)), Cleaning())
     (tmp_path / "volts").mkdir()
     (tmp_path / "volts" / "notes.txt").write_text("mine")
     with refused("something else"):
