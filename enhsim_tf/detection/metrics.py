@@ -88,28 +88,49 @@ def recall_at_real_rate(real_scores: np.ndarray, anomalous_scores: np.ndarray, r
 def auc_roc(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> float:
     """Area under the ROC curve (AUC): the probability that an anomalous window scores higher than a nominal one.
 
-    Ties count as one half.
-    """
-    from sklearn.metrics import roc_auc_score
+    Ties count as one half. It is computed from ranks, as the statistic of Mann and Whitney (1947).
 
-    return float(roc_auc_score(*_labelled(nominal_scores, anomalous_scores)))
+    Args:
+        nominal_scores: Scores of nominal windows.
+        anomalous_scores: Scores of anomalous windows.
+
+    Returns:
+        The area, from 0 to 1.
+
+    Raises:
+        InputError: If there are no scores of one kind, or if one is not finite.
+    """
+    from scipy.stats import rankdata
+
+    labels, scores = _labelled(nominal_scores, anomalous_scores)
+    num_anomalous = np.sum(labels)
+    rank_sum = np.sum(rankdata(scores)[labels])
+    return float((rank_sum - num_anomalous * (num_anomalous + 1) / 2) / (num_anomalous * (len(labels) - num_anomalous)))
 
 
 def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarray, prevalence: float = 0.02) -> float:
     """Area under the precision-recall curve (average precision) for a given share of anomalous windows.
 
-    The windows are weighted such that the anomalous windows have this share of the total weight.
+    With `p` for this share, the precision of a threshold is `p recall / (p recall + (1 - p) false-alarm rate)`. The area is the sum,
+    over all thresholds from the highest score down, of the precision times the increase of recall.
 
     Args:
         nominal_scores: Scores of nominal windows.
         anomalous_scores: Scores of anomalous windows.
         prevalence: Share of anomalous windows. It is also the expected value of this measure for random scores.
-    """
-    from sklearn.metrics import average_precision_score
 
+    Returns:
+        The area, from 0 to 1.
+
+    Raises:
+        InputError: If there are no scores of one kind, or if one is not finite.
+    """
     labels, scores = _labelled(nominal_scores, anomalous_scores)
-    weights = np.where(labels, prevalence / len(anomalous_scores), (1 - prevalence) / len(nominal_scores))
-    return float(average_precision_score(labels, scores, sample_weight=weights))
+    order = np.argsort(-scores, kind="stable")
+    last = np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)  # the last of each group of equal scores, where a threshold may lie
+    recalls, false_alarms = (np.cumsum(marks[order])[last] / np.sum(marks) for marks in (labels, ~labels))
+    precisions = prevalence * recalls / (prevalence * recalls + (1 - prevalence) * false_alarms)
+    return float(np.sum(precisions * np.diff(recalls, prepend=0.0)))
 
 
 def gap_closed(rate: float, simulated_rate: float, real_rate: float) -> float:
@@ -196,5 +217,11 @@ def _distance(labels: np.ndarray) -> np.ndarray:
 
 
 def _labelled(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Concatenates the scores and returns them with their labels, 0 for nominal and 1 for anomalous."""
-    return np.repeat([0, 1], [len(nominal_scores), len(anomalous_scores)]), np.concatenate([nominal_scores, anomalous_scores])
+    """Concatenates the scores and returns them with their labels, False for nominal and True for anomalous."""
+    numbers, scores = (len(nominal_scores), len(anomalous_scores)), np.concatenate([nominal_scores, anomalous_scores]).astype(np.float64)
+    if min(numbers) == 0 or not np.isfinite(scores).all():
+        raise InputError(
+            "Expected finite scores of nominal and of anomalous windows. "
+            f"Received: {numbers[0]} and {numbers[1]} scores, {np.sum(~np.isfinite(scores))} not finite."
+        )
+    return np.repeat([False, True], numbers), scores

@@ -99,6 +99,28 @@ def test_area_of_a_random_score_is_the_prevalence(prevalence):
     assert auc_pr_at_prevalence(np.ones(50), np.ones(70), prevalence) == pytest.approx(prevalence)  # flags all or none
 
 
+@pytest.mark.parametrize("prevalence", [0.02, 0.5])
+def test_areas_are_those_of_an_independent_implementation(prevalence):
+    rng = np.random.default_rng(3)
+    for nominal, anomalous in ((200, 30), (7, 50), (1, 1)):
+        for decimals in (0, 1, 9):  # many ties, some, none
+            scores = rng.normal(size=nominal).round(decimals), rng.normal(0.7, 1, anomalous).round(decimals)
+            labels, pooled = np.repeat([0, 1], [nominal, anomalous]), np.concatenate(scores)
+            weights = np.where(labels, prevalence / anomalous, (1 - prevalence) / nominal)
+            assert auc_roc(*scores) == pytest.approx(roc_auc_score(labels, pooled), abs=1e-12)
+            area = average_precision_score(labels, pooled, sample_weight=weights)
+            assert auc_pr_at_prevalence(*scores, prevalence) == pytest.approx(area, abs=1e-12)
+
+
+@pytest.mark.parametrize("area", [auc_roc, auc_pr_at_prevalence])
+@pytest.mark.parametrize(
+    ("nominal", "anomalous", "said"), [([], [1], "0 and 1 scores"), ([1], [], "1 and 0"), ([1, np.nan], [np.inf], "2 not finite")]
+)
+def test_scores_without_an_area_are_refused(refused, area, nominal, anomalous, said):
+    with refused(said):
+        area(nominal, anomalous)
+
+
 def test_gap_closed():
     assert gap_closed(0.26, 1, 0.01) == pytest.approx(0.74 / 0.99)
     assert (gap_closed(1, 1, 0.01), gap_closed(0.01, 1, 0.01)) == (0, 1)
