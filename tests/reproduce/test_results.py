@@ -188,11 +188,29 @@ def test_the_readme_gives_the_range_over_seeds_where_it_is_known(filled):
     )
     assert "| 1,234,568 | **partly**" in text, "a speed has no range over seeds"
     assert "**partly** (over seeds: 2 partly, 1 not reproduced)" in text and text.count("over seeds:") == 1
-    for other in (_spread(0.15), _spread(0.12345, budget="full"), _spread(0.12345, seeds=(0, 1))):
+    for other in (_spread(0.12345, budget="full"), _spread(0.12345, seeds=(0, 1))):
         assert "over seeds" not in filled(spread=other), "ranges of another run"
     older = _spread(0.12345)
     del older["claims"]["C9"]
     assert "over seeds" not in filled(spread=older), "ranges of another ledger"
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([0.15, 0.1, 0.2], "0.123 (0.1 to 0.2)"),  # another processor: the value of the seed was .15 and is .12345
+        ([0.15, 0.13, 0.16], "0.123 (0.123 to 0.16)"),  # .0066 outside, and half the width is .015
+        ([0.15, 0.14, 0.16], None),  # .0166 outside, and half the width is .01
+        ([0.1, 0.09, 0.11], None),  # .0135 outside
+        ([0.123, 0.123, 0.123], "0.123 (0.123 to 0.123)"),  # no width: equal in three digits
+        ([0.124, 0.124, 0.124], None),
+    ],
+)
+def test_ranges_of_another_processor_are_kept_and_those_of_other_code_are_not(filled, values, expected):
+    spread = _spread(0.12345)
+    spread["claims"]["C1"]["values"] = values
+    text = filled(spread=spread)
+    assert ("over 3 seeds" in text) == (expected is not None) and (expected or "| 0.123 |") in text
 
 
 def test_a_value_stands_beside_the_number_that_decides(filled, found):

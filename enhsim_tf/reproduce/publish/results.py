@@ -19,6 +19,7 @@ from enhsim_tf.reproduce.settings import deviations
 from enhsim_tf.reproduce.stages import VERSIONS
 
 _SPEED = "C2"
+_REACH = 0.5  # of the width of the range over seeds: farther outside of it, a value is that of another version of the code
 PAPER = "the paper's example"  # what `results.json` names as the source where no file of real telemetry is
 
 
@@ -59,8 +60,16 @@ def table(claims: list[dict]) -> str:
 def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None:
     """The ranges and verdicts over further seeds, with this run's own in the place of those that its seed had before.
 
-    Those of another budget or of an older run say nothing of this one. A speed is of one machine at one time and has no
-    range over seeds.
+    Those of another budget or of an older run say nothing of this one. On another processor, training rounds differently and a value
+    changes as it does from seed to seed; the run is taken for an older one if its first value is farther outside of the range over
+    seeds than half of the width of that range. A speed is of one machine at one time and has no range over seeds.
+
+    Args:
+        folder: Holds `spread.json`, if further seeds were run.
+        found: The results of this run.
+
+    Returns:
+        The contents of `spread.json` with this run's values, or None if there is none that belongs to this run.
     """
     path = folder / "spread.json"
     spread = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
@@ -69,7 +78,8 @@ def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None
     first, here = found["claims"][0], spread["seeds"].index(found["seed"])
     if {claim["id"] for claim in found["claims"]} != set(spread["claims"]):
         return None
-    if short(first["value"]) not in map(short, spread["claims"][first["id"]]["values"]):
+    known = [value for value in spread["claims"][first["id"]]["values"] if value is not None]
+    if first["value"] is None or not known or not _is_near(first["value"], min(known), max(known)):
         return None
     for claim in found["claims"]:
         over = spread["claims"][claim["id"]]
@@ -78,6 +88,11 @@ def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None
         values = [value for value in over["values"] if value is not None]
         over["range"] = [min(values), max(values)] if values and claim["id"] != _SPEED else None
     return spread
+
+
+def _is_near(value: float, low: float, high: float) -> bool:
+    reach = _REACH * (high - low)
+    return low - reach <= value <= high + reach or short(value) in (short(low), short(high))
 
 
 def disagreement(spread: Mapping[str, Any] | None, claim_id: str) -> str:
