@@ -21,7 +21,6 @@ _CURVES = {
     SIMULATOR + "residual windows": ("simulator + residual windows", "D", "-", ENHANCED),
     THRESHOLD_ON_REAL: ("residual windows, threshold on real", "d", ":", ENHANCED),
     SIMULATOR + "autoregressive network": ("simulator + autoregressive network", "o", "-", GENERATED),
-    SIMULATOR + "autoregressive network, fourth form": ("autoregressive network, fourth form", "o", "-", GENERATED),
     CORAL: ("CORAL", "s", ":", COARSE),
     ADVERSARIAL: ("domain-adversarial classifier", "x", ":", QUIET),
     CLASSIFIER_ON_REAL: ("classifier without simulator", "+", "-", QUIET),
