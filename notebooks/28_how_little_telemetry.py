@@ -385,12 +385,7 @@ for environment, about in found["environments"].items():
 # noise that an autoregression describes?
 
 # %%
-simple = "simulator + autoregression"
-learnt = next(  # its name says which form of the network was tried
-    arm
-    for arm in found["environments"]["white"]["arms"]
-    if arm.startswith("simulator + autoregressive network")
-)
+simple, learnt = "simulator + autoregression", "simulator + autoregressive network"
 gaps = {}
 for environment in ("white", "autoregressive"):
     arms = group_with(found["environments"][environment], learnt)["arms"]

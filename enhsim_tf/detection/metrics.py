@@ -126,8 +126,7 @@ def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarra
         InputError: If there are no scores of one kind, or if one is not finite.
     """
     labels, scores = _labelled(nominal_scores, anomalous_scores)
-    order = np.argsort(-scores, kind="stable")
-    last = np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)  # the last of each group of equal scores, where a threshold may lie
+    order, last = _thresholds(scores)
     recalls, false_alarms = (np.cumsum(marks[order])[last] / np.sum(marks) for marks in (labels, ~labels))
     precisions = prevalence * recalls / (prevalence * recalls + (1 - prevalence) * false_alarms)
     return float(np.sum(precisions * np.diff(recalls, prepend=0.0)))
@@ -185,8 +184,7 @@ def vus_pr(labels: np.ndarray, scores: np.ndarray, max_buffer: int, num_buffers:
             f"Received: shapes {labels.shape} and {scores.shape}, {labels.sum()} anomalous, {np.isnan(scores).sum()} nan, "
             f"max_buffer={max_buffer}."
         )
-    order = np.argsort(-scores, kind="stable")
-    last = np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)  # the last of each group of equal scores, where a threshold may lie
+    order, last = _thresholds(scores)
     alarms = last + 1
     group = np.empty(len(scores), int)  # for each sample, the index of the first threshold at which it raises an alarm
     group[order] = np.searchsorted(last, np.arange(len(scores)))
@@ -216,8 +214,14 @@ def _distance(labels: np.ndarray) -> np.ndarray:
     return np.minimum(places - before, after - places)
 
 
+def _thresholds(scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the order of falling scores, and in it the last place of each group of equal scores, where a threshold may lie."""
+    order = np.argsort(-scores, kind="stable")
+    return order, np.flatnonzero(np.diff(scores[order], append=np.nan) != 0)
+
+
 def _labelled(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Concatenates the scores and returns them with their labels, False for nominal and True for anomalous."""
+    """Checks and concatenates the scores, and returns their labels, False for nominal and True for anomalous, and the scores."""
     numbers, scores = (len(nominal_scores), len(anomalous_scores)), np.concatenate([nominal_scores, anomalous_scores]).astype(np.float64)
     if min(numbers) == 0 or not np.isfinite(scores).all():
         raise InputError(

@@ -78,16 +78,20 @@ def read_spread(folder: Path, found: Mapping[str, Any]) -> dict[str, Any] | None
     first, here = found["claims"][0], spread["seeds"].index(found["seed"])
     if {claim["id"] for claim in found["claims"]} != set(spread["claims"]):
         return None
-    known = [value for value in spread["claims"][first["id"]]["values"] if value is not None]
+    known = _known(spread["claims"][first["id"]])
     if first["value"] is None or not known or not _is_near(first["value"], min(known), max(known)):
         return None
     for claim in found["claims"]:
         over = spread["claims"][claim["id"]]
         over["holds"] = _holds(over)
         over["values"][here], over["verdicts"][here], over["holds"][here] = claim["value"], claim["verdict"], claim.get("holds")
-        values = [value for value in over["values"] if value is not None]
+        values = _known(over)
         over["range"] = [min(values), max(values)] if values and claim["id"] != _SPEED else None
     return spread
+
+
+def _known(about: Mapping[str, Any]) -> list[float]:
+    return [value for value in about["values"] if value is not None]
 
 
 def _is_near(value: float, low: float, high: float) -> bool:
@@ -224,7 +228,7 @@ def _value(claim: Mapping[str, Any], spread: Mapping[str, Any] | None) -> str:
     over = None if spread is None else spread["claims"][claim["id"]]
     if over is None or over["range"] is None:
         return short(claim["value"])
-    known = sum(each is not None for each in over["values"])
+    known = len(_known(over))
     among = f" in {known} seeds, none in {len(over['values']) - known}" if known < len(over["values"]) else ""
     return "{} ({} to {}{})".format(*map(short, (claim["value"], *over["range"])), among)
 
