@@ -80,8 +80,9 @@ def measure(options: argparse.Namespace) -> dict:
     this = machine() | {"as_without_avx512": options.avx2}
     kept = json.loads(options.out.read_text()) if options.only and options.out.exists() else {"machine": this, "rows": []}
     about = kept["machine"]
-    # a row of another processor than the rest says so
-    elsewhere = {} if this["processor"] == about["processor"] else {"machine": this}
+    # a row of another processor than the rest says so; processors of one name can differ in their instruction sets
+    is_same = all(this[key] == about[key] for key in ("processor", "instruction_sets"))
+    elsewhere = {} if is_same else {"machine": this}
     found = []
     for name in ROWS:
         if options.only and name not in options.only:
