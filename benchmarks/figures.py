@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 
+from enhsim_tf.common.figure import Figure, save
 from enhsim_tf.common.plot_style import DOUBLE, ENHANCED, FOOT, GENERATED, LINE, QUIET, REAL, beside, new_sheet, panels
-from enhsim_tf.reproduce.figure import Figure, save
 
 
 def draw(results: dict, folder: Path) -> list[Path]:

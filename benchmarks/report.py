@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from benchmarks.rows import bar_of_reproduction, reproduction
-from enhsim_tf.reproduce.publish.results import fill_pages
+from book.tables import fill_parts
+from enhsim_tf.common.atomic_files import replace_file
 
 
 def line_of(row: dict) -> str:
@@ -84,4 +85,7 @@ def with_words(results: dict) -> list[dict]:
 
 def fill_page(root: Path, results: list[dict]) -> None:
     """Writes the table into the page on speed."""
-    fill_pages(root, {"speed": markdown(results)})
+    path = root / "docs" / "speed.md"
+    text = fill_parts(path.read_text(encoding="utf-8"), {"speed": markdown(results)}, path.name)
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

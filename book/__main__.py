@@ -22,7 +22,13 @@ def main(arguments: list[str] | None = None) -> int:
         'and checks its links. It needs `python -m pip install ".[book]"` and no network.',
     )
     parser.add_argument("--out", type=Path, default=FOLDER.parent / "build" / "book", help="folder of the pages (default: build/book)")
+    parser.add_argument("--tables", action="store_true", help="refresh the marked tables of README.md and docs/, and build nothing")
     options = parser.parse_args(arguments)
+    if options.tables:
+        from book.tables import refresh
+
+        print(*refresh(FOLDER.parent), sep="\n")
+        return 0
     missing = [name for name in ("sphinx", "myst_nb", "sphinx_book_theme") if importlib.util.find_spec(name) is None]
     if missing:
         print(f'Expected the packages of the book. Missing: {", ".join(missing)}. Run `python -m pip install ".[book]"`.', file=sys.stderr)

@@ -19,8 +19,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
+from notebooks.lesson_tools import check_answer, say
+from notebooks.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment(lesson="01")
 claim("C2", "C7")

@@ -18,8 +18,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
+from notebooks.lesson_tools import check_answer, say
+from notebooks.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment(lesson="05")
 claim("C6", "C7")

@@ -19,8 +19,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment(lesson="08")
 claim("C6")

@@ -19,8 +19,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment(lesson="13")
 claim("C7")

@@ -21,8 +21,8 @@ import warnings
 import numpy as np
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
+from notebooks.lesson_tools import check_answer, say
+from notebooks.notebook import claim, drawing, open_experiment, show
 
 experiment = open_experiment(lesson="20")
 claim("C5")

@@ -19,8 +19,8 @@ import numpy as np
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, QUIET, REAL
 from enhsim_tf.realism import measures
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
+from notebooks.lesson_tools import check_answer, say
+from notebooks.notebook import claim, drawing, open_experiment, show, verdict
 
 experiment = open_experiment(lesson="21")
 claim("C6", "C8")

@@ -20,8 +20,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import (
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import (
     claim,
     drawing,
     open_experiment,
@@ -400,7 +400,7 @@ assert not is_full or max(area.values()) - min(area.values()) < 0.03
 # deviation: rare pulses. One arm adds Gaussian numbers, the other draws whole windows of real noise again.
 
 # %%
-from enhsim_tf.reproduce.noise_processes import NOISES
+from studies.common.noise_processes import NOISES
 
 true_noise_sd = experiment.settings.telemetry.noise_sd
 shot, signal = NOISES["shot"], pool["truth"]

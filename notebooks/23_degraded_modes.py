@@ -19,8 +19,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, open_findings, show_finding
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import claim, drawing, open_experiment, open_findings, show_finding
 
 experiment = open_experiment(lesson="23")
 claim("C9")

@@ -18,8 +18,8 @@
 import numpy as np
 
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import drawing, open_experiment, open_labelled, open_residual, show_finding
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import drawing, open_experiment, open_labelled, open_residual, show_finding
 
 experiment = open_experiment(lesson="24")  # nothing of the paper's example is used here
 is_full = experiment.settings.budget == "full"

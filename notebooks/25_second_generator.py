@@ -21,8 +21,8 @@ import numpy as np
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, ENHANCED, GENERATED, QUIET, REAL
 from enhsim_tf.realism import measures, two_sample
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import drawing, open_experiment, open_noise
+from notebooks.lesson_tools import check_answer, say
+from notebooks.notebook import drawing, open_experiment, open_noise
 
 experiment = open_experiment(lesson="25")
 is_full = experiment.settings.budget == "full"
@@ -259,7 +259,7 @@ np.testing.assert_allclose(mine, tiny.generate(5, 3), rtol=1e-2, atol=1e-3)
 # a moving average extracts (notebook 08), and is compared with that.
 
 # %%
-from enhsim_tf.reproduce.noise_gallery import GALLERY
+from studies.common.noise_gallery import GALLERY
 
 wheel = GALLERY["interference"].draw(2 * number * window, np.random.default_rng(7)).reshape(2, number, window)
 parts = [experiment.data.windows("train", number, "second generator"), experiment.data.windows("test", None)]

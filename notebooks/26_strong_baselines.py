@@ -20,8 +20,8 @@ import numpy as np
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
 from enhsim_tf.enhancer import ridge as packaged
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import drawing, open_battery, open_experiment, open_factorial
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import drawing, open_battery, open_experiment, open_factorial
 
 experiment = open_experiment(lesson="26")
 is_full = experiment.settings.budget == "full"

@@ -24,8 +24,8 @@ import numpy as np
 from enhsim_tf import clean, read_source
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import drawing, open_experiment
+from notebooks.lesson_tools import check_answer, say
+from notebooks.notebook import drawing, open_experiment
 
 experiment = open_experiment(
     lesson="27"

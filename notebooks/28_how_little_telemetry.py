@@ -26,9 +26,9 @@ from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.enhancer import ridge as packaged
-from enhsim_tf.reproduce.learning_curve.cells import World
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import drawing, open_curve, open_experiment, show_finding
+from notebooks.lesson_tools import check_answer, say, slider
+from notebooks.notebook import drawing, open_curve, open_experiment, show_finding
+from studies.few_windows.cells import World
 
 experiment = open_experiment(lesson="28")
 is_full = experiment.settings.budget == "full"
@@ -267,7 +267,7 @@ slider(draw, "number of real windows", NUM_REAL, shown=NUM_REAL[:2])
 # methods are described in [docs/noise.md](../docs/noise.md). Each sentence below is computed from the table.
 
 # %%
-from enhsim_tf.reproduce.learning_curve.findings import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
+from studies.few_windows.findings import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
 
 excess = {name: values - RATE for name, values in alarms.items()}
 pays_here = [

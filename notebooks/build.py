@@ -19,7 +19,7 @@ import nbformat
 from jupyter_client.manager import KernelManager
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file, sha256
-from enhsim_tf.reproduce.lesson import STATIC, TIMES
+from notebooks.lesson_tools import STATIC, TIMES
 
 FOLDER = Path(__file__).parent
 STAMP = "enhsim_tf"  # the notebook's metadata that hold its stamp
@@ -248,7 +248,7 @@ def build(budget: str, only: str | None, solved: bool = False) -> int:
             file=sys.stderr,
         )
         return 2
-    from enhsim_tf.reproduce.notebook import open_experiment, prepare
+    from notebooks.notebook import open_experiment, prepare
 
     prepare(open_experiment(budget))  # so that no progress bar of a training stays in a notebook
     folder = FOLDER

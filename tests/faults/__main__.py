@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.atomic_files import write_json
-from enhsim_tf.reproduce.publish.results import fill_pages
 from tests.faults import of_data_sets, of_reproduce
 from tests.faults.in_common import MISSED
 
@@ -44,11 +43,6 @@ def as_markdown(table):
     )
 
 
-def fill_page(table):
-    """Writes the table into the page on faults."""
-    fill_pages(ROOT, {"faults": as_markdown(table)})
-
-
 def main():
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description="Faults, tried for real.")
     choices = [*BENCHES, "page"]
@@ -68,7 +62,6 @@ def main():
     signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore SIGINT, and so would their child processes
     kept = json.loads(options.out.read_text()) if options.out.exists() else []
     if options.of == "page":
-        fill_page(kept)
         return 0
     make, faults = BENCHES[options.of]
     table = [row for row in kept if row["of"] != options.of or (options.only and row["fault"] not in options.only)]

@@ -13,14 +13,14 @@ import pytest
 from jupyter_client.manager import KernelManager
 from PIL import Image
 
-from enhsim_tf.reproduce import figure, lesson
-from enhsim_tf.reproduce import notebook as teaching
-from enhsim_tf.reproduce.learning_curve import figures as curve_figures
+from enhsim_tf.common import figure, lesson
 from enhsim_tf.reproduce.paper.claims import CLAIMS
 from enhsim_tf.reproduce.paper.figures import FIGURES
-from enhsim_tf.reproduce.robustness import figures as robustness_figures
-from enhsim_tf.reproduce.spacecraft import figures as labelled_figures
 from notebooks import build
+from notebooks import notebook as teaching
+from studies.few_windows import figures as curve_figures
+from studies.robustness import figures as robustness_figures
+from studies.spacecraft import figures as labelled_figures
 
 ROOT = Path(__file__).parents[2]
 SOURCES = build.sources()

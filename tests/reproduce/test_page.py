@@ -1,23 +1,20 @@
 """Tests the HTML page: structure and escaping with a parser, behaviour, colours and print with a headless browser."""
 
 import base64
-import fcntl
 import html.parser
 import itertools
 import json
-import os
 import re
-import select
 import shutil
 import struct
 import zlib
 
 import pytest
 
+from enhsim_tf.reproduce import report as page
 from enhsim_tf.reproduce.paper.claims import CLAIMS
 from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.judgements import NOT_MEASURED, NOT_REPRODUCED, NOT_TESTED, PARTLY, REPRODUCED
-from enhsim_tf.reproduce.publish import page
 from enhsim_tf.reproduce.settings import deviations
 
 HOSTILE = "\"'><img src=x onerror=alert(1)><script>alert(2)</script></table>{{ 7 * 7 }}&lt;" + "T1_" * 80 + ".npy"
@@ -306,205 +303,3 @@ def test_a_missing_or_broken_figure_is_refused_and_the_old_page_stays(folder, tm
 @pytest.mark.parametrize("value", VALUES)
 def test_numbers_in_short(value):
     assert page.short(value) == VALUES[value]
-
-
-# -- what a browser makes of it --------------------------------------------------------------------------------------------
-
-PROGRAM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = (
-    "--headless=new --no-sandbox --disable-gpu --disable-quic --disable-dev-shm-usage --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --hide-scrollbars --remote-debugging-pipe"
-).split()
-
-
-class Browser:
-    """A headless Chromium, spoken to over two pipes in its own protocol: JSON messages that end in a zero byte."""
-
-    def __init__(self, program, profile):
-        pipes = [os.pipe(), os.pipe()]
-        (into, self._to), (self._from, out) = pipes
-        high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (into, out, os.open(os.devnull, os.O_RDWR))]
-        actions = [(os.POSIX_SPAWN_DUP2, high[number], target) for number, target in ((0, 3), (1, 4), (2, 1), (2, 2))]
-        command = [program, *FLAGS, f"--user-data-dir={profile}", "about:blank"]
-        self._process = os.posix_spawn(program, command, os.environ, file_actions=actions)
-        for end in (into, out, *high):
-            os.close(end)
-        self._count, self._rest, self._session, self.events = 0, b"", None, []
-        target = next(target for target in self.call("Target.getTargets")["targetInfos"] if target["type"] == "page")
-        self._session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log", "Network", "Accessibility"):
-            self.call(f"{domain}.enable")
-
-    def message(self):
-        while b"\0" not in self._rest:
-            assert select.select([self._from], [], [], 60)[0], "the browser does not answer"
-            content = os.read(self._from, 1 << 20)
-            assert content, "the browser has ended"
-            self._rest += content
-        message, _, self._rest = self._rest.partition(b"\0")
-        return json.loads(message)
-
-    def call(self, method, **parameters):
-        self._count += 1
-        words = {"id": self._count, "method": method, "params": parameters} | ({"sessionId": self._session} if self._session else {})
-        os.write(self._to, json.dumps(words).encode() + b"\0")
-        while (message := self.message()).get("id") != self._count:
-            self.events.append(message)
-        assert "error" not in message, message
-        return message["result"]
-
-    def open(self, path):
-        self.events.clear()
-        self.call("Page.navigate", url=path.as_uri())
-        while not any(event["method"] == "Page.loadEventFired" for event in self.events):
-            self.events.append(self.message())
-
-    def view(self, width, scheme="light", media="screen"):
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=800, deviceScaleFactor=1, mobile=width < 600)
-        self.call("Emulation.setEmulatedMedia", media=media, features=[{"name": "prefers-color-scheme", "value": scheme}])
-
-    def ask(self, expression):
-        answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
-        assert "exceptionDetails" not in answer, answer
-        return answer["result"].get("value")
-
-    def press(self, key, code):
-        for kind in ("keyDown", "keyUp"):
-            text = {"text": "\r"} if key == "Enter" and kind == "keyDown" else {}
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code, **text)
-
-    def close(self):
-        self.call("Browser.close")
-        os.close(self._to), os.close(self._from)
-        os.waitpid(self._process, 0)
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    if PROGRAM is None:
-        pytest.skip("no Chromium on this machine")
-    browser = Browser(PROGRAM, tmp_path_factory.mktemp("profile"))
-    yield browser
-    browser.close()
-
-
-@pytest.fixture(params=["full", "smoke and hostile"])
-def browser(request, chromium, folder):
-    found = found_of() if request.param == "full" else hostile_of(found_of(budget="smoke"))
-    chromium.open(page.write_page(folder, found, list(FIGURES)))
-    return chromium
-
-
-def test_a_click_downloads_the_figure(browser, folder, tmp_path):
-    browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
-    browser.view(1280)
-    browser.ask("document.querySelectorAll('[download]')[3].click()")
-    while not any(event["method"] == "Page.downloadProgress" and event["params"]["state"] == "completed" for event in browser.events):
-        browser.events.append(browser.message())
-    assert (tmp_path / "fig04_enhanced_simulation.png").read_bytes() == (folder / "fig04_enhanced_simulation.png").read_bytes()
-
-
-# every text with its colour on the nearest ground below it, by the formula of WCAG 2; large text needs 3, other 4.5
-CONTRAST = """(() => {
-  const light = color => { const [r, g, b] = color.match(/[0-9.]+/g).map(c => c / 255)
-    .map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4); return 0.2126 * r + 0.7152 * g + 0.0722 * b }
-  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), poor = []; let count = 0
-  while (walker.nextNode()) {
-    const element = walker.currentNode.parentElement, style = getComputedStyle(element)
-    if (!walker.currentNode.data.trim() || !element.checkVisibility() || element.closest('.unseen')) continue
-    let ground = element
-    while (ground && getComputedStyle(ground).backgroundColor.endsWith(', 0)')) ground = ground.parentElement
-    const [low, high] = [light(style.color), light(getComputedStyle(ground).backgroundColor)].sort((a, b) => a - b)
-    const size = parseFloat(style.fontSize), large = size >= 24 || size >= 18.66 && style.fontWeight >= 700
-    count += 1
-    if ((high + 0.05) / (low + 0.05) < (large ? 3 : 4.5)) poor.push(element.textContent.slice(0, 30))
-  }
-  return [count, poor]
-})()"""
-
-
-def test_it_loads_alone_without_a_word_on_the_console(browser):
-    words = [
-        event for event in browser.events if event["method"] in ("Log.entryAdded", "Runtime.consoleAPICalled", "Runtime.exceptionThrown")
-    ]
-    assert not words
-    asked = [event["params"]["request"]["url"] for event in browser.events if event["method"] == "Network.requestWillBeSent"]
-    assert asked and {url.split(":")[0] for url in asked} == {"file", "data"} and sum(url.startswith("file") for url in asked) == 1
-    images = browser.ask("[...document.images].map(image => image.complete ? [image.naturalWidth, image.naturalHeight] : null)")
-    assert images == [[round(length / 3) for length in size_of(name)] for name in FIGURES]  # a quarter of a point, in pixels
-
-
-@pytest.mark.parametrize("width", [1280, 768, 390, 320])
-def test_the_page_never_scrolls_sideways(browser, width):
-    browser.view(width)
-    browser.ask("document.querySelectorAll('details').forEach(part => part.open = true)")
-    for zoomed in (False, True)[: 2 if width < 600 else 1]:
-        assert browser.ask("document.documentElement.clientWidth") == width
-        assert browser.ask("document.documentElement.scrollWidth") <= width
-        assert browser.ask("scrollTo(99, 0), scrollX") == 0
-        beyond = "[...document.querySelectorAll('main *, header *')].filter(part => !part.closest('.frame') && part.getBoundingClientRect().right > innerWidth)"
-        assert browser.ask(f"{beyond}.map(part => part.outerHTML.slice(0, 80))") == []
-        rows = browser.ask("[...document.querySelectorAll('tbody tr')].filter(row => row.getBoundingClientRect().height > 15).length")
-        assert rows == browser.ask("document.querySelectorAll('tbody tr').length") > len(CLAIMS) + len(deviations())
-        assert browser.ask("document.querySelector('.frame').scrollWidth > 2 * innerWidth") == zoomed
-        browser.ask("document.querySelectorAll('.zoom input').forEach(box => box.click())")
-    words = "[...document.querySelectorAll('.run thead th')].map(head => head.getBoundingClientRect().height)"
-    assert max(browser.ask(words)) < 40, "no word of the heads is broken"
-    ends = "['.first h2', '.first .facts', '.lead'].map(name => document.querySelector(name).getBoundingClientRect())"
-    caption, facts, claims = browser.ask(f"{ends}.map(({{top, bottom}}) => [top, bottom])")
-    assert caption[1] <= facts[0] and facts[1] <= claims[0], "nothing lies over another thing"
-
-
-def test_a_claims_name_beside_its_figure_is_never_broken(browser):
-    browser.view(1200)
-    heights = browser.ask("[...document.querySelectorAll('.shows a')].map(name => name.getBoundingClientRect().height)")
-    assert len(heights) == len(CLAIMS) and max(heights) < 1.5 * min(heights) < 45
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 390])
-def test_contrast_is_enough(browser, width, scheme):
-    browser.view(width, scheme)
-    browser.ask("document.querySelectorAll('details').forEach(part => part.open = true)")
-    assert browser.ask("matchMedia('(prefers-color-scheme: dark)').matches") == (scheme == "dark")
-    count, poor = browser.ask(CONTRAST)
-    assert count > 300 and poor == []
-    assert browser.ask("getComputedStyle(document.querySelector('.frame')).backgroundColor") == "rgb(255, 255, 255)"
-    browser.ask(f"document.body.style.setProperty('--quiet', '{'#808080' if scheme == 'light' else '#6a6a6a'}')")
-    assert len(browser.ask(CONTRAST)[1]) > 20, "a grey that is too weak is found"
-
-
-def test_the_keyboard_reaches_everything_and_sees_where_it_is(browser):
-    browser.view(1280)
-    browser.press("Tab", 9)
-    shown = "(({top, left, height}) => top >= 0 && left >= 0 && height > 20)(document.activeElement.getBoundingClientRect())"
-    assert browser.ask("document.activeElement.className") == "skip" and browser.ask(shown)
-    reachable = browser.ask("[...document.querySelectorAll('a, summary, input')].filter(part => part.checkVisibility()).length")
-    ring = "(style => style.outlineStyle == 'solid' && parseFloat(style.outlineWidth) >= 2)(getComputedStyle(document.activeElement))"
-    for _ in range(reachable - 1):
-        assert browser.ask(ring)
-        browser.press("Tab", 9)
-        assert browser.ask("document.activeElement.matches('a, summary, input')")
-    browser.ask("document.querySelector('.skip').focus()")
-    browser.press("Enter", 13)
-    assert browser.ask("document.activeElement.id") == "main"
-
-
-def test_cards_on_a_phone_are_still_tables_to_a_screen_reader(browser):
-    counts = []
-    for width in (1280, 390):
-        browser.view(width)
-        browser.ask("document.querySelectorAll('details').forEach(part => part.open = true)")
-        nodes = [node for node in browser.call("Accessibility.getFullAXTree")["nodes"] if not node["ignored"]]
-        roles = [node["role"]["value"] for node in nodes]
-        counts.append({role: roles.count(role) for role in ("table", "row", "columnheader", "rowheader", "cell", "caption")})
-        assert [node["name"]["value"] for node in nodes if node["role"]["value"] == "image"] == [about.alt for about in FIGURES.values()]
-    assert counts[0] == counts[1] and counts[0]["table"] == 4 and counts[0]["rowheader"] > len(CLAIMS) + len(deviations())
-
-
-def test_print_shows_all_settings_in_light_colours(browser):
-    browser.view(718, "dark", "print")
-    assert browser.ask("[...document.querySelectorAll('.setting')].filter(row => row.checkVisibility()).length") == len(deviations())
-    assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-    assert not browser.ask("[...document.querySelectorAll('nav, .tools, .skip')].some(part => part.checkVisibility())")
-    assert base64.b64decode(browser.call("Page.printToPDF", preferCSSPageSize=True)["data"]).startswith(b"%PDF")

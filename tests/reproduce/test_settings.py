@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.stages import Stages
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import Settings, deviations, groups, make_settings
-from enhsim_tf.reproduce.stages import Stages
 
 FIELDS = {
     f"{name}.{field.name}": (getattr(group, field.name), field.metadata)
