@@ -21,15 +21,15 @@ TOLERANCE = 0.25  # relative: another processor gives other numbers, and no othe
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?")
 
 CLAIMS_IN_SHORT = {
-    "C1": ("the enhancer learns the waveform", "error {value} (ridge regression {ridge_nrmse}, required: less)"),
-    "C2": ("it costs little time", "{cost_ratio} times the coarse simulator's (required: 2)"),
-    "C3": ("without noise, the signal is too clean", "{value:%} false alarms (required: 10 %)"),
-    "C4": ("1,000 iterations suffice for the noise", "from iteration {value} on (required: 500 to 1,500)"),
-    "C5": ("generator and discriminator stay balanced", "accuracy {value} (required: 0.5 to 0.8, with interval)"),
-    "C6": ("generated noise is similar to real noise", "standard deviation {scale_difference:%} off, effective rank {rank} of {real_rank}"),
-    "C7": ("the sum resembles telemetry", "AUC {value} (required: 0.6)"),
-    "C8": ("training on it makes detectors robust", "{value:%} false alarms (asked for: 1 %)"),
-    "C9": ("it is realistic under new faults", "error up to {value} times the nominal one (required: 2)"),
+    "C1": ("the enhancer learns the waveform", "error {value:.3f}; ridge regression {ridge_nrmse:.3f}"),
+    "C2": ("it costs little time", "{cost_ratio:.1f} times the coarse simulator's; required: 2"),
+    "C3": ("without noise, it is too clean", "{value:.0%} false alarms; required: 10%"),
+    "C4": ("1,000 iterations suffice", "from iteration {value:,.0f} on; required: 500 to 1,500"),
+    "C5": ("the two networks stay balanced", "accuracy {value:.3f}; required: 0.5 to 0.8, within its interval"),
+    "C6": ("the noise is similar", "standard deviation {scale_difference:.1%} off; effective rank {rank:.0f} of {real_rank:.0f}"),
+    "C7": ("the sum resembles telemetry", "AUC {value:.2f}; required: 0.6"),
+    "C8": ("detectors become robust", "{value:.0%} false alarms; asked for: 1%"),
+    "C9": ("new faults are realistic", "up to {value:.1f} times the nominal error; required: 2"),
 }
 """Each claim in a few words, and what decides its verdict, with the numbers of a run in braces."""
 
@@ -110,8 +110,8 @@ def claims_in_short(root: Path) -> str:
     rows = []
     for claim in found["claims"]:
         words, decides = CLAIMS_IN_SHORT[claim["id"]]
-        numbers = {name: Number(value) for name, value in {**claim["details"], "value": claim["value"]}.items()}
-        rows.append((f"{claim['id']} {words}", claim.get("holds") or verdict_over(claim, spread), decides.format_map(numbers)))
+        value = math.nan if claim["value"] is None else claim["value"]
+        rows.append((f"{claim['id']} {words}", claim.get("holds") or verdict_over(claim, spread), decides.format(**claim["details"], value=value).replace("%", " %")))
     return markdown(("claim", "verdict", "measured"), rows)
 
 
@@ -146,18 +146,6 @@ def speed(root: Path) -> str:
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Formats a table."""
     return "\n".join("| " + " | ".join(row) + " |" for row in (header, ["---"] * len(header), *rows))
-
-
-class Number(float):
-    """A number that a template shows with three significant digits, or with `%` as a percentage."""
-
-    def __new__(cls, value: float | None) -> "Number":
-        """Takes a missing number as NaN."""
-        return super().__new__(cls, math.nan if value is None else value)
-
-    def __format__(self, form: str) -> str:
-        """Formats the number."""
-        return f"{short(100 * self)} %" if form == "%" else short(float(self))
 
 
 def _results(root: Path) -> tuple[dict[str, Any], dict[str, Any] | None]:

@@ -173,7 +173,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--engine", choices=("local", "ray"), help="run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS"
     )
     large.add_argument(
-        "--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models (docs/scenarios.md)"
+        "--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models (docs/large_data_sets.md)"
     )
     _add_seed(generate, None)  # None shows that the option was not given: a scenario file may contain the seed
 

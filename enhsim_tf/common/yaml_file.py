@@ -149,4 +149,4 @@ def _load(path: Path) -> Any:
         reason = f"{' '.join(str(error.problem or error.context).split())[:120]}{where}"
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # an invalid date or number, or bytes that are not UTF-8
         reason = " ".join(str(error).split())[:120]
-    raise InputError(f"Expected settings in plain YAML, as in docs/scenarios.md. Received: {path.name!r}, {reason}.")
+    raise InputError(f"Expected settings in plain YAML, as in docs/large_data_sets.md. Received: {path.name!r}, {reason}.")

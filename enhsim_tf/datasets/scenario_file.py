@@ -1,6 +1,6 @@
 """The scenario file: a YAML file with the shares of scenarios and models in a large data set.
 
-docs/scenarios.md describes the file, and `scenario_form` validates it.
+docs/large_data_sets.md describes the file, and `scenario_form` validates it.
 """
 
 import dataclasses

@@ -14,7 +14,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.scenario_file import Mix, ModelShare, ScenarioShare, make_mix, read_mix
 
-DOCS = Path(__file__).parents[2] / "docs" / "scenarios.md"
+DOCS = Path(__file__).parents[2] / "docs" / "large_data_sets.md"
 GOOD = {
     "windows": 1_000,
     "seed": 7,

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from enhsim_tf.common.errors import InputError
 from tests.fuzzing import judge as judge_module
 from tests.fuzzing.__main__ import shares
-from tests.fuzzing.judge import MAX_MIB, MAX_SECONDS, judge
+from tests.fuzzing.judge import judge
 from tests.fuzzing.mutations import change_json
 from tests.fuzzing.target import MAX_CHARACTERS, Target, all_of, is_good
 from tests.fuzzing.targets import TARGETS
@@ -209,40 +209,8 @@ def test_the_command_is_guided_by_coverage(tmp_path):
     assert found["counters"] > found["counters_at_first"] > 0 and not list((tmp_path / "failures").iterdir())
 
 
-# the record
-
-
-def test_the_record_covers_the_stated_number_of_inputs():
-    record = json.loads((ROOT / "docs" / "fuzzing.json").read_text())
-    assert record["targets"].keys() == TARGETS.keys()
-    total = record["all"]
-    assert total["inputs"] == sum(each["inputs"] for each in record["targets"].values()) >= 100_000
-    assert total["failed"] == 0 and total["accepted"] + total["refused"] == total["inputs"]
-    assert all(each["accepted"] and each["counters"] for each in record["targets"].values())
-    grown = [name for name, each in record["targets"].items() if each["counters"] > each["counters_at_first"]]
-    assert len(grown) > len(TARGETS) / 2
-    assert total["peak_mib"] < MAX_MIB
-    assert total["slowest_s"] < MAX_SECONDS == record["most_seconds"] and total["more_than_at_first_mib"] < MAX_MIB == record["most_mib"]
-
-
-def test_the_stated_numbers_match_the_record():
-    record, text = json.loads((ROOT / "docs" / "fuzzing.json").read_text()), (ROOT / "SECURITY.md").read_text()
-    (said,) = re.findall(
-        r"([\d,]+) inputs on (\d+) targets: ([\d,]+) accepted, ([\d,]+) refused, no traceback; the slowest took ([\d.]+) s, "
-        r"the most memory that inputs added to a process was (\d+) MiB",
-        " ".join(text.split()),
-    )
-    total = record["all"]
-    assert said == (
-        f"{total['inputs']:,}", str(len(record["targets"])), f"{total['accepted']:,}", f"{total['refused']:,}",
-        f"{total['slowest_s']:.1f}", str(total["more_than_at_first_mib"]),
-    )  # fmt: skip
-    assert record["command"] in text
-    slow = ("manifest of a model", "settings of a model", "description of a network", "archive of a network", "weights of a network")
-    assert f"they had {sum(record['targets'][name]['inputs'] for name in slow):,} inputs together" in text
-    named = re.findall(r"`(tests/\w+/test_\w+\.py)(?:::(\w+))?`", text)
-    assert len(named) >= 10
-    for file, test in named:
+def test_the_tests_that_the_guarantees_name_exist():
+    for file, test in re.findall(r"`(tests/\w+/test_\w+\.py)(?:::(\w+))?`", (ROOT / "SECURITY.md").read_text()):
         assert f"def {test or 'test_'}" in (ROOT / file).read_text(), (file, test)
 
 
