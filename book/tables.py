@@ -111,7 +111,13 @@ def claims_in_short(root: Path) -> str:
     for claim in found["claims"]:
         words, decides = CLAIMS_IN_SHORT[claim["id"]]
         value = math.nan if claim["value"] is None else claim["value"]
-        rows.append((f"{claim['id']} {words}", claim.get("holds") or verdict_over(claim, spread), decides.format(**claim["details"], value=value).replace("%", " %")))
+        rows.append(
+            (
+                f"{claim['id']} {words}",
+                claim.get("holds") or verdict_over(claim, spread),
+                decides.format(**claim["details"], value=value).replace("%", " %"),
+            )
+        )
     return markdown(("claim", "verdict", "measured"), rows)
 
 
