@@ -478,7 +478,7 @@ assert verdicts["random fifths"] and not verdicts["blocks of time"]
 # %% [markdown]
 # ## What published runs say
 #
-# Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([battery study](../studies/battery/README.md)): near
+# Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([study](../studies/battery/README.md)): near
 # 1 C and at 15 °C it is *gentle*; in the *hard* regime, at −5 °C, it is discharged deeply, and the map is less linear. The *factorial
 # experiment* combines windows, extraction, enhancer and generator in all ways and measures false alarms
 # ([report](../docs/report.md)).
