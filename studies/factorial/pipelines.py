@@ -28,12 +28,12 @@ from studies.factorial.cells import (
     cells_by_source,
 )
 from studies.robustness.replicate import Replicate
-from studies.robustness.second_pipeline import train_convolutional_gan
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from enhsim_tf.noise.gan import NoiseGAN
+    from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN
 
 Enhance = Callable[[np.ndarray], np.ndarray]
 TRAINING, THRESHOLD = "arms, training", "arms, threshold"
@@ -112,8 +112,8 @@ class Pipelines:
         coarse = self.data.windows("train", number, purpose)["coarse"]
         if cell == "coarse":
             return coarse
-        seed = int(self.data.draw(purpose).integers(2**31))
-        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, seed)
+        rng = np.random.default_rng(int(self.data.draw(purpose).integers(2**31)))
+        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, rng)
 
     def number(self, windows: str) -> int:
         """Number of windows that a level of the factor `windows` stands for."""
@@ -151,7 +151,7 @@ class Pipelines:
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
-    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | NoiseGAN":
+    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | NoiseGAN | ConvolutionalGAN":
         """The fitted noise model of a cell. The last one is kept, because both purposes and some cells share it."""
         key = (*cell.source, cell.generator)
         if self._model is None or self._model[0] != key:
@@ -159,13 +159,18 @@ class Pipelines:
                 WHOLE_WINDOWS: WindowBootstrap.fit,
                 AUTOREGRESSION: self._autoregression,
                 PAPER_GAN: self._paper_gan,
-                CONVOLUTIONAL_GAN: functools.partial(train_convolutional_gan, settings=self.settings),
+                CONVOLUTIONAL_GAN: self._convolutional_gan,
             }[cell.generator]
             self._model = (key, fit(self.extracted(*cell.source)))
         return self._model[1]
 
     def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
         return GaussianAutoregression.fit(noise, min(self.settings.robustness.max_order, self.window - 1))
+
+    def _convolutional_gan(self, noise: np.ndarray) -> "ConvolutionalGAN":
+        from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
+
+        return fit_convolutional_gan(noise, self.settings.adversarial.num_iterations, self.seed)
 
     def _paper_gan(self, noise: np.ndarray) -> "NoiseGAN":
         from enhsim_tf.noise.gan import NoiseGAN

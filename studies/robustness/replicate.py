@@ -15,7 +15,7 @@ from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, G
 from enhsim_tf.realism import real_floor
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from studies.common.settings import Settings
-from studies.robustness.second_pipeline import SecondPipeline, train_convolutional_gan
+from studies.robustness.second_pipeline import SecondPipeline
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -123,11 +123,14 @@ class Replicate:
     @functools.cached_property
     def noises(self) -> "Mapping[str, Mapping[str, Any]]":
         """The fitted noise models of both pipelines by name; each learns the noise that its pipeline extracts."""
-        data, simulator = self.experiment.data, self.experiment.simulator
-        averaged, residual = data.noise_windows("train", self.settings.telemetry.num_windows, "noise windows"), self.second.residuals()
+        from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
+
+        chosen, residual = self.settings, self.second.residuals()
+        averaged = self.experiment.data.noise_windows("train", chosen.telemetry.num_windows, "noise windows")
+        gan = fit_convolutional_gan(residual, chosen.adversarial.num_iterations, chosen.seed)
         return {
-            "enhanced": {"GAN": simulator.noise, **self._fitted(averaged)},
-            "residual": {"convolutional GAN": train_convolutional_gan(residual, self.settings), **self._fitted(residual)},
+            "enhanced": {"GAN": self.experiment.simulator.noise, **self._fitted(averaged)},
+            "residual": {"convolutional GAN": gan, **self._fitted(residual)},
         }
 
     def _fitted(self, noise: np.ndarray) -> dict[str, Any]:
@@ -158,5 +161,5 @@ class Replicate:
         seed = int(data.draw(purpose).integers(2**31))
         for pipeline, clean in (("enhanced", "enhanced"), ("residual", "residual, no noise")):
             for noise, model in self.noises[pipeline].items():
-                arms[f"{pipeline} + {noise}"] = arms[clean] + model.generate(number, seed)
+                arms[f"{pipeline} + {noise}"] = arms[clean] + model.generate(number, np.random.default_rng(seed))
         return {arm: arms[arm] for arm in ARMS}

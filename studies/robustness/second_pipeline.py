@@ -1,4 +1,4 @@
-"""The residual pipeline: an enhancer trained on more windows in fewer epochs, its residual as the noise, and the convolutional GAN."""
+"""The residual pipeline: an enhancer trained on more windows in fewer epochs, and its residual as the noise."""
 
 import functools
 from pathlib import Path
@@ -11,7 +11,6 @@ from studies.common.settings import Settings
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-    from enhsim_tf.noise.gan import NoiseGAN
     from enhsim_tf.reproduce.paper.data import Data
 
 
@@ -59,18 +58,3 @@ class SecondPipeline:
         """Windows of telemetry minus the enhanced signal, of shape `(windows, samples)`."""
         draws = np.random.default_rng([self.settings.seed, 1])
         return self.simulator.residual_windows(self.data.channels[0].train, self.settings.second.num_windows, draws)
-
-
-def train_convolutional_gan(noise: np.ndarray, settings: Settings) -> "NoiseGAN":
-    """Trains the convolutional GAN on windows of noise.
-
-    Args:
-        noise: Windows of noise, shape `(windows, samples)`, in the unit of the telemetry.
-        settings: All settings; `adversarial` says how long it is trained.
-    """
-    from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
-
-    training = settings.adversarial
-    gan = convolutional_noise_gan(noise, training.num_iterations, settings.seed)
-    gan.fit(noise, training.num_iterations, training.record_every, verbose=False)
-    return gan

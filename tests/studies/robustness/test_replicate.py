@@ -9,13 +9,13 @@ from studies.robustness.replicate import ARMS, Replicate
 
 
 class Constant:
-    """A constant noise that records the seeds it was called with."""
+    """A constant noise that records a draw of each generator it was called with."""
 
     def __init__(self, value):
-        self.value, self.seeds = value, []
+        self.value, self.draws = value, []
 
-    def generate(self, number, seed):
-        self.seeds.append(seed)
+    def generate(self, number, rng):
+        self.draws.append(rng.random())
         return np.full((number, 10), self.value)
 
 
@@ -75,4 +75,4 @@ def test_training_and_threshold_windows_are_drawn_separately(replicate):
     assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == ["train", "train", "train", "calibration"]
     for noises in replicate.noises.values():
         for noise in noises.values():
-            assert len(noise.seeds) == 2 and noise.seeds[0] != noise.seeds[1]
+            assert len(noise.draws) == 2 and noise.draws[0] != noise.draws[1]
