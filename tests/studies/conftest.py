@@ -1,6 +1,23 @@
 """Fixtures of the tests of studies."""
 
+import re
+from pathlib import Path
+
 import pytest
+
+STUDIES = Path(__file__).parents[2] / "studies"
+
+
+@pytest.fixture
+def numbers_of():
+    """`numbers_of(study)` gives the numbers of the tables in a study's README, by the first cell of a row."""
+
+    def numbers_of(study: str) -> dict[str, list[float]]:
+        text = (STUDIES / study / "README.md").read_text(encoding="utf-8")
+        rows = (line.strip("| ").split(" | ", 1) for line in text.splitlines() if line.startswith("| "))
+        return {name: [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", cells)] for name, cells in rows}
+
+    return numbers_of
 
 
 @pytest.fixture

@@ -88,3 +88,15 @@ def test_published_findings_come_from_the_published_table(near):
     kept = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8"))
     again = summary.summarise(summary.KEPT.read(PUBLISHED))
     assert json.loads(json.dumps(again, allow_nan=False)) == near({key: kept[key] for key in again})
+
+
+def test_the_readme_has_the_numbers_of_the_findings(numbers_of):
+    found, rows = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8")), numbers_of("factorial")
+    shown = [name for name in found["cells"] if name in rows]
+    assert len(shown) == 10
+    for name in shown:
+        about = found["cells"][name]
+        values = [100 * value for value in (*about["false_alarms"].values(), about["recall_at_real_rate"], about["gap_closed"])]
+        assert rows[name][:4] == pytest.approx(values[:4], abs=0.051) and rows[name][4] == pytest.approx(values[4], abs=0.51), name
+    for environment, about in found["contrasts"]["no network, real"]["by_environment"].items():
+        assert rows[environment] == pytest.approx([100 * value for value in about["false_alarms"].values()], abs=0.051)

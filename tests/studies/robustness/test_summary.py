@@ -109,3 +109,14 @@ def test_published_findings_come_from_the_published_tables(near):
     kept = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8"))
     again = summary.summarise(summary.KEPT.read(PUBLISHED))
     assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
+
+
+def test_the_readme_has_the_numbers_of_the_findings(numbers_of):
+    found, rows = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8")), numbers_of("robustness")
+    shown = [arm for arm in ARMS if arm in rows]
+    assert len(shown) == 8
+    for arm in shown:
+        about = found["arms"][arm]
+        rates = [about["false_alarms"], *(each["false_alarms"] for each in about["by_environment"].values())]
+        values = [*rates[0].values(), *(rate["mean"] for rate in rates[1:]), about["recall_at_real_rate"]]
+        assert rows[arm] == pytest.approx([*(100 * value for value in values), *about["criterion"].values()], abs=0.051), arm
