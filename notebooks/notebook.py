@@ -35,8 +35,8 @@ from notebooks.lesson_tools import TIMES
 from studies.common.figures import in_seeds
 from studies.few_windows import figures as curve_figures
 from studies.few_windows import findings as curve_findings
-from studies.robustness import figures as robustness_figures
-from studies.robustness import findings
+from studies.robustness import figure as robustness_figures
+from studies.robustness import summary as findings
 from studies.spacecraft import figures as labelled_figures
 from studies.spacecraft import findings as labelled_findings
 from studies.spacecraft import residual as labelled_residual

@@ -4,18 +4,12 @@ The real process has memory (AR(1), 0.7), heavy tails (innovations of Student's 
 differs between windows. A measure that accepts a control cannot detect its error; no control is accepted by all measures.
 """
 
-import dataclasses
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.common.console import SILENT, Progress
-from enhsim_tf.realism.real_floor import RealFloor
+from enhsim_tf.realism.measures import autocorrelation
 from studies.common.noise_processes import AutoregressiveNoise
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Control = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 
@@ -40,7 +34,7 @@ def _gaussian(real: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _autoregression(real: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    fitted = AutoregressiveNoise(**AutoregressiveNoise.estimate(real))
+    fitted = AutoregressiveNoise(float(autocorrelation(real, 1)[1]), float(np.std(real)))
     return np.stack([fitted.draw(real.shape[1], rng) for _ in real])
 
 
@@ -72,29 +66,3 @@ NEGATIVE_CONTROLS: Mapping[str, Control] = {
     "sixteen linear dimensions": _linear_latent,
 }
 """Functions from real windows and a random generator to as many windows with a known error."""
-
-
-def judge_controls(num_windows: int, samples: int, num_resplits: int, seed: int, progress: Progress = SILENT) -> "pd.DataFrame":
-    """Measures all controls, and real windows as the control without an error.
-
-    Args:
-        num_windows: Windows in each sample.
-        samples: Samples of a window.
-        num_resplits: Maximum number of resamples of the real-vs-real baseline.
-        seed: Seed of the process, the controls and the resamples.
-        progress: Tells how many controls are done.
-
-    Returns:
-        One row for each control and measure, with the fields of `realism.Row`, `control` and `num_windows`.
-    """
-    import pandas as pd
-
-    real, again, third = (process(num_windows, samples, np.random.default_rng([seed, part])) for part in range(3))
-    floor = RealFloor(real, again, num_resplits, seed=seed)
-    controls: dict[str, Control] = {"real": lambda windows, rng: windows, **NEGATIVE_CONTROLS}
-    rows, told = [], progress.loop("control", len(controls))
-    for number, (name, make) in enumerate(controls.items()):
-        judged = floor.evaluate(make(third, np.random.default_rng([seed, 3 + number])))
-        rows += [{"control": name, "num_windows": num_windows, **dataclasses.asdict(row)} for row in judged.rows]
-        told(number + 1)
-    return pd.DataFrame(rows)
