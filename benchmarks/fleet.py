@@ -50,8 +50,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 def plan_for(options: argparse.Namespace) -> "Plan":
     """Returns the plan of the data set, which is the same for all rows."""
     from enhsim_tf.coarse_simulator.degraded import Degraded
+    from enhsim_tf.datasets.mix import make_mix
     from enhsim_tf.datasets.plan import make_plan
-    from enhsim_tf.datasets.scenario_file import make_mix
 
     mix = make_mix([Degraded("stuck", 0.5), Degraded("drift", 0.3)], options.nominal_share)
     mix = dataclasses.replace(mix, shard=min(8_192, max(1, options.windows // 8)))
