@@ -79,7 +79,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         default="best",
         metavar="MODEL",
         help=f"noise model: {', '.join(name.replace(' ', '-') for name in NOISES)} (default: best, the simplest one that held-out telemetry does not "
-        "tell from real noise; paper: the GAN of the paper)",
+        "tell from real noise)",
     )
     fit.add_argument(
         "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"
