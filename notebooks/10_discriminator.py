@@ -6,7 +6,6 @@
 # - **After this lesson** you can write the discriminator and one update of it in plain Keras, compute its first two layers by hand, and
 #   name differences between noises that it cannot detect.
 # - **You should know** what a convolution is. The generator is explained in notebook 09.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [discriminator](../docs/glossary.md#generator-and-discriminator),
 #   [adversarial loss](../docs/glossary.md#adversarial-loss), [AUC](../docs/glossary.md#auc).
 #
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
 
 from enhsim_tf.common.plot_style import QUIET, REAL
-from notebooks.lesson_tools import check_answer, say
-from notebooks.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="10")
+experiment = open_experiment()
 claim("C5")
 
 # %% [markdown]

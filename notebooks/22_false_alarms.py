@@ -6,7 +6,6 @@
 # - **After this lesson** you can explain why a perfect simulator without noise gives a useless alarm, read false alarms and recall
 #   together, and repair a threshold with a few real windows.
 # - **You should know** the detector and the threshold of notebook 13, and ridge regression (notebook 04).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [nominal](../docs/glossary.md#nominal), [arm](../docs/glossary.md#arm): one kind of training windows;
 #   [PCA residual](../docs/glossary.md#pca-residual), [conformal threshold](../docs/glossary.md#conformal-threshold),
 #   [false-alarm rate](../docs/glossary.md#false-alarm-rate),
@@ -18,19 +17,21 @@
 
 # %%
 import numpy as np
-
-from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
-from notebooks.lesson_tools import check_answer, say, slider
-from notebooks.notebook import (
+from lesson_tools import (
+    check_answer,
     claim,
     drawing,
     open_experiment,
     open_findings,
+    say,
     show_finding,
+    slider,
     verdict,
 )
 
-experiment = open_experiment(lesson="22")
+from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
+
+experiment = open_experiment()
 is_full = experiment.settings.budget == "full"
 claim("C8")
 
