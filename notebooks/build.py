@@ -91,6 +91,7 @@ def execute(source: Path, budget: str = FULL, solved: bool = False) -> nbformat.
         resources={"metadata": {"path": str(FOLDER)}},
         record_timing=False,
         coalesce_streams=True,
+        extra_arguments=["--IPKernelApp.log_level=ERROR"],
     )
     client.execute(env=os.environ | {BUDGET: budget, STATIC: "1"})
     notebook.metadata["language_info"] = {"name": "python"}  # what the kernel adds differs between machines
