@@ -86,7 +86,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     fit.add_argument("--num-windows", type=int, default=2_500, metavar="N", help="number of training windows (default: 2500)")
     fit.add_argument("--epochs", type=int, default=6, metavar="N", help="training epochs of the enhancer (default: 6)")
-    fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="training iterations of the noise networks (default: 1000)")
     fit.add_argument("--workers", metavar="auto|N", help="channels fitted in parallel, two threads each (default: auto, one per core)")
     fit.add_argument(
         "--engine",

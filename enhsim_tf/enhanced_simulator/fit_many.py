@@ -239,7 +239,7 @@ def fit_job(job: Job) -> list[str]:
 
         cleaning = dataclasses.replace(job.cleaning, min_part=2)
         run = read_recording(job.run.source, job.run.columns, job.run.time, cleaning, parts[0].interval_s if parts[0].has_time else None)
-        simulator, report = fit_run_model(parts, run, job.options, verbose, progress)
+        simulator, report = fit_run_model(parts, run, job.options)
         figure = run_figure(report)
     refuse_foreign(job.folder)  # checked again, because the fit took minutes
     with replace_folder(job.folder) as temporary:

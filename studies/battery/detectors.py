@@ -107,14 +107,17 @@ class Judge:
         arms[REAL_120] = fit.telemetry, more.telemetry
         return {name: arms[name] for name in ARMS if name in arms}
 
-    def convolutional_arm(self, num_iterations: int, verbose: bool = False) -> Arms:
+    def convolutional_arm(self, num_iterations: int) -> Arms:
         """The arm of enhanced windows with noise of the convolutional GAN, which learns the residuals."""
-        from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+        from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
 
-        gan = convolutional_noise_gan(self.residuals, num_iterations, self.seed)
-        gan.fit(self.residuals, num_iterations, verbose=verbose)
+        gan = fit_convolutional_gan(self.residuals, num_iterations, self.seed)
         coarse, _ = coarse_windows(self.recorded, "coarse", 2 * NUM)
-        return {CONVOLUTIONAL: apart(self.enhancer.predict(coarse) + gan.generate(2 * NUM, self.seed), 1 / 2, self.num_coarse)}
+        return {
+            CONVOLUTIONAL: apart(
+                self.enhancer.predict(coarse) + gan.generate(2 * NUM, np.random.default_rng(self.seed)), 1 / 2, self.num_coarse
+            )
+        }
 
     def rows(self, arms: Mapping[str, tuple[np.ndarray, np.ndarray]], names: tuple[str, ...]) -> list[dict[str, Any]]:
         """Trains detectors on each arm and judges them; see `judge`."""

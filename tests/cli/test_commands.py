@@ -309,9 +309,7 @@ def test_the_commands_of_the_readme_can_be_parsed():
 def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     page = (ROOT / "docs" / "own_telemetry.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
-    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
-        "num_windows=1000", "num_windows=20"
-    )
+    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1)").replace("num_windows=1000", "num_windows=20")
     table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 60)
