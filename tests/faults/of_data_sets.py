@@ -64,7 +64,7 @@ def damaged_manifest(bench, name, rng):
 
 
 def damaged_model(bench, name, rng):
-    model = bench.folder / "models" / "volts" / "enhancer.keras"
+    model = bench.folder / "models" / "volts" / "arrays.npz"
     content = model.read_bytes()
     model.write_bytes(content[: rng.integers(len(content))])
     code, _, err = bench.ran(name)
