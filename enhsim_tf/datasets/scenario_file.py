@@ -1,4 +1,4 @@
-"""Reads a scenario file: YAML with the shares of scenarios and models in a large data set, see docs/scenarios.md."""
+"""Reads a scenario file: YAML with the shares of scenarios and models in a large data set, see docs/large_data_sets.md."""
 
 import collections
 import math

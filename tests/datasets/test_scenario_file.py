@@ -12,7 +12,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare, make_mix
 from enhsim_tf.datasets.scenario_file import read_mix
 
-DOCS = Path(__file__).parents[2] / "docs" / "scenarios.md"
+DOCS = Path(__file__).parents[2] / "docs" / "large_data_sets.md"
 GOOD = {
     "windows": 1_000,
     "seed": 7,
