@@ -7,8 +7,9 @@ from pathlib import Path
 from enhsim_tf.common.console import Parser
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.registry import RESIDUAL, option_name
-from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
+from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, FitOptions
 from enhsim_tf.enhanced_simulator.runs.options import NOISES, RUNGS
+from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 from enhsim_tf.telemetry.registry import SOURCES
 
 EXAMPLES = """\
@@ -82,10 +83,18 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "tell from real noise)",
     )
     fit.add_argument(
-        "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"
+        "--held-out",
+        type=float,
+        default=FitOptions.held_out,
+        metavar="SHARE",
+        help="share of the telemetry held out for the report (default: %(default)s)",
     )
-    fit.add_argument("--num-windows", type=int, default=2_500, metavar="N", help="number of training windows (default: 2500)")
-    fit.add_argument("--epochs", type=int, default=6, metavar="N", help="training epochs of the enhancer (default: 6)")
+    fit.add_argument(
+        "--num-windows", type=int, default=FitOptions.num_windows, metavar="N", help="number of training windows (default: %(default)s)"
+    )
+    fit.add_argument(
+        "--epochs", type=int, default=FitOptions.epochs, metavar="N", help="training epochs of the enhancer (default: %(default)s)"
+    )
     fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="training iterations of the noise networks (default: 1000)")
     fit.add_argument("--workers", metavar="auto|N", help="channels fitted in parallel, two threads each (default: auto, one per core)")
     fit.add_argument(
@@ -221,15 +230,25 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
     update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
     update.add_argument(
-        "--epochs", type=int, default=2, metavar="N", help="further epochs of the enhancer; 0 keeps its weights (default: 2)"
+        "--epochs",
+        type=int,
+        default=UpdateOptions.epochs,
+        metavar="N",
+        help="further epochs of the enhancer; 0 keeps its weights (default: %(default)s)",
     )
-    update.add_argument("--num-windows", type=int, default=1_000, metavar="N", help="training windows of these epochs (default: 1000)")
+    update.add_argument(
+        "--num-windows",
+        type=int,
+        default=UpdateOptions.num_windows,
+        metavar="N",
+        help="training windows of these epochs (default: %(default)s)",
+    )
     update.add_argument(
         "--held-out",
         type=float,
-        default=0.2,
+        default=UpdateOptions.held_out,
         metavar="SHARE",
-        help="share of the new telemetry on which the update is judged (default: 0.2)",
+        help="share of the new telemetry on which the update is judged (default: %(default)s)",
     )
     _add_seed(update)
 
