@@ -37,9 +37,8 @@ from studies.few_windows import figures as curve_figures
 from studies.few_windows import findings as curve_findings
 from studies.robustness import figures as robustness_figures
 from studies.robustness import findings
-from studies.spacecraft import figures as labelled_figures
-from studies.spacecraft import findings as labelled_findings
-from studies.spacecraft import residual as labelled_residual
+from studies.spacecraft import figure as labelled_figures
+from studies.spacecraft import summary as labelled_findings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -176,15 +175,6 @@ def open_labelled() -> "tuple[dict, dict[str, pd.DataFrame]]":
         f"{len(found['channels'])} channels with {found['num_sequences']} labelled sequences, kept in studies/."
     )
     return found, labelled_findings.KEPT.read(folder)
-
-
-def open_residual() -> "pd.DataFrame":
-    """The published results of the residual detector on real telemetry: the rows of `spacecraft.residual.summarise`."""
-    import pandas as pd
-
-    return labelled_residual.summarise(
-        pd.read_csv(_STUDIES / "spacecraft" / "results" / labelled_residual.TABLE)
-    )
 
 
 def open_curve() -> "tuple[dict, pd.DataFrame]":

@@ -20,7 +20,7 @@ from notebooks import build
 from notebooks import notebook as teaching
 from studies.few_windows import figures as curve_figures
 from studies.robustness import figures as robustness_figures
-from studies.spacecraft import figures as labelled_figures
+from studies.spacecraft import figure as labelled_figures
 
 ROOT = Path(__file__).parents[2]
 SOURCES = build.sources()
