@@ -1,4 +1,4 @@
-"""What lessons say of answers, and their sliders."""
+"""What lessons share: published results, budgets, answers and sliders."""
 
 import ipywidgets
 import numpy as np
@@ -51,6 +51,23 @@ def test_a_notebook_that_is_executed_to_be_read_holds_pictures_instead(displayed
     drawn = []
     lesson.slider(drawn.append, "width", range(1, 8, 2), shown=(5, 1), unit="samples")
     assert drawn == [5, 1]
-    assert [thing.data for thing in displayed] == [
-        "*Run this cell in Jupyter to change the width with a slider. Stored here: 5, 1 samples.*"
-    ]
+    assert [thing.data for thing in displayed] == ["*In Jupyter, this cell has a slider for the width (samples). Stored here: 5, 1.*"]
+
+
+def test_a_study_is_opened_by_its_name():
+    found, tables = lesson.open_study("robustness")
+    assert found["num_replicates"] == tables["alarms"].groupby(["environment", "seed"]).ngroups
+
+
+def test_an_unknown_study_is_refused(refused):
+    with refused("robustnes", "robustness"):
+        lesson.open_study("robustnes")
+
+
+def test_the_budget_comes_from_the_environment(tmp_path, monkeypatch, refused):
+    monkeypatch.setenv("ENHSIM_TF_CACHE", str(tmp_path))
+    monkeypatch.setenv(lesson.BUDGET, lesson.SMOKE)
+    assert lesson.open_experiment().settings.budget == lesson.SMOKE
+    monkeypatch.setenv(lesson.BUDGET, "endless")
+    with refused("endless", lesson.BUDGET):
+        lesson.open_experiment()
