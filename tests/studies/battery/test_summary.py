@@ -94,3 +94,13 @@ def test_the_published_findings_are_those_of_the_published_tables(near):
     kept = json.loads((PUBLISHED / "findings.json").read_text())
     again = json.loads(json.dumps(summarise(KEPT.read(PUBLISHED))))
     assert again == near({key: kept[key] for key in again}) and kept["budget"] == "full"
+
+
+def test_the_readme_has_the_numbers_of_the_findings(numbers_of):
+    rows, regimes = numbers_of("battery"), json.loads((PUBLISHED / "findings.json").read_text())["regimes"]
+    shown = [use for use in regimes["gentle"]["uses"] if use in rows]
+    assert len(shown) == 8
+    for use in shown:
+        about = [regimes[regime]["uses"][use] for regime in ("gentle", "hard")]
+        values = [value for each in about for value in (*each["recall"].values(), each["false_alarms"]["mean"])]
+        assert rows[use] == pytest.approx([100 * value for value in values], abs=0.051), use
