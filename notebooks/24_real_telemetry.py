@@ -464,8 +464,9 @@ say(
     "Better than all of them: "
     + ", ".join(f"{name} **{area_of[name]:.2f}**" for name in better)
     + f". The residual detector: **{area_of['residual']:.2f}**, with false alarms on {summary['residual'][0]:.1%} of the nominal windows "
-    f"({typical:.1%} in the median channel); the moving deviation has {summary['no simulator: moving deviation'][0]:.1%}. Random scores find "
-    f"{summary['no simulator: random score'][1]:.0%} at 5 %. There are {found['num_sequences']} labelled sequences; with so few, differences "
+    f"({typical:.1%} in the median channel); the moving deviation has {summary['no simulator: moving deviation'][0]:.1%}. "
+    f"Random scores find {summary['no simulator: random score'][1]:.0%} at 5 %. "
+    f"There are {found['num_sequences']} labelled sequences; with so few, differences "
     "of a few hundredths mean nothing."
 )
 assert {"no simulator: largest step", "no simulator: moving deviation"} <= set(better)
