@@ -29,6 +29,7 @@ from enhsim_tf.telemetry.sources import Source, read_source
 _SAME_RATE = 1e-3  # relative difference of two intervals that count as the same
 _TABLES = tuple(ending for ending, reader in FILES.items() if reader.endswith(":read_table_channels"))
 _QUIET = ("constant", "stuck", "quantised", "changing level")
+_NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns")  # findings of columns that are no inputs
 _FEW_ODD = 0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
 
 
@@ -74,6 +75,7 @@ def read_recording(
         for finding in cleaned[each].report.findings
         if finding.kind not in _QUIET and finding.action != "accepted"
     ]
+    notes += [f"{name}: {finding.text}" for finding in cleaned[names[0]].report.findings if finding.kind in _NO_INPUTS]
     notes += [f"{name}: {stepped}"] if stepped else []
     grid_s = own_s if interval_s is None else float(interval_s)
     if not has_time and grid_s != 1.0:

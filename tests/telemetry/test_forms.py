@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.datasets.inject import InjectOptions, inject_channel
+from enhsim_tf.datasets.label_columns import write_table, write_timeeval
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.sources import read_source
 
@@ -87,6 +89,8 @@ READ = {
         ZERO,
     ),
     "NumPy's": ("# time v\n" + "\n".join(f"{second:.6e} {value:.6e}" for second, value in zip(SECONDS, VALUES, strict=True)), ZERO),
+    "NumPy's, with units": ("# t [s]  v\n" + "\n".join(f" {second} {value}" for second, value in zip(SECONDS, VALUES, strict=True)), ZERO),
+    "day of year in UTC": (table("UTC,v", [f"{text[:-3]}Z" for text in stamps("%Y-%jT%H:%M:%S.%f")], VALUES), START),
     "a log cut by a power failure": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES, below="\x00" * 300), START),
     "commas behind each line": (table("time,v,", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES, [""] * N), START),
     "NaN of C": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
@@ -147,6 +151,8 @@ ASKED = {
         0,
     ),
     "a sum at the end": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES, below="Average,20.1\n"), ["'Average' at line 62"], None, 0),
+    "a time of day": (table("time,v", stamps("%H:%M:%S"), VALUES), ["'00:00:00'", "column of dates"], None, 0),
+    "units behind all numbers": (table("time,v", SECONDS, [f"{value} V" for value in VALUES]), [f"v ('{VALUES[0]} V')"], None, 0),
     "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), ["'v' more than once"], None, 0),
     "numbered sensors": (
         table(
@@ -392,6 +398,29 @@ def test_pandas_objects_are_sources():
     frame = pd.DataFrame({"time": TIMES, "v": VALUES})
     check(only(read_source(frame)))
     check(only(read_source(frame.set_index("time")["v"])))
+
+
+@pytest.mark.parametrize("form", ["labelled.csv", "labelled.parquet", "timeeval.csv"])
+def test_the_files_of_this_tool_are_read_back(tmp_path, form):
+    cleaned = clean(pd.Series(VALUES, index=TIMES, name="value"))
+    frame = inject_channel(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0))
+    frame.attrs = {}  # which Parquet would store
+    (write_timeeval if form == "timeeval.csv" else write_table)(tmp_path / form, {"value": frame} if form == "timeeval.csv" else frame)
+    series = only(read_source(tmp_path / form))
+    report = check(series, frame["value"])
+    assert series.name == "value" and report.find("labels").count == 10
+
+
+def test_scores_of_this_tool_are_no_channels(tmp_path):
+    pd.DataFrame({"time": TIMES, "value": VALUES, "score": VALUES / 30, "flag": VALUES > 24}).to_csv(tmp_path / "a.csv", index=False)
+    assert list(read_source(tmp_path / "a.csv")) == ["value"]
+
+
+def test_copies_of_a_run_are_series(tmp_path):
+    long(copy=(0, 1)).rename(columns={"v": "value"}).assign(out_of_range=0.5).to_parquet(tmp_path / "a.parquet")
+    channels = read_source(tmp_path / "a.parquet")
+    assert list(channels) == ["copy 0", "copy 1"]
+    check(channels["copy 1"], VALUES + 9)
 
 
 def test_names_may_be_missing(tmp_path):

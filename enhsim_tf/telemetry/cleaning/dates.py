@@ -13,7 +13,7 @@ from pandas.tseries.api import guess_datetime_format
 ISO = "ISO8601"
 LOOK = 200  # number of cells that are inspected to find a form
 _TIME = r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>\.\d+)?)?)(?P<half> ?[AaPp][Mm])?"
-_END = rf"(?:(?P<gap>[T:]|,? +){_TIME})?(?P<zone> ?[+-]\d\d(?::?\d\d)?)?"
+_END = rf"(?:(?P<gap>[T:]|,? +){_TIME})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
 _DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
 _DAY_MONTH = re.compile(rf"(?P<first>\d\d?)(?P<mark>[./-])(?P<second>\d\d?)(?P=mark)\d{{4}}{_END}")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import is_text
+from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.reading.clock import NO_TIME
@@ -56,11 +56,18 @@ def read_table_channels(
                 raise InputError(f"Expected series of {what}: {said}. Received: {missing!r}. Name one of these.")
             chosen = {name: chosen[name] for name in columns}
     if not chosen:
-        left = f"; left out: {', '.join(name for names in layout.left_out.values() for name in names)}" if layout.left_out else ""
+        left = "; left out: " + ", ".join(_with_cell(table, name) for names in layout.left_out.values() for name in names)
+        left = left if layout.left_out else ""
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
         )
     return {name: _channel(table, layout, name, *place, findings, options) for name, place in chosen.items()}
+
+
+def _with_cell(table: Table, name: str) -> str:
+    """Returns the name of a column with its first cell."""
+    cells = table.frame[name].dropna()
+    return f"{name} ({format_cell(cells.iloc[0])})" if len(cells) else name
 
 
 def _wanted(table: Table, columns: Sequence[str] | None) -> list[str] | None:

@@ -179,6 +179,11 @@ def find_clock(
             )
         return named_clock(frame, clocks[0], what, stated, tuple(name for name in named if name != clocks[0]))
     unread = next((name for name, kind in kinds.items() if tells[name][0] == 2 and kind in ("words", "times of day")), None)
+    if unread is not None and kinds[unread] == "times of day":
+        raise InputError(
+            f"Expected times with a date. Received: {str(frame[unread].dropna().iloc[0])!r} in {unread!r} of {what}. Add a column of dates, or give "
+            "time 'none' (--time none) to count the samples."
+        )
     if unread is not None:
         return Clock((unread,), frame[unread])  # to be refused with its first cell
     if named:

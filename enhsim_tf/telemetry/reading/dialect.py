@@ -179,7 +179,12 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
     comments = [line.lstrip("#").strip() for line in lines[: found.first_line] if line.startswith("#")]
     if not comments:
         return None
-    names = comments[-1].split() if found.separator == BLANKS else [name.strip() for name in comments[-1].split(found.separator)]
+    mark = (
+        (r"\s{2,}|\t" if len(comments[-1].split()) != len(found.names) else BLANKS)
+        if found.separator == BLANKS
+        else re.escape(found.separator)
+    )
+    names = [name.strip() for name in re.split(mark, comments[-1])]
     if len(names) != len(found.names) or not all(names) or all(_SOLID.match(name) for name in names):
         return None
     return dataclasses.replace(found, names=names)
