@@ -105,6 +105,40 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     return paths
 
 
+def refuse_same_file(paths: Iterable[Path], source: str) -> None:
+    """Checks that no output file is the input itself.
+
+    Args:
+        paths: The output files.
+        source: The input, which may be no file at all.
+
+    Raises:
+        InputError: If one is.
+    """
+    for path in paths:
+        if path.exists() and os.path.exists(source) and path.samefile(source):
+            raise InputError(f"Expected --out to differ from the input. Received: {path} for both. Give another --out.")
+
+
+def model_names(series: Iterable[str], models: Iterable[str]) -> dict[str, str]:
+    """Returns the name of the model of each channel. A single channel and a single model match even if their names differ.
+
+    Args:
+        series: Names of the channels.
+        models: Names of the fitted channels.
+
+    Raises:
+        InputError: If a channel has no model.
+    """
+    series, models = list(series), list(models)
+    names = dict(zip(series, models, strict=True)) if len(series) == len(models) == 1 else {name: name for name in series}
+    unknown = [name for name in series if names[name] not in models]
+    if unknown:
+        known = printable(", ".join(models[:8]))
+        raise InputError(f"Expected fitted channels: {known}. Received: {unknown[0]!r}. Select the channels with --column.")
+    return names
+
+
 def events_line(frame: "pd.DataFrame", path: Path) -> str:
     """Says how many events the scores of a channel have, and how many are expected on nominal telemetry.
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, output_paths
+from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, output_paths, refuse_same_file
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -58,7 +58,7 @@ def generate_copies(options: argparse.Namespace) -> int:
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = output_paths(options.out, models, (".parquet",))
-    refuse_same_file(paths, options.coarse)
+    refuse_same_file(paths.values(), options.coarse)
     cleaning = cleaning_options(options, 2)
 
     def write(channel: str) -> None:
@@ -100,7 +100,7 @@ def score_runs(
     from enhsim_tf.telemetry.cleaning.clean import clean
 
     coarse = options.coarse or options.source  # a model of commands reads them from the telemetry itself
-    refuse_same_file(paths, coarse)
+    refuse_same_file(paths.values(), coarse)
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
@@ -146,18 +146,3 @@ def load_run_model(folder: Path):  # noqa: ANN201  its type imports TensorFlow
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
 
     return RunModel.load(folder)
-
-
-def refuse_same_file(paths: Mapping[str, Path], source: str) -> None:
-    """Checks that no output file is the coarse run itself.
-
-    Args:
-        paths: Output file of each channel.
-        source: The value of `--coarse`.
-
-    Raises:
-        InputError: If one is.
-    """
-    for path in paths.values():
-        if path.exists() and Path(source).exists() and path.samefile(source):
-            raise InputError(f"Expected --out to differ from --coarse. Received: {path} for both. Give another --out.")
