@@ -118,13 +118,12 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     return paths
 
 
-def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str], option: str = "the source") -> None:
+def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str]) -> None:
     """Checks that no output file is an input file.
 
     Args:
         paths: Output files.
-        source: The input, one or several files.
-        option: What the input is, for the message.
+        source: The input, one or several files; it may be no file at all.
 
     Raises:
         InputError: If one is.
@@ -132,26 +131,29 @@ def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str], option:
     for path in paths:
         for each in [source] if isinstance(source, str) else source:
             if path.exists() and os.path.exists(each) and path.samefile(each):
-                raise InputError(f"Expected --out to differ from {option}. Received: {path} for both. Give another --out.")
+                raise InputError(f"Expected --out to differ from the input. Received: {path} for both. Give another --out.")
 
 
-def matching_channels(series: "Mapping[str, pd.Series]", models: Mapping[str, Path]) -> "dict[str, pd.Series]":
-    """Returns the channels that have a fitted simulator, and says which others the source has.
+def model_names(series: Iterable[str], models: Iterable[str]) -> dict[str, str]:
+    """Returns the name of the model of each channel that has one, and says which others the source has.
+
+    A single channel and a single model match even if their names differ.
 
     Args:
-        series: Raw channels by name.
-        models: Folder of each simulator by the name of its channel.
+        series: Names of the channels.
+        models: Names of the fitted channels.
 
     Raises:
-        InputError: If none has one.
+        InputError: If no channel has a model.
     """
-    found = {name: each for name, each in series.items() if name in models}
+    series, models = list(series), list(models)
+    if len(series) == len(models) == 1:
+        return {series[0]: models[0]}
+    found = {name: name for name in series if name in models}
     others = [name for name in series if name not in models]
     if not found:
-        known = ", ".join(list(models)[:8])
-        raise InputError(
-            f"Expected fitted channels: {printable(known)}. Received: {', '.join(others[:8])}. Select the channels with --column."
-        )
+        known = printable(", ".join(models[:8]))
+        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(others[:8])}. Select the channels with --column.")
     if others:
         tell(f"columns without a fitted simulator, left out: {printable(', '.join(others[:8]))}")
     return found

@@ -58,7 +58,7 @@ def generate_copies(options: argparse.Namespace) -> int:
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = output_paths(options.out, models, (".parquet",))
-    refuse_same_file(paths.values(), options.coarse, "--coarse")
+    refuse_same_file(paths.values(), options.coarse)
     cleaning = cleaning_options(options, 2)
 
     def write(channel: str) -> None:
@@ -100,7 +100,7 @@ def score_runs(
     from enhsim_tf.telemetry.cleaning.clean import clean
 
     coarse = options.coarse or options.source  # a model of commands reads them from the telemetry itself
-    refuse_same_file(paths.values(), coarse, "--coarse")
+    refuse_same_file(paths.values(), coarse)
     of_run = cleaning.of_run()
 
     def write(channel: str) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, load, matching_channels, output_paths, refuse_same_file
+from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, load, model_names, output_paths, refuse_same_file
 from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import printable
@@ -27,9 +27,8 @@ def run_score(options: argparse.Namespace) -> int:
 
     models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
-    if len(models) == 1 and len(series) == 1:  # a single channel and a single simulator match even if their names differ
-        models = dict(zip(series, models.values(), strict=True))
-    series = matching_channels(series, models)
+    names = model_names(series, models)
+    series, models = {name: series[name] for name in names}, {name: models[model] for name, model in names.items()}
     paths = output_paths(options.out, series, (".parquet", ".csv"))
     refuse_same_file([*paths.values(), *map(events_path, paths.values())], options.source)
 

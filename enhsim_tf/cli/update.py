@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from enhsim_tf.cli.options import cleaning_options, for_each, load, matching_channels
+from enhsim_tf.cli.options import cleaning_options, for_each, load, model_names
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -27,10 +27,8 @@ def run_update(options: argparse.Namespace) -> int:
     from enhsim_tf.telemetry.sources import read_source
 
     series = read_source(options.source, options.column, options.time, cleaning)
-    names = {name: name for name in series}
-    if len(models) == 1 and len(series) == 1:  # a single channel and a single simulator match even if their names differ
-        names = dict(zip(series, models, strict=True))
-    series = matching_channels(series, {name: models[model] for name, model in names.items() if model in models})
+    names = model_names(series, models)
+    series = {name: series[name] for name in names}
     folders = {name: folder_of(out, names[name]) for name in series}
     for name, folder in folders.items():
         refuse_foreign(folder)
