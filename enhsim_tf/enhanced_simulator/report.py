@@ -80,7 +80,10 @@ class ChannelReport:
         return plain | {
             "period_s": self.period_s if np.isfinite(self.period_s) else None,
             "nrmse": nrmse,
-            "noise": [{key: _json_number(value) for key, value in row.items()} for row in self.noise],
+            "noise": [
+                {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
+                for row in self.noise
+            ],
             "ladder": [dict(each) for each in self.ladder],
             "noise_candidates": [dict(each) for each in self.noise_candidates],
             "noise_auc": dict(self.noise_auc),
@@ -209,11 +212,6 @@ class ChannelReport:
         warning = warning_of(self.noise_auc.get("generated"), self.noise_auc.get("real"))
         first, *rest = [*([self.coarse] if self.coarse else []), head]
         return [f"{printable(self.channel)}: {warning}{first}", *(f"{printable(self.channel)}: {line}" for line in rest), *self.verdict]
-
-
-def _json_number(value: Any) -> Any:
-    """Replaces a number that is not finite by None, because JSON has no infinity. Windows without noise have measures of that size."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _counted(number: int, noun: str) -> str:

@@ -88,11 +88,13 @@ def test_an_enhancer_that_diverges_is_trained_again_more_slowly(monkeypatch, fai
 
 
 def broken(which):
-    """A simulator with a NaN in its enhancer or in its noise."""
-    enhancer, noise = build_enhancer(60, 8, seed=0), GaussianNoise(np.nan if which == "noise" else 0.1, 60)
+    """A simulator whose enhancer or noise has a NaN."""
+    noise = GaussianNoise(np.nan if which == "noise" else 0.1, 60)
+    simulator = EnhancedSimulator(SquareWaveSimulator([SquareWave(40)]), build_enhancer(60, 8, seed=0), noise)
     if which == "enhancer":
-        enhancer.set_weights([*enhancer.get_weights()[:-1], enhancer.get_weights()[-1] * np.nan])
-    return EnhancedSimulator(SquareWaveSimulator([SquareWave(40)]), enhancer, noise)
+        *others, last = simulator.enhancer.get_weights()
+        simulator.enhancer.set_weights([*others, last * np.nan])
+    return simulator
 
 
 @pytest.mark.parametrize("which", ["enhancer", "noise"])
