@@ -6,6 +6,7 @@ generated noise and judged on nominal windows with real noise, as in the study o
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,15 +48,15 @@ class Cell:
         self.one = Replicate(settings, stages)
         self.data = self.one.experiment.data
 
-    def tables(self) -> "dict[str, pd.DataFrame]":
-        """The tables of all models and of real windows; each model is a stage of its own, so that an interrupted run goes on."""
+    def tables(self, models: Sequence[str] = (REAL, *MODELS)) -> "dict[str, pd.DataFrame]":
+        """The tables of models, or of real windows; each model is a stage of its own, so that an interrupted run goes on."""
         import pandas as pd
 
         chosen = self.settings
         counts = (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.noise_models)
         depends = (chosen.telemetry, chosen.split, *counts, chosen.seed)
         parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
-        for model in (REAL, *MODELS):
+        for model in models:
             name = "noise model " + model.replace(" ", "_")
             folder = self.stages.run(name, functools.partial(self._make, model), (model, *depends), ("telemetry",))
             for table, found in parts.items():

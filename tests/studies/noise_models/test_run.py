@@ -2,6 +2,8 @@
 
 import json
 
+import pandas as pd
+
 from enhsim_tf.detection.registry import DETECTORS
 from studies.common.settings import make_settings
 from studies.noise_models import cells, run
@@ -13,7 +15,7 @@ def test_every_model_is_tried_and_a_second_run_trains_nothing(tmp_path, monkeypa
     settings = make_settings("smoke", telemetry__window=64, robustness__num_windows=60)
     out, told = tmp_path / "out", []
     out.mkdir()
-    arguments = (settings, tmp_path / "cache", out, ["shot"], False)
+    arguments = (settings, tmp_path / "cache", out, ["shot"], None, False)
     first = run.run(*arguments, told.append)
     tables = KEPT.read(out)
     assert tuple(dict.fromkeys(tables["detectors"]["model"])) == (cells.REAL, *cells.MODELS)
@@ -22,3 +24,7 @@ def test_every_model_is_tried_and_a_second_run_trains_nothing(tmp_path, monkeypa
     told.clear()
     assert run.run(*arguments, told.append) == first
     assert not any(line.endswith(" ...") for line in told)
+    run.run(*arguments[:4], cells.LEARNT, False, told.append)  # its rows replace themselves, and the others are kept
+    for name, table in KEPT.read(out).items():
+        keys = list(table.columns)
+        pd.testing.assert_frame_equal(table.sort_values(keys, ignore_index=True), tables[name].sort_values(keys, ignore_index=True))
