@@ -63,7 +63,7 @@ def generate_copies(options: argparse.Namespace) -> int:
 
     def write(channel: str) -> None:
         model = load_run_model(models[channel])
-        run = _run_of(options.coarse, model, options.coarse_time, cleaning)
+        run = _run_of(options.coarse, model, options, cleaning)
         num_rows = write_copies(paths[channel], model, run, copies, options.seed or 0)
         name = printable(channel)
         for line in (*run.notes, *coverage_lines(model, run)):
@@ -101,11 +101,12 @@ def score_runs(
 
     coarse = options.coarse or options.source  # a model of commands reads them from the telemetry itself
     refuse_same_file(paths.values(), coarse)
+    of_run = cleaning.of_run()
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
         model = load_run_model(models[channel])
-        run = _run_of(coarse, model, options.coarse_time, cleaning)
+        run = _run_of(coarse, model, options, of_run)
         frame = score_run(model, cleaned.parts, run, chosen)
         write_scores(paths[channel], frame)
         name = printable(channel)
@@ -128,14 +129,14 @@ def score_runs(
     return for_each(series, write)
 
 
-def _run_of(source: str, model: "RunModel", time: str | None, cleaning: "Cleaning") -> "Recording":
+def _run_of(source: str, model: "RunModel", options: argparse.Namespace, cleaning: "Cleaning") -> "Recording":
     """Reads the coarse run that a model needs: the commands of the file for a model of commands, otherwise a recorded run."""
     from enhsim_tf.coarse_simulator.recording_files import read_recording
     from enhsim_tf.enhanced_simulator.runs.commands import is_of_commands, recording_of
 
     if is_of_commands(model):
         return recording_of(model, source)
-    return read_recording(source, model.columns, time, cleaning, model.interval_s)
+    return read_recording(source, model.columns, options.coarse_time, cleaning, model.interval_s, options.coarse_start)
 
 
 def load_run_model(folder: Path):  # noqa: ANN201  its type imports TensorFlow

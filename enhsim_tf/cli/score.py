@@ -27,7 +27,8 @@ def run_score(options: argparse.Namespace) -> int:
 
     models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
-    models = {name: models[model] for name, model in model_names(series, models).items()}
+    names = model_names(series, models)
+    series, models = {name: series[name] for name in names}, {name: models[model] for name, model in names.items()}
     paths = output_paths(options.out, series, (".parquet", ".csv"))
     refuse_same_file([*paths.values(), *map(events_path, paths.values())], options.source)
 
@@ -35,7 +36,7 @@ def run_score(options: argparse.Namespace) -> int:
         from enhsim_tf.cli.runs import score_runs
 
         return score_runs(options, series, models, paths, chosen, cleaning)
-    refuse_without_coarse(options, "coarse_time")
+    refuse_without_coarse(options, "coarse_time", "coarse_start")
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)

@@ -22,12 +22,13 @@ def run_update(options: argparse.Namespace) -> int:
     chosen = UpdateOptions(options.epochs, options.num_windows, options.held_out, options.seed)
     models = models_of(options.models)
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
-    cleaning = cleaning_options(options, 2)
+    cleaning = cleaning_options(options, 2, "missing")
     from enhsim_tf.telemetry.cleaning.clean import clean
     from enhsim_tf.telemetry.sources import read_source
 
     series = read_source(options.source, options.column, options.time, cleaning)
     names = model_names(series, models)
+    series = {name: series[name] for name in names}
     folders = {name: folder_of(out, names[name]) for name in series}
     for name, folder in folders.items():
         refuse_foreign(folder)
