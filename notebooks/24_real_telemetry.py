@@ -401,7 +401,7 @@ if is_full:
 # ## A real spacecraft
 #
 # The study used six channels of NASA's SMAP satellite, published with the anomalies that its operators labelled
-# ([docs/spacecraft.md](../docs/spacecraft.md)). Nothing is computed here; what was found is kept. First: is the enhanced signal nearer to
+# ([study](../studies/spacecraft/README.md)). Nothing is computed here; what was found is kept. First: is the enhanced signal nearer to
 # the telemetry than the square wave? All are aligned with each window, as above.
 #
 # ![Median error of the coarse, ridge and enhanced signal on each channel](../studies/spacecraft/results/errors.png)

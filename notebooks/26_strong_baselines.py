@@ -476,10 +476,10 @@ assert verdicts["random fifths"] and not verdicts["blocks of time"]
 # %% [markdown]
 # ## What published runs say
 #
-# Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([docs/battery.md](../docs/battery.md)): near
+# Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([study](../studies/battery/README.md)): near
 # 1 C and at 15 °C it is *gentle*; in the *hard* regime, at −5 °C, it is discharged deeply, and the map is less linear. The *factorial
 # experiment* combines windows, extraction, enhancer and generator in all ways and measures false alarms
-# ([docs/what_holds.md](../docs/what_holds.md)).
+# ([report](../docs/report.md)).
 
 # %%
 battery, _ = open_study("battery")

@@ -13,7 +13,7 @@
 # **What the paper says** (section 1): the enhanced simulator should "perform similarly to much more sophisticated simulators". The
 # paper's example has a square wave as its simulator. Here the pair is real: a satellite's battery over low orbits, with a coarse
 # single-particle model as the simulator and a Doyle-Fuller-Newman model with sensor noise in the place of the vehicle
-# ([docs/battery.md](../docs/battery.md)).
+# ([battery study](../studies/battery/README.md)).
 
 # %%
 import numpy as np

@@ -9,7 +9,7 @@ from typing import Any
 from enhsim_tf.common.console import Parser, run_command, tell
 from enhsim_tf.common.errors import InputError
 
-PUBLISHED = Path("studies")
+PUBLISHED = Path(__file__).resolve().parents[1]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,12 +73,9 @@ class Command:
         options = parser.parse_args(arguments)
         if options.seeds is not None and options.seeds < 1:
             raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
-        if (
-            options.budget == "smoke"
-            and options.out is not None
-            and options.out.resolve() == (PUBLISHED / self.study / "results").resolve()
-        ):
-            raise InputError(f"Expected another --out for a smoke run: {options.out} holds full budget. Received: --out {options.out}.")
+        out = options.out
+        if options.budget == "smoke" and out is not None and out.resolve() == PUBLISHED / self.study / "results":
+            raise InputError(f"Expected another folder for a smoke run than that of the published tables. Received: --out {out}.")
         return options
 
     def _run(self, options: argparse.Namespace) -> int:

@@ -11,29 +11,19 @@ from enhsim_tf.common.figure import Figure, save
 def save_all(
     figures: Mapping[str, Figure], found: Mapping[str, Any], folder: str | os.PathLike, command: str, names: Sequence[str] = ()
 ) -> list[Path]:
-    """Draws the figures of an experiment from its findings and writes them, as `save` does.
+    """Draws the figures of a study from its findings and writes them, as `save` does.
 
     Args:
-        figures: The experiment's figures by name.
+        figures: The study's figures by name.
         found: Its findings.
         folder: An existing folder.
-        command: The command of the experiment, for the captions.
+        command: The command of the study, which is the caption.
         names: Names of the figures; empty for all.
 
     Returns:
         The paths of the files.
     """
-    caption = experiment_caption(found, command)
-    return [path for name in names or figures for path in save(name, found, folder, caption, found["budget"] == "smoke", figures=figures)]
-
-
-def experiment_caption(found: Mapping[str, Any], command: str) -> str:
-    """The caption line of the figures of an experiment: its `seeds`, its `budget` and its command."""
-    seeds = found["seeds"]
-    is_gapless = seeds[-1] - seeds[0] == len(seeds) - 1
-    several = f"{seeds[0]} to {seeds[-1]}" if is_gapless else ", ".join(map(str, seeds))
-    ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {several}"
-    return f"{ran} · {found['budget']} budget · {command}"
+    return [path for name in names or figures for path in save(name, found, folder, command, found["budget"] == "smoke", figures=figures)]
 
 
 def in_seeds(seeds: Sequence[int]) -> str:

@@ -48,14 +48,8 @@ class RobustnessSettings:
         f"{OUR_CHOICE}: anomalous windows of each kind and severity, the same places for all kinds, severities and arms",
         smoke=6,
     )
-    num_anomalous_varied: int = setting(
-        30, "windows", f"{OUR_CHOICE}: anomalous windows where the noise scale and the share of real windows are varied", smoke=3
-    )
     num_resplits: int = setting(
         40, "re-splits", f"{OUR_CHOICE}: maximum number of resamples for the real-vs-real baseline; fewer for expensive measures", smoke=5
-    )
-    num_trace_samples: int = setting(
-        20_000, "samples", f"{OUR_CHOICE}: length of the continuous trace, which has two anomalies of each kind", smoke=8_000
     )
     false_alarm_rate: float = setting(
         0.01, "share", f"{OUR_CHOICE}: target rate of each threshold, on held-out windows of the training arm"

@@ -1,1 +1,1 @@
-"""The factorial experiment: which part of the pipeline (windows, extraction, enhancer or generator) lowers false alarms."""
+"""Study: which part of the pipeline (windows, extraction, enhancer or generator) lowers false alarms."""

@@ -1,1 +1,1 @@
-"""The experiment on robustness: detectors trained on every kind of noise, over seeds and environments."""
+"""Study: detectors trained on every kind of training data, over seeds and kinds of noise."""

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -162,12 +163,10 @@ def test_of_two_runs_at_once_the_first_keeps_its_place(work):
     assert [path.name for path in work.cache.iterdir()] == [folder.name]
 
 
-def test_what_a_killed_run_left_is_cleared_away_by_the_next(work, monkeypatch):
+def test_what_a_killed_run_left_is_cleared_away_by_the_next(work):
     folder, _ = work.run()
-    monkeypatch.setattr(os, "getpid", lambda: 2**22 + 1)  # above the largest number of a process
     with replace_folder(folder.with_name("killed")) as temporary:
         shutil.copytree(temporary, half := temporary.with_name(temporary.name.replace("killed", "work")))
-    monkeypatch.undo()
     assert half.is_dir()
     Stages(work.cache, tell=lambda line: None)
     assert not half.exists() and folder.is_dir()
@@ -175,7 +174,7 @@ def test_what_a_killed_run_left_is_cleared_away_by_the_next(work, monkeypatch):
 
 def test_times_and_lines_tell_what_was_done(work, monkeypatch):
     clock = iter([10.0, 12.5])
-    monkeypatch.setattr(stages.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(stages, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
     told = []
     for _ in range(2):
         done = Stages(work.cache, tell=told.append)

@@ -24,7 +24,7 @@ from enhsim_tf.reproduce.report import write_page
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
-from tests.fuzzing.of_folders import write_model
+from tests.hostile.folders import write_model
 
 NAMES = (
     "..", ".", "../../up", "/etc/passwd", "..\\..\\up", "C:\\up", "a/b", ".hidden", "CON", "nul", "com1", "LPT9", "Aux ", "trailing.", " lead",

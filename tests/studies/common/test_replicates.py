@@ -1,12 +1,10 @@
-"""Tests of the frame that experiments share."""
+"""The frame that studies share."""
 
 import json
 
 import pandas as pd
 import pytest
 
-from enhsim_tf.common.errors import InputError
-from studies.common.figures import experiment_caption
 from studies.common.replicates import collect, seed_by_seed, write_results
 from studies.common.tables import KeptTables
 
@@ -32,7 +30,7 @@ def test_all_names_with_one_seed_come_before_the_next_seed():
 
 
 def test_findings_are_computed_from_the_written_tables_and_name_the_versions(tmp_path):
-    kept = KeptTables(names=("rows",), labels=(), digits=1, kind="experiment", command="x")
+    kept = KeptTables(names=("rows",), labels=(), digits=1, kind="study", command="x")
     tables = {"rows": pd.DataFrame({"value": [0.123]})}
 
     def summarise(read):
@@ -42,27 +40,3 @@ def test_findings_are_computed_from_the_written_tables_and_name_the_versions(tmp
     assert found["value"] == pytest.approx(0.1)  # rounded as it is stored
     assert found["budget"] == "smoke" and found["versions"]["other"] == "1" and "tensorflow" in found["versions"]
     assert json.loads((tmp_path / "findings.json").read_text()) == found
-
-
-def test_a_new_run_keeps_the_rows_of_earlier_seeds(tmp_path):
-    kept = KeptTables(names=("rows", "others"), labels=("name",), digits=2, kind="experiment", command="x")
-
-    def run(seeds, value):
-        rows = pd.DataFrame({"name": "a", "seed": seeds, "value": value})
-        kept.write(kept.with_earlier_seeds({"rows": rows, "others": rows}, tmp_path, min(seeds)), tmp_path)
-        return [list(zip(table["name"], table["seed"], table["value"].round(2), strict=True)) for table in kept.read(tmp_path).values()]
-
-    first = [("a", 1, pytest.approx(0.1)), ("a", 2, pytest.approx(0.1))]
-    assert run([1, 2], 0.1) == [first, first]
-    again = [first[0], ("a", 2, pytest.approx(0.2)), ("a", 3, pytest.approx(0.2))]
-    assert run([2, 3], 0.2) == run([2, 3], 0.2) == [again, again]
-    (tmp_path / "others.parquet").unlink()
-    with pytest.raises(InputError, match="no others.parquet"):
-        run([3], 0.3)
-
-
-def test_a_caption_names_each_seed_where_one_is_missing():
-    found = {"seeds": [3, 4, 5], "budget": "full"}
-    assert experiment_caption(found, "run") == "seeds 3 to 5 · full budget · run"
-    assert experiment_caption(found | {"seeds": [3, 5]}, "run") == "seeds 3, 5 · full budget · run"
-    assert experiment_caption(found | {"seeds": [3]}, "run") == "seed 3 · full budget · run"

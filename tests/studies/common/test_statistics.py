@@ -9,12 +9,10 @@ import scipy.stats
 
 from studies.common.statistics import (
     crossed_interval,
-    declared_contrasts,
-    detector_averaged_log_odds,
     hierarchical_interval,
     holm,
-    log_odds,
-    rank_correlation,
+    mean_interval,
+    t_interval,
     wilcoxon_signed_rank,
 )
 
@@ -33,18 +31,6 @@ def nested(sizes, sds, seed=0, mean=0.0):
 
 def half_width(interval):
     return (interval.high - interval.low) / 2
-
-
-def test_log_odds_by_hand():
-    assert log_odds(0, 9) == pytest.approx(np.log(0.5 / 9.5))
-    np.testing.assert_allclose(log_odds([5, 10], 10), [0, np.log(21)])
-    assert log_odds(3, 20) == pytest.approx(-log_odds(17, 20))
-
-
-def test_log_odds_refuses_what_is_no_rate(refused):
-    for alarms, trials in ((3, 2), (-1, 2), (0, 0), (np.nan, 3)):
-        with refused("alarms", "trials"):
-            log_odds(alarms, trials)
 
 
 def test_the_interval_of_nested_data_has_the_width_that_the_bootstrap_has_in_closed_form():
@@ -236,101 +222,15 @@ def test_signed_ranks_refuse_what_is_missing(refused):
             wilcoxon_signed_rank(differences)
 
 
-def alarms(effects, num_seeds=10, num_blocks=4, trials=2_000, seed=0, detectors=("pca", "forest")):
-    """Alarms of arms whose log-odds differ by known effects, over environments and seeds that have effects of their own."""
-    rng = np.random.default_rng(seed)
-    rows = []
-    for environment, number in itertools.product(("white", "shot"), range(num_seeds)):
-        common = -1.0 + rng.normal(0, 0.5)
-        for (arm, effect), (place, detector) in itertools.product(effects.items(), enumerate(detectors)):
-            odds = common + effect + rng.normal(0, 0.05) + place
-            found = rng.binomial(trials, 1 / (1 + np.exp(-odds)), num_blocks)
-            rows += [(environment, number, arm, detector, block, count, trials) for block, count in enumerate(found)]
-    return pd.DataFrame(rows, columns=["environment", "seed", "arm", "detector", "block", "alarms", "trials"])
+def test_the_interval_of_a_mean_over_the_levels_of_its_index():
+    index = pd.MultiIndex.from_product([["white", "shot"], [1, 2]], names=["environment", "seed"])
+    values = pd.Series([1.0, 3.0, 1.0, 3.0], index)
+    assert mean_interval(values) == {"mean": 2.0, "low": 1.0, "high": 3.0}
+    assert mean_interval(values, ["environment"]) == {"mean": 2.0, "low": 1.0, "high": 3.0}  # the seeds are rows of its cells
 
 
-def test_detector_averages_by_hand():
-    rows = [("a2", "pca", 0, 4), ("a2", "pca", 3, 6), ("a2", "forest", 1, 2), ("a4", "pca", 9, 10), ("a4", "forest", 0, 10)]
-    table = pd.DataFrame(rows, columns=["arm", "detector", "alarms", "trials"]).assign(environment="white", seed=0)
-    averaged = detector_averaged_log_odds(table)
-    assert averaged.loc[("white", 0), "a2"] == pytest.approx((np.log(3.5 / 7.5) + 0) / 2)
-    assert averaged.loc[("white", 0), "a4"] == pytest.approx((np.log(9.5 / 1.5) + np.log(0.5 / 10.5)) / 2)
-
-
-def test_declared_contrasts_find_the_effects_that_are_there():
-    effects = {"a1": 1.5, "a2": 0.0, "a4": 0.3, "a5": 0.0}
-    contrasts = [("a2", "a1"), ("a2", "a4"), ("a2", "a5")]
-    table = alarms(effects)
-    results = declared_contrasts(table.sample(frac=1, random_state=0), contrasts, seed=1)
-    averaged = detector_averaged_log_odds(table)
-    for (first, second), result in zip(contrasts, results, strict=True):
-        differences = averaged[first] - averaged[second]
-        assert (result.first, result.second, result.num_replicates, result.num_clusters) == (first, second, 20, 10)
-        assert result.mean.estimate == pytest.approx(differences.mean()) and result.median.estimate == pytest.approx(differences.median())
-        by_seed = differences.unstack("environment").mean(axis=1)
-        assert result.p_value == pytest.approx(scipy.stats.wilcoxon(by_seed, method="exact").pvalue)
-        assert result.pooled_p_value == pytest.approx(scipy.stats.wilcoxon(differences, method="exact").pvalue)
-        assert result.parts == pytest.approx({name: differences.loc[name].mean() for name in ("shot", "white")})
-        # a difference has sd sqrt(0.05^2 + 1 / (8,000 p q)) < 0.07 over two detectors, as p q > 0.07
-        assert result.mean.estimate == pytest.approx(effects[first] - effects[second], abs=4 * 0.07 / np.sqrt(20))
-        assert result.mean.low <= result.mean.estimate <= result.mean.high and result.mean.high - result.mean.low < 0.1
-    np.testing.assert_allclose([result.adjusted_p_value for result in results], holm([result.p_value for result in results]))
-    assert [result.adjusted_p_value < 0.05 for result in results] == [True, True, False]
-    assert results[0].mean.high < 0 and results[1].median.high < 0
-
-
-def test_effects_of_one_seed_count_as_one_observation():
-    """Ten seeds by four environments that only repeat them: as sure as ten, where the pooled test takes them for forty."""
-    once = alarms({"a1": 0.1, "a2": 0.0}).query("environment == 'white'")
-    (single,) = declared_contrasts(once, [("a1", "a2")])
-    (repeated,) = declared_contrasts(pd.concat([once.assign(environment=name) for name in "abcd"]), [("a1", "a2")])
-    assert repeated.p_value == single.p_value and repeated.pooled_p_value < single.pooled_p_value == single.p_value
-    assert half_width(repeated.mean) == pytest.approx(half_width(single.mean), rel=0.05)
-    assert repeated.parts == pytest.approx(dict.fromkeys("abcd", single.mean.estimate))
-
-
-def test_contrasts_refuse_replicates_that_are_not_paired(refused):
-    table = alarms({"a1": 1.0, "a2": 0.0}, num_seeds=3)
-    with refused("a9"):
-        declared_contrasts(table, [("a1", "a9")])
-    with refused("a1, a2"):
-        declared_contrasts(table, [])
-    with refused("23 of 24"):
-        declared_contrasts(
-            table[~((table.seed == 1) & (table.arm == "a2") & (table.detector == "pca") & (table.environment == "shot"))], []
-        )
-    with refused("12 of 24"):  # each arm with a detector of its own
-        declared_contrasts(table[(table.arm == "a1") == (table.detector == "pca")], [("a1", "a2")])
-    with refused("'trials'"):
-        declared_contrasts(table.drop(columns="trials"), [("a1", "a2")])
-
-
-def test_rank_correlation_as_scipy_has_it():
-    rng = np.random.default_rng(0)
-    x = rng.standard_normal(60)
-    y = np.round(x + rng.standard_normal(60), 1)  # with ties
-    result = rank_correlation(x, y, num_resamples=500)
-    assert result.estimate == pytest.approx(scipy.stats.spearmanr(x, y)[0])
-    assert result.low < result.estimate < result.high
-    # Fieller's standard error of the transformed coefficient, 1.06 / (n - 3)
-    error = np.sqrt(1.06 / 57) * (1 - result.estimate**2)
-    assert half_width(result) == pytest.approx(1.96 * error, rel=0.25)
-    assert rank_correlation(x, np.exp(x), num_resamples=50).low == pytest.approx(1)
-    assert rank_correlation(x, -x, num_resamples=50).high == pytest.approx(-1)
-
-
-def test_rank_correlation_over_clusters_is_as_sure_as_there_are_clusters():
-    rng = np.random.default_rng(1)
-    x, y = rng.standard_normal((2, 30)) + 0.8 * rng.standard_normal(30)
-    once = rank_correlation(x, y, num_resamples=500)
-    copied = rank_correlation(np.repeat(x, 20), np.repeat(y, 20), np.repeat(np.arange(30), 20), num_resamples=500)
-    assert copied.estimate == pytest.approx(once.estimate)
-    assert half_width(copied) == pytest.approx(half_width(once), rel=0.15)
-    unaware = rank_correlation(np.repeat(x, 20), np.repeat(y, 20), num_resamples=200)
-    assert half_width(unaware) < half_width(once) / 3
-
-
-def test_rank_correlation_refuses_what_has_no_order(refused):
-    for x, y in (([1.0, 1.0, 1.0], [1.0, 2.0, 3.0]), ([1.0, 2.0], [1.0, 2.0, 3.0]), ([1.0, np.nan], [1.0, 2.0]), ([], [])):
-        with refused("shapes"):
-            rank_correlation(np.array(x), np.array(y))
+def test_students_interval_as_scipy_has_it():
+    values = pd.Series([0.1, 0.4, -0.2, 0.3, 0.9])
+    low, high = scipy.stats.ttest_1samp(values, 0).confidence_interval(0.95)
+    assert t_interval(values) == pytest.approx({"mean": 0.3, "low": low, "high": high})
+    assert t_interval(values[:1]) == {"mean": 0.1, "low": None, "high": None}
