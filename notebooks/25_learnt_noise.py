@@ -201,7 +201,8 @@ def spread_of(mixture):
 
 
 later = noises["bursts"][1]
-chosen = later[np.argsort(later.std(axis=1))[int(0.8 * number)]]  # louder than four of five windows
+inner = np.abs(later[:, 340:380]).mean(axis=1) - np.abs(later[:, 420:]).mean(axis=1)
+chosen = later[np.argmax(inner)]  # a window with a burst after its middle
 past = np.lib.stride_tricks.sliding_window_view(chosen, PAST)[:-1]
 spread = spread_of(networks["bursts"].predict(inputs_of(past), verbose=0))
 alt = "A window of noise in bursts with the standard deviation that the network predicts before each sample"
@@ -210,10 +211,10 @@ with drawing(alt, height=2.0, title="The network expects larger samples while a 
     panel.plot(np.arange(PAST, window), spread, color=GENERATED, label="predicted standard deviation")
     panel.plot(np.arange(PAST, window), -spread, color=GENERATED)
     panel.set(xlabel="sample", ylabel="standard deviations")
-    panel.legend(frameon=False, loc="upper right", ncols=2)
+    panel.legend(frameon=False, loc="lower left", ncols=2)
 
 # %% [markdown]
-# *What to see:* the blue band opens after the first loud samples of a burst and closes after the last. When a burst begins, no model can
+# *What to see:* the orange lines open after the first loud samples of a burst and close after the last. When a burst begins, no model can
 # know; that it goes on, this one has learnt.
 
 # %%
