@@ -21,6 +21,7 @@ from lesson_tools import check_answer, drawing, open_experiment, open_study
 from enhsim_tf.common.plot_style import AVERAGE, GENERATED, QUIET, REAL
 from enhsim_tf.realism import measures, two_sample
 from studies.common.noise_gallery import GALLERY
+from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
 is_full = open_experiment().settings.budget == "full"  # nothing else of the paper's example is used here
 number, window = 1_000 if is_full else 60, 500
@@ -132,13 +133,11 @@ def negative_log_likelihood(samples, mixture):
 
 
 # %% [markdown]
-# The same number from SciPy's normal density, and from the network that the study of noise models uses:
+# SciPy's normal density must give the same number:
 
 # %%
 from scipy.special import softmax
 from scipy.stats import norm
-
-from studies.noise_models.networks import mixture_density
 
 rng = np.random.default_rng(1)
 samples, mixture = (
@@ -147,8 +146,9 @@ samples, mixture = (
 )
 shares, means, log_scales = np.split(mixture, 3, axis=1)
 density = np.sum(softmax(shares, axis=1) * norm.pdf(samples, means, np.exp(log_scales)), axis=1)
-for loss in (negative_log_likelihood, mixture_density.negative_log_likelihood):
-    np.testing.assert_allclose(float(loss(samples, mixture)), -np.mean(np.log(density)), rtol=1e-5)
+np.testing.assert_allclose(
+    float(negative_log_likelihood(samples, mixture)), -np.mean(np.log(density)), rtol=1e-5
+)
 
 # %% [markdown]
 # Training makes this number small, with Adam and nothing else: no second network, no balance, and a loss that says how good the model is.
@@ -245,8 +245,9 @@ def generate(network, first_past, rng):
 
 
 # %% [markdown]
-# The study's network, `MixtureDensityNoise`, does a few things more: its linear part is fitted in closed form, the weights of the best
-# step on held-out noise are kept, and the noise may depend on the signal below it. Both networks, the autoregression and the plain normal
+# The project's study of noise models has such a network, `MixtureDensityNoise`, which does a few things more: two of its components have
+# heavy tails, its linear part is fitted in closed form, the weights of the best step on held-out noise are kept, and the noise may depend
+# on the signal below it. Both networks, the autoregression and the plain normal
 # distribution learn from the same windows. *Residual windows* learns nothing: it draws the windows to learn from again. The judge is a
 # classifier that is trained to tell generated windows from later real ones.
 
@@ -254,7 +255,7 @@ def generate(network, first_past, rng):
 made = {}
 for kind, (learnt, _) in noises.items():
     rng = np.random.default_rng(11)
-    study = mixture_density.MixtureDensityNoise(seed=0, num_steps=600 if is_full else 20).fit(learnt)
+    study = MixtureDensityNoise(seed=0, num_steps=600 if is_full else 20).fit(learnt)
     made[kind] = {
         "later real windows (floor)": learnt,
         "normal distribution": learnt.std() * rng.standard_normal(learnt.shape),
