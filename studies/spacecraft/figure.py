@@ -7,7 +7,7 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.figure import Figure
-from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, SINGLE, new_sheet, panels
+from enhsim_tf.common.plot_style import AVERAGE, COARSE, DOUBLE, ENHANCED, GENERATED, QUIET, REAL, SINGLE, new_sheet, panels
 
 Findings = Mapping[str, Any]
 GROUPS = {"references": (ENHANCED, "s"), "controls": (QUIET, "D"), "sources": (GENERATED, "o")}
@@ -22,7 +22,7 @@ def reference_or_source(found: Findings) -> matplotlib.figure.Figure:
         1.5 + 0.19 * len(names),
         "Detectors on real spacecraft channels: simulator as reference and as source",
         "Mean and 95 % interval over channels and training seeds. Squares: residual of the aligned simulator. Diamonds: no simulator. "
-        "Circles: mean of seven detectors, by their training data.",
+        "Circles: mean of seven detectors, by their training data (black: real telemetry).",
     )
     grid = panels(figure, down + 0.1, 1, 2, sharey=True)
     left, width = 1.95 / DOUBLE, (1 - 2.1 / DOUBLE) / 2
@@ -32,6 +32,7 @@ def reference_or_source(found: Findings) -> matplotlib.figure.Figure:
         axes.set_position([left + number * width, place.y0, width - 0.03, place.height])
         for height, (group, name) in enumerate(names):
             colour, mark = GROUPS[group]
+            colour = REAL if name == "real" else colour
             each = {end: unit * value for end, value in found[group][name][key].items()}
             axes.plot([each["low"], each["high"]], [-height] * 2, color=colour, linewidth=2.2, alpha=0.45)
             axes.plot(each["mean"], -height, mark, color=colour, markersize=4.5)

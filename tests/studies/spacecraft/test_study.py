@@ -46,7 +46,7 @@ def data(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def results(data, tmp_path_factory):
+def results(data, narrow_enhancer, tmp_path_factory):
     """Tables and findings of a smoke run, with the detectors whose training is quick and noise that diverges."""
 
     def diverge(*_):
@@ -114,6 +114,17 @@ def test_the_published_findings_are_those_of_the_published_tables(near):
     kept = json.loads((PUBLISHED / "findings.json").read_text())
     again = json.loads(json.dumps(summarise(KEPT.read(PUBLISHED))))
     assert again == near({key: kept[key] for key in again}) and kept["budget"] == "full"
+
+
+def test_the_readme_has_the_numbers_of_the_findings(numbers_of):
+    rows, found = numbers_of("spacecraft"), json.loads((PUBLISHED / "findings.json").read_text())
+    results = found["references"] | found["controls"] | found["sources"]
+    shown = [name for name in results if name in rows]
+    assert len(shown) == 11
+    for name in shown:
+        about = results[name]
+        values = [about["auc_pr"]["mean"], 100 * about["false_alarms"]["mean"], 100 * about["found"]["0.01"]]
+        assert rows[name][:1] == pytest.approx(values[:1], abs=0.0051) and rows[name][1:] == pytest.approx(values[1:], abs=0.51), name
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,19 @@
 """Classifiers that learn simulated faults, which only a simulator can provide, judged on the faults of the fine simulator."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from enhsim_tf.realism.window_features import window_features
-from studies.battery.detectors import COARSE, NUM, RESAMPLED, Judge, apart, judge
-from studies.battery.errors import fault_windows
+from studies.battery.detectors import COARSE, ENHANCED_RUN, NUM, WITH_RESIDUALS, Judge, Rows, alarm_rows, apart
 from studies.battery.faults import ALL
 from studies.battery.orbits import Regime, draw_load
 from studies.battery.simulate import simulate_all
-from studies.battery.windows import coarse_windows, cut_windows_of_columns, window_starts
+from studies.battery.windows import coarse_windows, cut_columns, window_starts
 
 CLASSIFIERS = ("logistic regression", "boosted trees")
-DIFFERENCE = "residual of the enhanced run, faults in training"
-"""The arm whose windows are differences from the run of the planned orbits."""
+FAULTS = ", simulated faults"
+"""Ending of the names of training data with simulated faults."""
 _STREAM = 200  # of the seed, for the loads
 
 Score = Callable[[np.ndarray], np.ndarray]
@@ -41,52 +39,48 @@ def simulate_faults(num_orbits: int, regime: Regime, seed: int) -> tuple[np.ndar
         load = draw_load(num_orbits + 1, regime, np.random.default_rng([seed, _STREAM, number]))
         nominal, broken = (runs[0].values for runs in simulate_all(load, regime, [None, fault], ["coarse"]))
         starts = window_starts(len(broken), NUM // len(ALL))
-        faulty.append(cut_windows_of_columns(broken, starts))
-        planned.append(cut_windows_of_columns(nominal, starts))
+        faulty.append(cut_columns(broken, starts))
+        planned.append(cut_columns(nominal, starts))
     return np.concatenate(faulty), np.concatenate(planned)
 
 
-def labelled_rows(trained: Judge, faults: tuple[np.ndarray, np.ndarray]) -> list[dict[str, Any]]:
+def classifier_rows(judge: Judge, faults: tuple[np.ndarray, np.ndarray]) -> Rows:
     """Judges classifiers that learn nominal windows and windows of simulated faults.
 
-    They learn three kinds of windows: of the coarse simulator, enhanced with residuals drawn again, and the difference of the
-    latter from the enhanced run of the planned orbits.
+    They learn three kinds of windows: of the coarse simulator, enhanced with residual windows, and the difference of the latter
+    from the enhanced run of the planned orbits.
 
     Args:
-        trained: The enhancer and the windows of a replicate.
+        judge: The enhancer and the windows of a replicate.
         faults: What `simulate_faults` returns.
 
     Returns:
-        Rows as `detectors.judge` returns them.
+        Rows as `detectors.alarm_rows` returns them.
     """
-    nominal, _ = coarse_windows(trained.recorded, "coarse", 2 * NUM)
+    nominal = coarse_windows(judge.recorded, "coarse", 2 * NUM)
     faulty, planned = faults
-    enhance = trained.enhancer.predict
-    noise = trained.noise(len(nominal) + len(faulty), 3)
-    noises = noise[: len(nominal)], noise[len(nominal) :]
+    noise = judge.noise(len(nominal) + len(faulty), 3)
+    of_nominal, of_faulty = noise[: len(nominal)], noise[len(nominal) :]
+    windows = {fault: pairs.telemetry for fault, pairs in judge.test.items()}
+    enhanced = judge.enhance(faulty) + of_faulty
     kinds = {
-        f"{COARSE}, faults in training": (nominal[:, :, 0], faulty[:, :, 0]),
-        f"{RESAMPLED}, faults in training": (enhance(nominal) + noises[0], enhance(faulty) + noises[1]),
-        DIFFERENCE: (noises[0], enhance(faulty) + noises[1] - enhance(planned)),
+        COARSE: (nominal[:, :, 0], faulty[:, :, 0], windows),
+        WITH_RESIDUALS: (judge.enhance(nominal) + of_nominal, enhanced, windows),
+        ENHANCED_RUN: (of_nominal, enhanced - judge.enhance(planned), judge.differences()),
     }
-    windows = {fault: pairs.telemetry for fault, pairs in trained.test.items()}
-    differences = {}
-    for fault in windows:
-        pairs = fault_windows(trained.recorded, fault, trained.seed, is_planned=True)
-        differences[fault] = pairs.telemetry - enhance(pairs.coarse)
     rows = []
-    for arm, (normal, broken) in kinds.items():
-        training, held_out = apart(normal, 1 / 2, trained.num_coarse)
-        labels = np.repeat([0, 1], [len(training), len(broken)])
+    for training, (normal, broken, judged) in kinds.items():
+        learnt, held_out = apart(normal, 1 / 2, judge.num_coarse)
+        labels = np.repeat([0, 1], [len(learnt), len(broken)])
         for name in CLASSIFIERS:
-            score = _classifier(name, np.concatenate([training, broken]), labels, trained.seed)
-            scores = {fault: score(each) for fault, each in (differences if arm == DIFFERENCE else windows).items()}
-            rows += judge(arm, name, score(held_out), scores, trained.num_stretches)
+            score = _classifier(name, np.concatenate([learnt, broken]), labels, judge.seed)
+            scores = {fault: score(each) for fault, each in judged.items()}
+            rows += alarm_rows(training + FAULTS, name, score(held_out), scores, judge.num_stretches)
     return rows
 
 
 def _classifier(name: str, windows: np.ndarray, labels: np.ndarray, seed: int) -> Score:
-    """Fits a classifier that gives the probability of a fault."""
+    """Fits a classifier that scores how likely a fault is."""
     from threadpoolctl import threadpool_limits
 
     if name == "boosted trees":
