@@ -80,7 +80,10 @@ class ChannelReport:
         return plain | {
             "period_s": self.period_s if np.isfinite(self.period_s) else None,
             "nrmse": nrmse,
-            "noise": [dict(row) for row in self.noise],
+            "noise": [
+                {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
+                for row in self.noise
+            ],
             "ladder": [dict(each) for each in self.ladder],
             "noise_ladder": [dict(each) for each in self.noise_ladder],
             "noise_auc": dict(self.noise_auc),

@@ -31,7 +31,7 @@ class StudyTelemetrySettings(TelemetrySettings):
 
 @dataclasses.dataclass(frozen=True)
 class RobustnessSettings:
-    """The experiment on robustness: `python -m studies.robustness`."""
+    """The study of robustness: `python -m studies.robustness`."""
 
     num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: a signed-rank test of 10 pairs can reach p = 0.002", smoke=2)
     first_seed: int = setting(
@@ -73,7 +73,7 @@ class SecondSettings:
 
 @dataclasses.dataclass(frozen=True)
 class ModesSettings:
-    """The detailed test of degraded modes, a part of the experiment on robustness."""
+    """The detailed test of degraded modes, a part of the study of robustness."""
 
     num_windows: int = setting(300, "windows", f"{OUR_CHOICE}: test windows in each mode at each severity", smoke=40)
     windows_per_configuration: int = setting(50, "windows", f"{OUR_CHOICE}: 300 configurations are sampled", smoke=5)
@@ -130,7 +130,7 @@ class CurveNetworkSettings:
 
 @dataclasses.dataclass(frozen=True)
 class FactorialSettings:
-    """The factorial experiment: `python -m studies.factorial`. Its other settings are those of robustness."""
+    """The factorial study: `python -m studies.factorial`. Its other settings are those of robustness."""
 
     num_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: the first seeds of the experiment on robustness; 32 cells for each", smoke=1)
 

@@ -293,7 +293,7 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
 
 
 def test_the_commands_of_the_readme_can_be_parsed():
-    pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/own_telemetry.md")]
+    pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/own_data.md")]
     texts = [*pages, commands.EXAMPLES]
     lines = [line.strip() for text in texts for line in text.splitlines()]
     asked = [line.split()[3:] for line in lines if line.startswith("python -m enhsim_tf ") and "--help" not in line]
@@ -307,7 +307,7 @@ def test_the_commands_of_the_readme_can_be_parsed():
 
 @pytest.mark.usefixtures("narrow_enhancer")
 def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs" / "own_telemetry.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "own_data.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
     snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
         "num_windows=1000", "num_windows=20"
