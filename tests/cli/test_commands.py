@@ -401,7 +401,6 @@ WRONG = {
     "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
     "rate of half": ([*SCORE, "--false-alarm-rate", "0.5"], "0.5"),
     "too few windows to learn from": ([*SCORE, "--windows", "9"], "num_windows=9"),
-    "channels that were not fitted": (["score", "WORLD/single", "WORLD/two.csv", "--out", "x"], "'amps'"),
     "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "telemetry below a window": (["score", "WORLD/single", "WORLD/short.csv", "--out", "x.parquet"], "60 samples"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
