@@ -119,9 +119,9 @@ class EnhancedSimulator(NoisyOutput):
             window: Length of a window in samples.
             noise: `best`, the simplest noise model that held-out telemetry does not tell from real noise; or one of
                 `noise.names.CANDIDATES`. Noise is the telemetry minus the enhanced signal.
-            held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for the noise
-                only and not for training the enhancer. 0 uses all telemetry for both, which is safe with many windows, few epochs and periodic coarse windows: the enhancer then
-                cannot memorise the noise of single windows.
+            held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for the noise only and not for
+                training the enhancer. 0 uses all telemetry for both, which is safe with many windows, few epochs and periodic
+                coarse windows: the enhancer then cannot memorise the noise of single windows.
             decay: Whether the enhancer's learning rate falls to zero along a cosine. With a constant rate, as in the paper,
                 the weights keep the noise of the last batches.
             follow: Whether the coarse simulator is aligned in time, offset and gain with each window before the enhancer

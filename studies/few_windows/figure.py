@@ -33,7 +33,7 @@ def curves(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     grid = panels(figure, down + 0.45, 2, len(environments), gap=(0.3, 0.2), sharex=True, sharey="row")
     for (name, about), (upper, lower) in zip(environments.items(), grid.T, strict=True):
         for arm, (label, marker, line, colour) in _CURVES.items():
-            curve = about["curves"][arm]
+            curve = about["arms"][arm]
             at = [number for number in numbers if str(number) in curve["rate"]]
             style = {"marker": marker, "linestyle": line, "color": colour, "markersize": 3.5, "linewidth": 1.0, "markerfacecolor": "none"}
             upper.plot(at, [100 * curve["rate"][str(number)] for number in at], label=label, **style)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.common.tables import KeptTables
-from studies.few_windows.record import ADVERSARIAL, CLASSIFIER, CLASSIFIER_ON_REAL, REAL
+from studies.few_windows.record import ADVERSARIAL, CLASSIFIER, CLASSIFIER_ON_REAL, REAL, SIMULATOR
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,9 +36,10 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         tables: The table `rows`.
 
     Returns:
-        For each environment the curves of all training data over the number of real windows, the numbers at which each `pays`, compared with
-        the real windows of the same seeds, the smallest number from which the real windows suffice, and by how much a classifier of injected
-        anomalies finds more if it learns from the simulator instead of the real windows.
+        For each environment the curves of all training data (`arms`) over the number of real windows, the numbers at which each simulator
+        `pays`, and those at which other methods do, compared with the real windows of the same seeds; the smallest number from which the
+        real windows suffice; by how much a classifier of injected anomalies finds more if it learns from the simulator instead of the real
+        windows; and the detector of nominal windows that finds most on the seeds and numbers of the classifiers.
     """
     rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
     numbers = sorted({int(number) for number in rows["num_real"]})
@@ -49,10 +50,12 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
         excess = curves[REAL]["excess"]
         suffices = [number for number in numbers if all(excess[str(n)] <= SUFFICES for n in numbers if n >= number)]
         environments[environment] = {
-            "curves": curves,
-            "pays": {arm: _pays(own, arm, numbers) for arm in curves if arm != REAL},
+            "arms": curves,
+            "pays": {arm: _pays(own, arm, numbers) for arm in curves if arm.startswith(SIMULATOR)},
+            "others_pay": {arm: _pays(own, arm, numbers) for arm in curves if arm != REAL and not arm.startswith(SIMULATOR)},
             "real_suffices_from": suffices[0] if suffices else None,
             "classifiers": {arm: _gain(own, arm, numbers) for arm in (CLASSIFIER, ADVERSARIAL) if arm in curves},
+            "best_detector": _best_detector(own, numbers),
         }
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
@@ -93,3 +96,15 @@ def _gain(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> dict[str, f
     recall = rows.pivot_table("recall_at_real_rate", ["num_real", "seed"], "arm")
     gain = (recall[arm] - recall[CLASSIFIER_ON_REAL]).dropna().groupby("num_real").mean()
     return {str(number): float(gain[number]) for number in numbers if number in gain.index}
+
+
+def _best_detector(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, dict[str, Any]]:
+    """The detector that finds most after training on the real windows, where there are classifiers, and its recall at the matched rate."""
+    same = rows[rows["arm"] == CLASSIFIER][["num_real", "seed"]].drop_duplicates()
+    recall = rows[rows["arm"] == REAL].merge(same).groupby(["num_real", "detector"])["recall_at_real_rate"].mean()
+    found = {}
+    for number in numbers:
+        if number in set(same["num_real"]):
+            name = recall.loc[number].idxmax()
+            found[str(number)] = {"name": name, "recall_at_real_rate": float(recall.loc[number, name])}
+    return found

@@ -132,7 +132,14 @@ def test_training_data_with_fewer_seeds_are_compared_with_the_real_windows_of_th
     second = table({REAL: {5: 0.01, 20: 0.01, 100: 0.01}}, seed=2)
     found = summary.summarise({"rows": pd.concat([table(RATES), second], ignore_index=True)})["environments"]["white"]
     assert found["pays"] == {SIMULATOR + "gaussian": [5]}
-    assert found["curves"][REAL]["rate"] == near({"5": 0.06, "20": 0.02, "100": 0.011})
+    assert found["arms"][REAL]["rate"] == near({"5": 0.06, "20": 0.02, "100": 0.011})
+
+
+def test_beside_classifiers_stands_the_detector_that_finds_most(near):
+    second = table({REAL: {5: 0.01, 20: 0.01}}).assign(detector="b", recall_at_real_rate=0.7)
+    rows = pd.concat([table(RATES), second, table({CLASSIFIER: {20: 0.01}})], ignore_index=True)
+    found = summary.summarise({"rows": rows})["environments"]["white"]
+    assert found["best_detector"] == {"20": {"name": "b", "recall_at_real_rate": near(0.7)}}
 
 
 def test_the_published_findings_come_from_the_published_table(near):
