@@ -166,8 +166,9 @@ networks, losses, judged_on = {}, {}, {}
 for kind, (learnt, judged) in noises.items():
     keras.utils.set_random_seed(0)
     networks[kind] = build_density()
-    networks[kind].compile(keras.optimizers.Adam(0.002), negative_log_likelihood)
     inputs, following = examples(learnt, 200_000 if is_full else 1_000, np.random.default_rng(2))
+    falling_rate = keras.optimizers.schedules.CosineDecay(0.003, 2 * len(inputs) // 500)
+    networks[kind].compile(keras.optimizers.Adam(falling_rate), negative_log_likelihood)
     networks[kind].fit(inputs, following, batch_size=500, epochs=2, verbose=0)
     coefficients, variance = fit_autoregression(learnt, 60)
     judged_on[kind] = examples(judged, 20_000 if is_full else 500, np.random.default_rng(3))
