@@ -143,7 +143,6 @@ simulator = EnhancedSimulator.fit(
     window=window,
     num_windows=800 if is_full else 90,
     epochs=1,
-    num_iterations=0,
     verbose=0,
 )
 

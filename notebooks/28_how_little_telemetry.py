@@ -42,7 +42,7 @@ NUM_REAL = (5, 20, 100) if is_full else (5, 20)
 small = {"num_real": NUM_REAL, "num_windows": 200, "num_judged": 400, "num_anomalous": 24}
 if not is_full:
     small |= {"num_windows": 60, "num_judged": 60, "num_anomalous": 6}
-small = {f"curve__{name}": value for name, value in small.items()}
+small = {f"few_windows__{name}": value for name, value in small.items()}
 # 100 is not one of the seeds of the published curve
 world = World(make_settings(budget, 100, telemetry__noise="autoregressive", **small))
 records = {k: world.record(k) for k in NUM_REAL}
@@ -262,7 +262,7 @@ slider(draw, "number of real windows", NUM_REAL, shown=NUM_REAL[:2])
 # ![False alarms and recall over the number of real windows](../studies/few_windows/results/learning_curve.png)
 
 # %%
-from studies.few_windows.findings import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
+from studies.few_windows.summary import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
 
 excess = {name: values - RATE for name, values in alarms.items()}
 pays_here = [
@@ -330,17 +330,11 @@ for environment, about in found["environments"].items():
 
 
 # %%
-def group_with(about, arm):
-    """The group of methods that have the same seeds as a method; an empty one if the method was not tried."""
-    empty = {"names": [], "seeds": [], "arms": {}, "best_detector": {}}
-    return next((group for group in about["few_seeds"] if arm in group["names"]), empty)
-
-
 both = ("classifier", "classifier without simulator")
 gains = []
 for environment, about in found["environments"].items():
     with_it, without = (about["arms"].get(arm, {}).get("recall_at_real_rate", {}) for arm in both)
-    single = group_with(about, both[0])["best_detector"]
+    single = about["best_detector"]
     shared = [number for number in found["numbers"] if str(number) in with_it and str(number) in without]
     for number in shared:
         gains.append(with_it[str(number)] - without[str(number)])
@@ -374,7 +368,7 @@ else:
 
 # %%
 for environment, about in found["environments"].items():
-    for number, best in group_with(about, both[0])["best_detector"].items():
+    for number, best in about["best_detector"].items():
         classifiers = {
             arm: about["arms"][arm]["recall_at_real_rate"][number]
             for arm in (*both, "domain-adversarial")

@@ -95,7 +95,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     fit.add_argument(
         "--epochs", type=int, default=FitOptions.epochs, metavar="N", help="training epochs of the enhancer (default: %(default)s)"
     )
-    fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="training iterations of the noise networks (default: 1000)")
     fit.add_argument("--workers", metavar="auto|N", help="channels fitted in parallel, two threads each (default: auto, one per core)")
     fit.add_argument(
         "--engine",

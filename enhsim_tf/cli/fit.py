@@ -17,7 +17,7 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 
     noise = options.noise.replace("-", " ")
-    counts = (options.num_windows, options.epochs, options.iterations)
+    counts = (options.num_windows, options.epochs)
     enhancer = None if options.enhancer is None else options.enhancer.replace("-", " ")
     if options.coarse is None:
         refuse_without_coarse(options, "coarse_time", "coarse_start", "coarse_column", "delay")

@@ -249,7 +249,7 @@ def fit_job(job: Job) -> list[str]:
 
         cleaning, interval_s = job.cleaning.of_run(min_part=2), parts[0].interval_s if parts[0].has_time else None
         run = read_recording(job.run.source, job.run.columns, job.run.time, cleaning, interval_s, job.run.start)
-        simulator, report = fit_run_model(parts, run, job.options, verbose, progress)
+        simulator, report = fit_run_model(parts, run, job.options)
         figure = run_figure(report)
     refuse_foreign(job.folder)  # checked again, because the fit took minutes
     with replace_folder(job.folder) as temporary:

@@ -1,7 +1,7 @@
 """The coarse and the fine simulator of the battery, in PyBaMM (Sulzer et al. 2021), without any report of its use.
 
-The coarse simulator is a single-particle model (SPM) with the book parameters of Chen et al. (2020), at 25 degrees Celsius. The
-fine one is a Doyle-Fuller-Newman model (DFN) of a vehicle that differs from the book. Both have a lumped thermal model. Faults
+The coarse simulator is a single-particle model (SPM) with the published parameters of Chen et al. (2020), at 25 degrees Celsius. The
+fine one is a Doyle-Fuller-Newman model (DFN) of a vehicle that differs from them. Both have a lumped thermal model. Faults
 are inputs that begin at a given sample, so that one model serves all of them.
 """
 
@@ -23,9 +23,9 @@ COLUMNS = ("volts", "amperes", "celsius")
 ONSET = ORBIT_SAMPLES
 """First sample of a fault: runs begin with a nominal orbit, in which the battery also reaches its usual temperature."""
 VEHICLE = {"added resistance": 0.008, "lost material": 0.04, "lost heat transfer": 0.4}
-"""How the fine simulator's battery differs from the book, in ohms and shares, beside its temperature and a slower diffusion."""
-_SLOWER_DIFFUSION = 0.7  # of lithium in the negative electrode's particles, as a share of the book's value
-_BOOK_K, _ZERO_K = 298.15, 273.15
+"""How the fine simulator's battery differs from the published one, in ohms and shares, beside its temperature and a slower diffusion."""
+_SLOWER_DIFFUSION = 0.7  # of lithium in the negative electrode's particles, as a share of the published value
+_PUBLISHED_K, _ZERO_K = 298.15, 273.15
 _ONSET_S = 60.0  # a fault grows to its full size in this time
 _MESH = {"x_n": 10, "x_s": 8, "x_p": 10, "r_n": 12, "r_p": 12}
 _TOLERANCES = {"rtol": 1e-4, "atol": 1e-5}
@@ -115,9 +115,9 @@ def simulate(model: str, current: np.ndarray, regime: Regime, faults: Sequence[F
 def _build(model: str, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
     """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
     pybamm = _pybamm()
-    is_fine, book = model == "fine", pybamm.ParameterValues("Chen2020")
-    values, kelvins = book.copy(), regime.ambient_k if is_fine else _BOOK_K
-    charged = book.copy()
+    is_fine, published = model == "fine", pybamm.ParameterValues("Chen2020")
+    values, kelvins = published.copy(), regime.ambient_k if is_fine else _PUBLISHED_K
+    charged = published.copy()
     charged.set_initial_state(FIRST_CHARGE)
     grown = pybamm.Interpolant(np.array([-1.0, begun, begun + _ONSET_S, 1e12]), np.array([0.0, 0.0, 1.0, 1.0]), pybamm.t)
     added, material, transfer = (pybamm.InputParameter(name) * grown for name in simulator_inputs(None))
@@ -125,13 +125,13 @@ def _build(model: str, current: np.ndarray, clock: np.ndarray, regime: Regime, b
     values["Contact resistance [Ohm]"] = differs["added resistance"] + added
     for electrode in ("Negative", "Positive"):
         share = f"{electrode} electrode active material volume fraction"
-        values[share] = book[share] * (1 - differs["lost material"]) * (1 - material)
+        values[share] = published[share] * (1 - differs["lost material"]) * (1 - material)
         concentration = f"Initial concentration in {electrode.lower()} electrode [mol.m-3]"
         values[concentration] = charged[concentration]
     name = "Total heat transfer coefficient [W.m-2.K-1]"
-    values[name] = book[name] * (1 - differs["lost heat transfer"]) * (1 - transfer)
+    values[name] = published[name] * (1 - differs["lost heat transfer"]) * (1 - transfer)
     name = "Negative particle diffusivity [m2.s-1]"
-    values[name] = book[name] * (_SLOWER_DIFFUSION if is_fine else 1.0)
+    values[name] = published[name] * (_SLOWER_DIFFUSION if is_fine else 1.0)
     values["Ambient temperature [K]"] = values["Initial temperature [K]"] = kelvins
     values["Lower voltage cut-off [V]"], values["Upper voltage cut-off [V]"] = _LIMITS_V
     values["Current function [A]"] = pybamm.Interpolant(clock, current, pybamm.t)

@@ -30,8 +30,8 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.6,
-        "Residual blocks keep false alarms near the target of 1 %",
-        "Real nominal windows that are flagged, by training data: without noise (grey), from the paper's pipeline (orange), from the residual "
+        "False alarms on real nominal windows, by training data",
+        "Training data without noise (grey), from the paper's pipeline (orange), from the residual "
         "pipeline (blue), real (black). Large mark and bar: mean over seven detectors with its 95 % interval over seeds and blocks of time. "
         "Small marks: single detectors; rates below 0.02 % are drawn at 0.02 %.",
     )
@@ -78,7 +78,7 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        "Enhancers trained on faults have smaller errors than the paper's",
+        "Error of enhancers in degraded modes, by severity",
         "Root-mean-square error with respect to the true degraded signal, in standard deviations of the nominal signal; means over seeds. "
         "“On faults”: trained on random configurations of all modes, with severities in the grey area.",
     )

@@ -64,7 +64,7 @@ def generators(
 
     def with_noise(fit: Callable[[], Any]) -> Callable[[int], np.ndarray]:
         fit = functools.cache(fit)  # one model for training and thresholds
-        return lambda seed: simulator.generate_clean(number, seed=seed) + fit().generate(number, seed)
+        return lambda seed: simulator.generate_clean(number, seed=seed) + fit().generate(number, np.random.default_rng(seed))
 
     return {
         "coarse": lambda seed: simulator.generate_coarse(number, seed=seed),

@@ -26,7 +26,7 @@ from enhsim_tf.noise.surrogates import GaussianNoise
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf"]
-TINY = ["--num-windows", "40", "--epochs", "1", "--iterations", "2", "--window", "64"]
+TINY = ["--num-windows", "40", "--epochs", "1", "--window", "64"]
 
 
 def table(num_samples=1_500, interval="10s"):
@@ -309,9 +309,7 @@ def test_the_commands_of_the_readme_can_be_parsed():
 def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     page = (ROOT / "docs" / "own_data.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
-    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
-        "num_windows=1000", "num_windows=20"
-    )
+    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1)").replace("num_windows=1000", "num_windows=20")
     table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 60)
@@ -350,7 +348,6 @@ WRONG = {
     "window of nothing": ([*FIT, "--window", "0"], "window=0"),
     "no training windows": ([*FIT, "--num-windows", "0"], "window"),
     "no epoch": ([*FIT, "--epochs", "0"], "epoch"),
-    "iterations below zero": ([*FIT, "--iterations", "-1"], "iterations"),
     "no workers": ([*FIT, "--workers", "0"], "worker"),
     "workers that are no number": ([*FIT, "--workers", "two"], "'two'"),
     "more workers than there can be": ([*FIT, "--workers", "513"], "513"),
@@ -488,8 +485,8 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
     if engine == "ray":
         pytest.importorskip("ray", reason="the optional extra ray is not installed")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "2"]
-    command += ["--iterations", "1000000", "--engine", engine]
+    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "1000000"]
+    command += ["--enhancer", "network", "--engine", engine]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True, start_new_session=True)
     while not (tmp_path / "models").is_dir():
         assert process.poll() is None

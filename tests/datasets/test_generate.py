@@ -451,14 +451,10 @@ def test_a_read_only_folder_gives_one_line():
         folder.chmod(0o755)
 
 
-def test_a_second_run_into_the_same_folder_is_refused(undisturbed, tmp_path):
-    folder = tmp_path / "set"
-    folder.mkdir()
-    first = started(folder)
-    wait_for(folder, 2, first)
-    second = started(folder)
-    assert "no other run" in second.communicate()[1] and second.returncode == 2
-    assert first.wait() == 0 and content_of(folder) == content_of(undisturbed)
+def test_a_second_run_into_the_same_folder_is_refused(tmp_path):
+    with locked(tmp_path / "set"):
+        second = started(tmp_path / "set")
+        assert "no other run" in second.communicate()[1] and second.returncode == 2
 
 
 # the command, with networks

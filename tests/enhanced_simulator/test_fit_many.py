@@ -24,7 +24,7 @@ from enhsim_tf.enhancer import network as enhancer
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
-TINY = {"window": 64, "num_windows": 30, "epochs": 1, "num_iterations": 2, "noise": "autoregression", "seed": 3, "enhancer": "network"}
+TINY = {"window": 64, "num_windows": 30, "epochs": 1, "noise": "autoregression", "seed": 3, "enhancer": "network"}
 REPORTS = []  # reports of the first fit
 HOSTILE = ["../x", "a/b", "<b>", ".", "..", ".hidden", "%2E", "a%2Fb", " ", "ä 漢", "C:\\x", "[!.]*", "~", "-rf", "a\nb", "manifest.json"]
 

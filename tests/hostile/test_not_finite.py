@@ -78,7 +78,7 @@ def test_an_enhancer_that_diverges_is_trained_again_more_slowly(monkeypatch, fai
         return plain(model, *arguments, **options)
 
     monkeypatch.setattr(training, "fit_windows", fit_windows)
-    simulator = fit_simulator(channel(WAVE + NOISE), dataclasses.replace(TINY, num_iterations=0), 0)
+    simulator = fit_simulator(channel(WAVE + NOISE), TINY, 0)
     assert np.isfinite(simulator.generate(5)).all()
     kind, said = simulator.trained["coarse"]["kind"], simulator.trained["coarse"]["said"]
     assert (kind == "square waves") == is_fitted

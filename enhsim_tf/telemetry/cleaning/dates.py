@@ -48,7 +48,8 @@ def date_forms(text: pd.Series) -> list[str]:
 
 def _orders(text: pd.Series, mark: str) -> list[str]:
     """Returns the orders of day and month that all dates allow; with points, the day comes first."""
-    parts = text.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}").dropna().astype(int)
+    days = pd.Series(text.str[:12].unique(), dtype="str")  # far fewer than rows
+    parts = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}").dropna().astype(int)
     largest = parts.max()
     orders = [order for order, which in (("%d-%m-%Y", 1), ("%m-%d-%Y", 0)) if largest[which] <= 12]
     return orders[:1] if mark == "." else orders

@@ -44,7 +44,7 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
         content: The bytes.
 
     Returns:
-        The text, the encoding, and findings for the cleaning log.
+        The text (its first part if all of it is ASCII with lines), the encoding, and findings for the cleaning log.
 
     Raises:
         ValueError: If it is not text.
@@ -58,7 +58,11 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
             text = f"NUL bytes at the end, as after a power failure: {len(content) - len(whole):,}"
             findings.append(Finding("padding", len(content) - len(whole), text))
         try:
-            text, encoding = whole.decode("utf-8-sig"), "utf-8"  # with or without a byte order mark
+            is_simple = b"\x00" not in content and content.isascii() and b"\n" in content
+            text, encoding = (
+                whole[:_HEAD].decode() if is_simple else whole.decode("utf-8-sig"),
+                "utf-8",
+            )  # with or without a byte order mark
         except UnicodeDecodeError:
             if b"\x00" in whole:
                 raise ValueError("it is not text") from None

@@ -54,8 +54,6 @@ class MixtureDensityNoise:
         num_steps: Steps of the training.
     """
 
-    follows_signal = True
-
     def __init__(self, seed: int = 0, num_steps: int = 600):
         self.seed, self.num_steps = seed, num_steps
 
@@ -109,7 +107,7 @@ class MixtureDensityNoise:
         """Continues real noise sample by sample, in standard deviations."""
         past, rows = self._past, np.arange(number)
         seen = np.empty((number, past + self.window), np.float32)
-        seen[:, :past] = self._pasts.generate(number, rng, *(() if below is None else (below[:, :past],)))
+        seen[:, :past] = self._pasts.generate(number, rng, None if below is None else below[:, :past])
         for place in range(self.window):
             inputs = self._inputs(seen[:, place : place + past], below, rows, place)
             logits, means, log_scales = np.split(self.network.predict_on_batch(inputs).astype(np.float64), 3, axis=1)

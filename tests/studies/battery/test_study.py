@@ -14,7 +14,7 @@ from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, battery_c
 from studies.battery.record import Recorded, key_of
 
 GENTLE = REGIMES["gentle"]
-OHMS = 0.02  # by which the made-up vehicle differs from the book
+OHMS = 0.02  # by which the made-up vehicle differs from the published one
 
 
 def _run(load, added=0.0):

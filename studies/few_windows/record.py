@@ -1,11 +1,11 @@
-"""Arms of the learning curve: what detectors are trained on, given a record of `k` windows of real telemetry.
+"""What detectors are trained on, given a record of `k` windows of real telemetry.
 
-Everything that an arm learns comes from the record and from the coarse simulator. The record is contiguous, so that it holds `k` disjoint
-windows, and all arms cut the same overlapping windows from it, evenly spaced over all samples. What follows was fixed before the first run:
+Everything that is learnt comes from the record and from the coarse simulator. The record is contiguous, so that it holds `k` disjoint
+windows, and all training data are cut from the same overlapping windows of it, evenly spaced over all samples. What follows was fixed before the first run:
 
 - `real`: detectors are trained on windows of the record. Its own windows set the threshold, each scored by a detector that was trained on
   the other blocks of time.
-- `simulator + ...`: tuned ridge regression from coarse to real windows, fitted to the record, plus noise of one rung of the ladder, fitted
+- `simulator + ...`: tuned ridge regression from coarse to real windows, fitted to the record, plus noise of a simple model, fitted
   to residuals of blocks of time that the regression had not seen. Generated windows train detectors, and others set the threshold.
 - `simulator, threshold on real`: the detectors of `simulator + residual windows`, with the threshold set on windows of the record.
 - `real and simulator`: trained on both, with the threshold of `real`.
@@ -22,14 +22,12 @@ windows, and all arms cut the same overlapping windows from it, evenly spaced ov
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import GAN_RUNGS
+from enhsim_tf.noise.candidates import NoiseModel, fit_candidate
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, time_blocks
 
@@ -37,11 +35,10 @@ REAL, BOTH, THRESHOLD_ON_REAL = "real", "real and simulator", "simulator, thresh
 CORAL, CLASSIFIER, ADVERSARIAL, ONE_LINE = "CORAL", "classifier", "domain-adversarial", "moving deviation"
 CLASSIFIER_ON_REAL = "classifier without simulator"
 SIMULATOR = "simulator + "
-"""Beginning of the names of arms with noise of a rung; the name of the rung follows."""
-CHEAP_RUNGS = ("none", "Gaussian", "autoregression", "residual windows")
-NETWORK_RUNGS = ("autoregressive network", *GAN_RUNGS)
+"""Beginning of the names of training data with noise of a model; the name of the model follows."""
+NOISE_MODELS = ("none", "gaussian", "autoregression", "residual windows")  # in no environment does the noise follow the signal
 WHOLE_WINDOWS = "residual windows"
-"""The rung of the arms that also use real windows, chosen before the first run because it is the simplest that needs no assumption."""
+"""The noise of training data that also use real windows, chosen before the first run because it is the simplest that needs no assumption."""
 NUM_BLOCKS = 5  # of time, for cross-fitting
 _START_RANGE = 1_000_000  # generated windows begin at a random sample below this one
 
@@ -55,22 +52,10 @@ class Record:
         window: Length of a window in samples.
         most: Maximum number of windows for training.
         seed: Seed of everything that is drawn or trained.
-        num_iterations: Iterations of the autoregressive network.
-        gan_iterations: Iterations of the GANs.
     """
 
-    def __init__(
-        self,
-        telemetry: Telemetry,
-        coarse: SquareWaveSimulator,
-        window: int,
-        most: int,
-        seed: int,
-        num_iterations: int = 3_000,
-        gan_iterations: int = 1_000,
-    ):
+    def __init__(self, telemetry: Telemetry, coarse: SquareWaveSimulator, window: int, most: int, seed: int):
         self.telemetry, self.coarse, self.window, self.most, self.seed = telemetry, coarse, window, most, seed
-        self.num_iterations, self.gan_iterations = num_iterations, gan_iterations
         self.starts = evenly_spaced_starts([telemetry], window, most)
         self.windows = cut_windows(telemetry.values, self.starts, window)
 
@@ -91,24 +76,22 @@ class Record:
             noise[held_out] = self.windows[held_out] - fitted.predict(coarse[held_out])
         return noise, self.windows - noise
 
-    @functools.cache  # noqa: B019  the record lives as long as its arms
-    def noise_model(self, rung: str) -> Any:
-        """The noise model of a rung, fitted to the residuals."""
-        number = self.gan_iterations if rung in GAN_RUNGS else self.num_iterations
-        noise, signal = self.residuals
-        return ladder.RUNGS[rung](ladder.FitTask(noise, signal, number, self.seed, self.starts))
+    @functools.cache  # noqa: B019  the record lives as long as its cell
+    def noise_model(self, name: str) -> NoiseModel:
+        """The noise model of a name, fitted to the residuals."""
+        return fit_candidate(name, *self.residuals, self.starts)
 
-    def generate(self, rung: str, num_windows: int, purpose: int) -> np.ndarray:
-        """Generates windows of the simulator with noise of a rung.
+    def generate(self, name: str, num_windows: int, purpose: int) -> np.ndarray:
+        """Generates windows of the simulator with noise of a model.
 
         Args:
-            rung: Name of the rung.
+            name: Name of the noise model.
             num_windows: Number of windows.
             purpose: Number of the random draw.
         """
         rng = np.random.default_rng([self.seed, purpose])
         clean = self.enhance(self._coarse(rng.integers(0, _START_RANGE, num_windows)))
-        return clean + ladder.generate(self.noise_model(rung), num_windows, rng, clean)
+        return clean + self.noise_model(name).generate(num_windows, rng, clean)
 
 
 @dataclasses.dataclass(frozen=True)
