@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, parse_dates
+from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, fill_dates, parse_dates
 from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Places
 
@@ -285,7 +285,7 @@ def _from_dates_as_text(
         leap[left] = text[left].astype(str).str.contains(r":\d\d:60").to_numpy()
         if leap.any():
             earlier, zoned[leap] = parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
-            dates = dates.fillna(earlier + pd.Timedelta(seconds=1))
+            dates = fill_dates(dates, earlier + pd.Timedelta(seconds=1))
             leap &= dates.notna().to_numpy()
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
