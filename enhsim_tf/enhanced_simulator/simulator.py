@@ -16,7 +16,7 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_finite, check_parts, config_of
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of
 from enhsim_tf.enhanced_simulator.noise_fitting import NoiseWindows
 from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
 from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
@@ -337,53 +337,6 @@ class EnhancedSimulator(NoisyOutput):
             rows = [(row, *held) for row in range(len(coarse))] if held else []
             yield self.complete_labelled(coarse, nominal, None if levels is None else levels[first : first + _CHUNK], noise_rng, rows)
 
-    def _complete(self, coarse: np.ndarray, levels: np.ndarray | None) -> np.ndarray:
-        """Enhances coarse windows and sets the offset and gain of each, shape `(windows, 2)`; no noise is added."""
-        windows = self.enhance(coarse)
-        return check_finite(windows if levels is None else apply_shift_and_gain(windows, *levels.T))
-
-    def complete_labelled(
-        self,
-        coarse: np.ndarray,
-        nominal: np.ndarray,
-        levels: np.ndarray | None,
-        noise_rng: np.random.Generator | None,
-        held: Sequence[tuple[int, int, int]] = (),
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Completes a batch of coarse windows, some of which a degraded mode has changed, and marks the changed samples.
-
-        Args:
-            coarse: Coarse windows, float32 of shape `(windows, samples)`.
-            nominal: Nominal coarse windows of the same times, same shape.
-            levels: Offset and gain of each window, shape `(windows, 2)`, or None for a simulator whose level is constant.
-            noise_rng: Random generator of the noise, or None for windows without noise.
-            held: Window, first sample and end of each range of samples at which a mechanism is stuck. Its telemetry stands still there,
-                and the coarse window is not used.
-
-        Returns:
-            `(windows, mask)`: float32 windows in the telemetry's unit, and a boolean array of the same shape, which marks the samples
-            that differ from the nominal windows with the same noise (see `changes`). All other samples equal them to the bit. Noise
-            that follows the signal follows the nominal one.
-
-        Raises:
-            InputError: If a value is not finite.
-        """
-        changed = coarse != nominal
-        changed[[row for row, *_ in held]] = False
-        clean, mask = self._complete(nominal, levels), np.zeros(coarse.shape, bool)
-        windows = clean
-        tolerance = tolerance_of(self.noise_sd, self.scale) if held or changed.any() else 0.0
-        if changed.any():
-            degraded = self._complete(coarse, levels)
-            windows, mask = blend_changes(clean, degraded, spans(changed), fade_length(coarse.shape[1]), tolerance)
-        elif held:
-            windows = clean.copy()
-        hold_values(windows, mask, held, tolerance)
-        if noise_rng is None:
-            return check_finite(windows), mask
-        noise = self.draw_noise(clean, noise_rng)
-        return add_changed(windows, clean, noise, mask, self.quantisation)
-
     def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
         check_counts(num_windows=(num_windows, 0))
         windows, filled = np.empty((num_windows, self.window), np.float32), 0
@@ -490,7 +443,7 @@ class EnhancedSimulator(NoisyOutput):
         """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
         window, hop = self.window, self.window // 2
         starts = np.arange(0, len(coarse) - window + 1, hop)
-        enhanced = self._complete(cut_windows(coarse, starts, window), levels)
+        enhanced = self.complete(cut_windows(coarse, starts, window), levels)
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
         signal, total = np.zeros((2, len(coarse)))
         for begin, clean in zip(starts, enhanced, strict=True):
