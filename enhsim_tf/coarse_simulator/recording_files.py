@@ -20,7 +20,6 @@ from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.regular_grid import find_interval, regular_step_fraction
 from enhsim_tf.telemetry.cleaning.report import ROWS, iso_time
 from enhsim_tf.telemetry.cleaning.times import localize_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.reading.files import read_table
 from enhsim_tf.telemetry.registry import FILES
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
@@ -220,9 +219,7 @@ def _carried(source: Source, names: Sequence[str], model: pd.Series, cleaning: C
     if table is None:
         return {}
     others = [name for name in table.columns if name not in (*names, model.index.name) and not name.startswith(("column ", "Unnamed: "))]
-    return (
-        {name: series.reset_index(drop=True) for name, series in read_source(source, others, NO_TIME, cleaning).items()} if others else {}
-    )
+    return {name: table[name].reset_index(drop=True) for name in others}
 
 
 def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:

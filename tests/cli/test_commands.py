@@ -15,11 +15,12 @@ import pytest
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
+from enhsim_tf.cli.options import cleaning_options, matching_channels
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.enhanced_simulator import report_measure
+from enhsim_tf.enhanced_simulator import fit_many, report_measure
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.noise.surrogates import GaussianNoise
@@ -289,6 +290,27 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
     assert not list((tmp_path / "models").iterdir())
 
 
+def test_columns_without_a_simulator_are_left_out_and_none_is_refused(refused, capsys):
+    series, models = {"volts": 1, "note": 2}, {"volts": Path("a"), "amps": Path("b")}
+    assert matching_channels(series, models) == {"volts": 1} and "left out: note" in capsys.readouterr().out
+    with refused("volts, amps", "note"):
+        matching_channels({"note": 2}, models)
+
+
+def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
+    monkeypatch.setattr(fit_many, "fit_job", lambda job: {}["defect"])
+    outcome = fit_many.fit_or_say(fit_many.Job("volts", None, Path("x"), None, None))
+    assert "KeyError" in outcome.failure and "'defect'" in outcome.failure and len(outcome.failure.splitlines()) == 1
+
+
+def test_several_sources_and_what_reading_takes_are_options():
+    words = ["inject", "a.csv", "b.csv", "--missing-values=-999.9,9999", "--label-column", "x", "--no-header", "--out", "y"]
+    options = parse(words)
+    chosen = cleaning_options(options, 3)
+    assert options.source == ["a.csv", "b.csv"] and parse(["inject", "a.csv", "--out", "y"]).source == "a.csv"
+    assert (chosen.missing_values, chosen.label_column, chosen.no_header) == (("-999.9", "9999"), ("x",), True)
+
+
 # examples of the README and of the page on telemetry of one's own
 
 
@@ -400,7 +422,6 @@ WRONG = {
     "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
     "rate of half": ([*SCORE, "--false-alarm-rate", "0.5"], "0.5"),
     "too few windows to learn from": ([*SCORE, "--windows", "9"], "num_windows=9"),
-    "channels that were not fitted": (["score", "WORLD/single", "WORLD/two.csv", "--out", "x"], "'amps'"),
     "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "telemetry below a window": (["score", "WORLD/single", "WORLD/short.csv", "--out", "x.parquet"], "60 samples"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),

@@ -243,6 +243,12 @@ def test_several_series_in_one_table_are_told_apart(tmp_path, form):
     check(channels[names[1]], VALUES + 9, START + shift)
 
 
+def test_a_named_column_of_several_series_is_told_apart_too(tmp_path):
+    long(host=("a", "b")).assign(other=2.0).to_csv(tmp_path / "a.csv", index=False)
+    assert list(read_source(tmp_path / "a.csv", ["v"])) == ["a", "b"]
+    assert list(read_source(tmp_path / "a.csv", ["a.v"])) == ["a.v"] and len(read_source(tmp_path / "a.csv")) == 4
+
+
 def test_a_state_is_no_key_of_series(tmp_path):
     frame = pd.DataFrame({"time": TIMES, "mode": np.where(np.arange(N) % 20 < 10, "sun", "eclipse"), "v": VALUES})
     frame.to_csv(tmp_path / "a.csv", index=False)

@@ -83,10 +83,11 @@ class Cleaning:
             raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
         check_time_format(self.time_format)
         for name in _NAMES:
-            if isinstance(getattr(self, name), str):
-                object.__setattr__(self, name, (getattr(self, name),))
-        if isinstance(self.missing_values, str | float | int):
-            object.__setattr__(self, "missing_values", (self.missing_values,))
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
+        given = self.missing_values
+        object.__setattr__(self, "missing_values", (given,) if isinstance(given, str | float | int) else tuple(given))
 
     @property
     def longest_gap(self) -> int:

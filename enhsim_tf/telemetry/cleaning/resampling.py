@@ -76,7 +76,7 @@ def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, nam
     log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
     rows = rows.take(~is_copy)
     kept, left = _merge_groups(rows, rows.times, same_time or "mean")
-    if same_time is None and not bins and 2 * len(left) > len(rows) > 2:
+    if same_time is None and not bins and 2 * len(left) >= len(rows) > 2:
         raise InputError(
             f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
             "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval) or same_time='mean'."

@@ -38,9 +38,9 @@ def read_table_channels(
         else f"{source[0].name} ..."
     )
     table = _without_repeats(read_table(source, options), columns, time, options, what)
-    several = options.series_column is not None
-    layout = lay_out(table, None if several else _wanted(table, columns), time, options, what)
-    keys = keys_of(table.frame, layout, options, what) if columns is None or several or not set(columns) <= set(table.frame.columns) else []
+    named = _wanted(table, columns)
+    layout = lay_out(table, named, time, options, what)
+    keys = [key for key in keys_of(table.frame, layout, options, what) if key not in (named or ())]
     _check_names(table, [] if keys else columns, what, layout)
     findings = [*table.findings, *_findings_of(layout, keys)]
     if not keys:
@@ -50,7 +50,7 @@ def read_table_channels(
         chosen = name_series(table.frame, keys, list(values), what)
         said = ", ".join(list(chosen)[:6])
         findings.append(Finding("series", len(chosen), f"series told apart by {', '.join(keys)}: {len(chosen):,} ({said})"))
-        if columns is not None:
+        if columns is not None and named is None:
             missing = next((name for name in columns if name not in chosen), None)
             if missing is not None:
                 raise InputError(f"Expected series of {what}: {said}. Received: {missing!r}. Name one of these.")

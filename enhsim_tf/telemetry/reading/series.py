@@ -107,9 +107,9 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
     """Refuses a table in which numbers, such as those of sensors, tell series apart, because a channel may look alike."""
     if _repeating(times, _codes(frame, [])) <= _OFTEN:
         return
-    for name in layout.channels:
-        cells = frame[name]
-        if len(layout.channels) > 1 and pd.api.types.is_integer_dtype(cells.dtype) and 1 < cells.nunique() <= _MAX_SERIES:
+    for name, cells in frame.items():
+        is_number = pd.api.types.is_integer_dtype(cells.dtype) and name not in layout.clock.columns and layout.channels != (name,)
+        if is_number and 1 < cells.nunique() <= _MAX_SERIES:
             if _repeating(times, _codes(frame, [name])) < 0.02:
                 raise InputError(
                     f"Expected one row for each time. Received: times that repeat, with different values of {name!r}, in {what}. Give "
