@@ -225,8 +225,8 @@ for name, noise in {
 assert not is_full or shot_alarms["Gaussian"] > 0.1 > 0.03 > shot_alarms["noise windows drawn again"]
 
 # %% [markdown]
-# It is not enough. Some windows hold many pulses and some hold few, so their scores scatter more than those of Gaussian windows, and the
-# threshold is a high quantile of scores. Noise that is drawn from real windows scatters as the real noise does.
+# It is not enough: two noises of the same standard deviation set different thresholds. Noise that is drawn from real windows sets the right
+# one.
 #
 # ## Few false alarms are not the aim
 #
@@ -304,8 +304,9 @@ assert all((rate < 0.02) == (kind in gaussian) for kind, rate in rates["residual
 _ = verdict(experiment, "C8")
 
 # %% [markdown]
-# The noise of the training windows decides the false alarms: its scale, its directions, and how it scatters from window to window. Noise
-# that is drawn from real residuals has all three.
+# The noise of the training windows decides the false alarms. Its scale must be right to a few per cent, but that is not enough: with the
+# same scale, noise of few directions or of another kind sets another threshold. Noise that is drawn from real residuals is right in all of
+# this.
 #
 # ## Exercises
 #

@@ -479,7 +479,7 @@ assert verdicts["random fifths"] and not verdicts["blocks of time"]
 # Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([study](../studies/battery/README.md)): near
 # 1 C and at 15 °C it is *gentle*; in the *hard* regime, at −5 °C, it is discharged deeply, and the map is less linear. The *factorial
 # experiment* combines windows, extraction, enhancer and generator in all ways and measures false alarms
-# ([report](../docs/report.md)).
+# ([study](../studies/factorial/README.md)).
 
 # %%
 battery, _ = open_study("battery")

@@ -257,7 +257,7 @@ slider(draw, "number of real windows", NUM_REAL, shown=NUM_REAL[:2])
 # The full experiment has four detectors, four kinds of noise and more methods. Its rule was fixed before the first run: a simulator *pays*
 # where its excess is at most half of that of the real windows, if these have an excess of more than half a point, and its recall at the
 # real rate is at most 3 points lower. Real windows *suffice* from the number on from which their excess stays at most half a point. The
-# methods are described in [docs/noise.md](../docs/noise.md). Each sentence below is computed from the table.
+# [study](../studies/few_windows/README.md) describes the methods. Each sentence below is computed from its findings.
 #
 # ![False alarms and recall over the number of real windows](../studies/few_windows/results/learning_curve.png)
 
