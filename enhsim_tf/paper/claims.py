@@ -201,13 +201,13 @@ def robust(pipeline: Pipeline) -> Measured:
 def settling(pipeline: Pipeline) -> Measured:
     """C4: from which iteration on the generated noise is what it will be, whether that resembles the real noise or not.
 
-    That is the first record from which the standard deviation stays within 10 % of its median over the second half of the record, and
+    That is the first record from which the standard deviation stays within 10 % of its median over the last quarter of the record, and
     the lag-1 correlation within .05 of its own, to the end. Without such a record, it is one interval after the last.
     """
     history, settings = pipeline.history, pipeline.settings
     if settings.rounds < 2:
         return {}
-    iteration, is_late = history["iteration"], history["iteration"] > history["iteration"][-1] / 2
+    iteration, is_late = history["iteration"], history["iteration"] > 0.75 * history["iteration"][-1]
     scale, lag = np.log(np.maximum(history["sd"], 1e-12)), history["lag_one"]
     apart = np.abs(scale - np.median(scale[is_late])), np.abs(lag - np.median(lag[is_late]))
     is_bad = np.flatnonzero((apart[0] > 0.1) | (apart[1] > 0.05))
