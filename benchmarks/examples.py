@@ -4,7 +4,6 @@ Each implementation must run as its users would run it. If enhsim_tf were import
 start with the settings of enhsim_tf.
 """
 
-import resource
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -15,7 +14,10 @@ if TYPE_CHECKING:
     import keras  # noqa: TID251  the package's own module would start TensorFlow
 
 Work = tuple[Callable[[], object], int]
-"""A function that is called repeatedly, and the number of units of work in each call."""
+"""A function that is called repeatedly, and the number of units of work in each call.
+
+The function may return the seconds that it took, as a float, where not all of its time counts.
+"""
 
 
 def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarray]:
@@ -27,29 +29,13 @@ def example_windows(num_windows: int, window: int) -> tuple[np.ndarray, np.ndarr
     return coarse.astype(np.float32), (truth + rng.normal(0, 0.1, truth.shape)).astype(np.float32)
 
 
-def seconds_of_epoch(model: "keras.Model", *data: object, **settings: object) -> tuple[float, int]:
-    """Returns the seconds and the page faults of one epoch of `fit`, without the work of `fit` before and after the epochs."""
-    clock, of_last = epoch_clock()
-    model.fit(*data, epochs=1, verbose=0, callbacks=[clock], **settings)
-    return of_last()
-
-
-def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], tuple[float, int]]]:
-    """Returns a callback that records epochs, and a function that returns the seconds and the page faults of the last epoch."""
+def epoch_clock() -> tuple["keras.callbacks.Callback", Callable[[], float]]:
+    """Returns a callback that times epochs, without the work of `fit` around them, and a function that returns the last epoch's seconds."""
     from keras.callbacks import LambdaCallback  # noqa: TID251
 
-    notes = []
+    times = []
 
     def note(epoch: int, logs: dict) -> None:
-        notes.append((time.perf_counter(), minor_faults()))
+        times.append(time.perf_counter())
 
-    def of_last() -> tuple[float, int]:
-        (began, before), (ended, after) = notes[-2:]
-        return ended - began, after - before
-
-    return LambdaCallback(on_epoch_begin=note, on_epoch_end=note), of_last
-
-
-def minor_faults() -> int:
-    """Returns the number of minor page faults of this process so far. At each of them, the system clears a page of memory."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    return LambdaCallback(on_epoch_begin=note, on_epoch_end=note), lambda: times[-1] - times[-2]

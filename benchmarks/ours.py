@@ -2,23 +2,18 @@
 
 import os
 import tempfile
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from benchmarks.examples import Work, epoch_clock, example_windows, minor_faults
+from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.keras_tools.backend import keras, tf
+from enhsim_tf.keras_tools.backend import tf
 from enhsim_tf.keras_tools.training import fit_windows
-from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
-from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
-
-_COMPILED = 5  # iterations before the time is taken, because the first one compiles
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -26,48 +21,23 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
     source, target = example_windows(15 * num_steps, window)
     model = build_enhancer(window, hidden_units)
 
-    def run() -> tuple[float, int]:
-        clock, of_last = epoch_clock()
+    def run() -> float:
+        clock, seconds_of_last = epoch_clock()
         fit_windows(model, source, target, epochs=2, batch_size=15, seed=0, verbose=0, callbacks=[clock])
-        return of_last()  # the first epoch compiles
+        return seconds_of_last()  # the first epoch compiles
 
     return run, num_steps
 
 
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
     """Prepares iterations of the paper's GAN, with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
-    return _iterations(NoiseGAN(build_generator(window), build_discriminator(window, filters, dropout=dropout)), num_iterations, window)
-
-
-def convolutional_iteration(num_iterations: int, window: int = 500) -> Work:
-    """Prepares iterations of the convolutional GAN with the same numbers of rows."""
-    return _iterations(convolutional_noise_gan(_example_noise(window)), num_iterations, window)
-
-
-def network_iteration(num_iterations: int, window: int = 500) -> Work:
-    """Prepares iterations of the autoregressive network of noise, with 200 windows and 50 positions."""
-    noise = _example_noise(window)
-    network = AutoregressiveNetwork.untrained(noise)
-
-    def run() -> tuple[float, int]:
-        notes = []
-        network.fit(noise, _COMPILED + num_iterations, on_iteration=lambda number: notes.append((time.perf_counter(), minor_faults())))
-        (began, before), (ended, after) = notes[_COMPILED - 1], notes[-1]
-        return ended - began, after - before
-
-    return run, num_iterations
-
-
-def _example_noise(window: int) -> np.ndarray:
-    return np.random.default_rng(0).normal(0, 0.1, (1_500, window))
-
-
-def _iterations(gan: NoiseGAN, num_iterations: int, window: int) -> Work:
-    noise = tf.constant(_example_noise(window)[:, :, None] / gan.scale, tf.float32)
+    gan = NoiseGAN(build_generator(window), build_discriminator(window, filters, dropout=dropout))
+    noise = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1))
+    rows = tf.constant(noise / gan.scale, tf.float32)
 
     def run() -> None:
         for _ in range(num_iterations):
-            gan._step(noise)  # what `fit` calls, without its records and progress bar
+            gan._step(rows)  # what `fit` calls, without its records and progress bar
 
     return run, num_iterations
 
@@ -83,13 +53,7 @@ def enhance_and_noise(num_windows: int, **size: int) -> Work:
     """Prepares the enhancement of existing coarse windows and the generation of their noise, in memory."""
     made = simulator(**size)
     coarse = made.generate_coarse(num_windows)
-
-    def run() -> np.ndarray:
-        windows = made.enhance(coarse)
-        windows += made.noise.generate(num_windows, seed=0)
-        return windows
-
-    return run, num_windows
+    return lambda: made.enhance(coarse) + made.noise.generate(num_windows, seed=0), num_windows
 
 
 def generate(num_windows: int, **size: int) -> Work:
@@ -101,32 +65,7 @@ def generate(num_windows: int, **size: int) -> Work:
 def generate_to_parquet(num_windows: int, **size: int) -> Work:
     """Prepares `EnhancedSimulator.generate_to_parquet` into a temporary folder."""
     made, folder = simulator(**size), tempfile.TemporaryDirectory()
-
-    def run() -> None:
-        made.generate_to_parquet(os.path.join(folder.name, "windows.parquet"), num_windows)
-
-    return run, num_windows
-
-
-def generate_any(**size: int) -> Work:
-    """Prepares the same for a number of windows that each repetition receives. The warm-up generates 2 chunks."""
-    made, folder = simulator(**size), tempfile.TemporaryDirectory()
-    return lambda number=5_000: made.generate_to_parquet(os.path.join(folder.name, "windows.parquet"), number), 1
-
-
-def load_simulator(**size: int) -> Work:
-    """Prepares `EnhancedSimulator.load`, including the verification of checksums."""
-    folder = tempfile.TemporaryDirectory()
-    simulator(**size).save(os.path.join(folder.name, "saved"))
-    return lambda: EnhancedSimulator.load(os.path.join(folder.name, "saved")), 1
-
-
-def load_networks(**size: int) -> Work:
-    """Prepares the comparison: `keras.saving.load_model` on the same three files, without verification."""
-    folder = tempfile.TemporaryDirectory()
-    simulator(**size).save(os.path.join(folder.name, "saved"))
-    names = ("enhancer", "generator", "discriminator")
-    return lambda: [keras.saving.load_model(os.path.join(folder.name, "saved", f"{name}.keras"), compile=False) for name in names], 1
+    return lambda: made.generate_to_parquet(os.path.join(folder.name, "windows.parquet"), num_windows), num_windows
 
 
 def matrix_product(size: int = 3_200) -> Work:
@@ -136,7 +75,7 @@ def matrix_product(size: int = 3_200) -> Work:
     return lambda: product().numpy(), 2 * size**3
 
 
-def copy(num_bytes: int = 548_000_000) -> Work:
+def copy(num_bytes: int) -> Work:
     """Prepares the limit of the machine for training: all cores copy `num_bytes` in total, without allocating memory."""
     num_cores = os.cpu_count() or 1
     source, target = (np.ones((num_cores, num_bytes // 8 // num_cores), np.float32) for _ in range(2))

@@ -2,7 +2,7 @@
 
 In `python -m benchmarks.worker MODULE FUNCTION JSON`, the function receives the settings and returns a `Work`. Each line on
 standard input requests a repetition, and each answer is a line of JSON. The separate process gives each implementation its
-own libraries, threads and peak memory.
+own libraries and threads.
 """
 
 import importlib
@@ -11,19 +11,11 @@ import os
 import subprocess
 import sys
 import time
-from typing import Any, ClassVar
-
-from benchmarks.examples import minor_faults
-
-COMMAND = (sys.executable, "-m", "benchmarks.worker")
+from typing import Any
 
 
 class Worker:
     """An implementation in a separate process.
-
-    The process inherits the user's environment with the variables of `Worker.processor`. Comparisons also receive the variables
-    of `Worker.of_comparisons`, see `benchmarks.machine`. The attribute `faults` holds the number of minor page faults for each
-    unit of work, one number for each repetition.
 
     Args:
         module: Module of this package.
@@ -31,46 +23,32 @@ class Worker:
         **settings: Arguments of the function, of JSON types.
     """
 
-    processor: ClassVar[dict[str, str]] = {}
-    of_comparisons: ClassVar[dict[str, str]] = {}
-
     def __init__(self, module: str, function: str, **settings: Any):
-        command = [*COMMAND, module, function, json.dumps(settings)]
-        quiet = os.environ | {"TF_CPP_MIN_LOG_LEVEL": "3"} | self.processor | ({} if module == "ours" else self.of_comparisons)
-        self.faults: list[float] = []
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=quiet
+            [sys.executable, "-m", "benchmarks.worker", module, function, json.dumps(settings)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env=os.environ | {"TF_CPP_MIN_LOG_LEVEL": "3"},
         )
         self.skipped: str | None = self._answer().get("skipped")
 
-    def repeat(self, argument: int | None = None) -> float:
-        """Runs one repetition, of size `argument` if the work has one, and returns the seconds for each unit of work."""
-        self._process.stdin.write("\n" if argument is None else f"{argument}\n")
+    def repeat(self) -> float:
+        """Runs one repetition and returns the seconds for each unit of work."""
+        self._process.stdin.write("\n")
         self._process.stdin.flush()
-        answer = self._answer()
-        self.faults.append(answer["faults"])
-        return answer["seconds"]
+        return self._answer()["seconds"]
 
-    def close(self) -> float:
-        """Ends the process and returns its peak memory in MB."""
-        if self.skipped:
-            return 0.0
-        self._process.stdin.close()
-        peak = self._answer()["peak_mb"]
-        self._process.wait()
-        return peak
+    def close(self) -> None:
+        """Ends the process."""
+        self._process.communicate()
 
     def _answer(self) -> dict:
         line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(f"Expected an answer. Received: none from {' '.join(self._process.args[2:])}. Run that command by hand.")
         return json.loads(line)
-
-
-def peak_mb() -> float:
-    """Returns the peak resident memory of this process in MB."""
-    with open("/proc/self/status", encoding="ascii") as status:
-        return next(int(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1024
 
 
 def main(module: str, function: str, settings: str) -> None:
@@ -84,15 +62,11 @@ def main(module: str, function: str, settings: str) -> None:
         return
     run()
     answers.write("{}\n")
-    for line in sys.stdin:
-        arguments = [int(word) for word in line.split()]
-        began, faults = time.perf_counter(), minor_faults()
-        timed = run(*arguments)
-        seconds, faults = time.perf_counter() - began, minor_faults() - faults
-        if isinstance(timed, tuple):  # the work has measured its own time
-            seconds, faults = timed
-        answers.write(json.dumps({"seconds": seconds / units, "faults": faults / units}) + "\n")
-    answers.write(json.dumps({"peak_mb": peak_mb()}) + "\n")
+    for _ in sys.stdin:
+        began = time.perf_counter()
+        timed = run()
+        seconds = timed if isinstance(timed, float) else time.perf_counter() - began  # some works measure their own time
+        answers.write(json.dumps({"seconds": seconds / units}) + "\n")
 
 
 if __name__ == "__main__":

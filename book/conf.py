@@ -2,36 +2,36 @@
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from docutils.utils.math.latex2mathml import tex2mathml  # noqa: E402
+
+import enhsim_tf.keras_tools.backend  # noqa: E402, F401  starts TensorFlow before another module imports it
 from enhsim_tf import __version__  # noqa: E402
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 project, author, copyright = "enhsim_tf", "The enhsim_tf authors", "The enhsim_tf authors, Apache-2.0"  # noqa: A001
 release = __version__
-root_doc = "book/index"
-include_patterns = ["book/**", "docs/*.md", "notebooks/*.ipynb", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"]
-exclude_patterns = [".*", "build", "figures*", "**/.ipynb_checkpoints"]
+extensions = ["myst_nb", "sphinx_external_toc", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon"]
+include_patterns = ["*.md", "book/**", "docs/*.md", "notebooks/*.ipynb", "studies/**.md"]
+external_toc_path = str(ROOT / "book" / "_toc.yml")
+suppress_warnings = ["etoc.toctree"]  # the toctrees of autosummary are beside the table of contents
 
-extensions = [
-    "myst_nb",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
-    "book.mathml",
-    "book.from_readme",
-    "book.contents",
-    "book.api_pages",
-]
 nb_execution_mode = "off"  # the stored outputs are those of the full budget; `python -m notebooks.build` makes them
 nb_ipywidgets_js: dict[str, dict] = {}  # the default loads two scripts from the network
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
+
+default_role = "code"  # docstrings have code between single backticks
 autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
 autodoc_default_options = {"members": True}
+autosummary_generate = True
 napoleon_use_rtype = False
-napoleon_use_ivar = True
 add_module_names = False
 toc_object_entries = False
 
@@ -51,3 +51,18 @@ html_theme_options = {
     "use_fullscreen_button": False,
     "show_toc_level": 2,
 }
+
+
+def setup(app: "Sphinx") -> None:
+    """Renders formulas as MathML, which browsers show without a script, and so without a network."""
+    from docutils.nodes import SkipNode
+
+    def visit(as_block: bool):  # noqa: ANN202
+        def write(writer, node) -> None:  # noqa: ANN001
+            formula = tex2mathml(node.astext(), as_block=as_block)
+            writer.body.append(f'<div class="formula">{formula}</div>' if as_block else formula)
+            raise SkipNode
+
+        return write
+
+    app.add_html_math_renderer("mathml", (visit(False), None), (visit(True), None))

@@ -5,7 +5,6 @@
 #
 # - **After this lesson** you can explain the method of the paper with one figure for each step, and say at which step it fails.
 # - **You should know** what a Dense layer is, and no more. Each step has a lesson of its own, which writes the mechanism out.
-# - **Running time:** the first cell prints it.
 # - **Terms:** *telemetry*: the measurements that a vehicle sends. *Nominal*: without a fault. A *detector* learns from nominal data, gives
 #   each new window a score, and raises an alarm above a threshold. All terms: [glossary](../docs/glossary.md).
 #
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, verdict
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment(lesson="00")
+experiment = open_experiment()
 
 # %% [markdown]
 # Networks are trained in the first cell that needs them, and kept; at full budget this takes minutes, once. To try things out in
@@ -33,7 +31,7 @@ experiment = open_experiment(lesson="00")
 # The paper's section 2 numbers nine steps. Solid arrows run whenever telemetry is made, dashed ones only in training.
 
 # %%
-show(experiment, "fig01_pipeline")
+_ = show(experiment, "fig01_pipeline")
 simulator = experiment.simulator
 
 # %% [markdown]

@@ -6,7 +6,6 @@
 # - **After this lesson** you can name the nine steps of the paper, compute a window of telemetry step by step, and say what the pipeline
 #   assumes about noise.
 # - **You should know** nothing in particular; every step has a lesson of its own.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [coarse simulator](../docs/glossary.md#coarse-simulator), [enhancer](../docs/glossary.md#enhancer),
 #   [generator](../docs/glossary.md#generator-and-discriminator),
 #   [degraded mode](../docs/glossary.md#degraded-mode-severity-onset); *latent vector*: the random numbers that a generator turns into
@@ -17,12 +16,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="01")
+experiment = open_experiment()
 claim("C2", "C7")
 
 # %%

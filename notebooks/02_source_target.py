@@ -6,7 +6,6 @@
 # - **After this lesson** you can write the paper's coarse simulator, compute its error in closed form, and say how many different
 #   windows it can ever produce.
 # - **You should know** sines, mean and variance.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [coarse simulator](../docs/glossary.md#coarse-simulator), [window](../docs/glossary.md#window);
 #   [NRMSE](../docs/glossary.md#nrmse): $\sqrt{\mathrm{mean}(\hat x-x)^2}\,/\,\mathrm{sd}(x)$ for an estimate $\hat x$ of a signal $x$.
 #
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="02")
+experiment = open_experiment()
 claim("C1")
 
 # %% [markdown]

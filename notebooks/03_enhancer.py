@@ -6,7 +6,6 @@
 # - **After this lesson** you can write and train the paper's first network in plain Keras, and say from the noise alone how low its loss
 #   can fall.
 # - **You should know** what a Dense layer and an epoch are. The training pairs are explained in notebook 02.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [window](../docs/glossary.md#window), [coarse simulator](../docs/glossary.md#coarse-simulator),
 #   [enhancer](../docs/glossary.md#enhancer); *mean squared error* (MSE): $\mathrm{mean}(\hat x-x)^2$. *Held-out* windows are from a
 #   later time, on which nothing was trained.
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
 
 from enhsim_tf.common.plot_style import DASHED, ENHANCED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="03")
+experiment = open_experiment()
 claim("C1")
 
 # %% [markdown]

@@ -6,7 +6,6 @@
 # - **After this lesson** you can compute the error of an enhancer (NRMSE), solve ridge regression in closed form, choose its penalty by
 #   cross-validation over time, and find out where an enhancer stops working.
 # - **You should know** the enhancer (notebook 03) and what a matrix inverse is.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [NRMSE](../docs/glossary.md#nrmse), [ridge regression](../docs/glossary.md#ridge-regression),
 #   [nearest windows](../docs/glossary.md#nearest-windows),
 #   [degraded mode, severity, onset](../docs/glossary.md#degraded-mode-severity-onset); *roughness*: the standard deviation of the steps
@@ -19,13 +18,12 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, slider, verdict
 
 from enhsim_tf import Degraded
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment(lesson="04")
+experiment = open_experiment()
 
 # %% [markdown]
 # ## The error of an estimate

@@ -5,7 +5,6 @@
 #
 # - **After this lesson** you can test your own eye honestly, measure what it misses, and find out what a classifier looks at.
 # - **You should know** how the noise is generated (notebook 09). The quiz comes first; do not read ahead.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [AUC](../docs/glossary.md#auc): the probability that a classifier gives a generated window a higher score than a real one,
 #   0.5 by chance and 1 if it always does; [effective rank](../docs/glossary.md#effective-rank): the number of dimensions in which a set
 #   of windows varies.
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, verdict
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment(lesson="05")
+experiment = open_experiment()
 claim("C6", "C7")
 
 # %% [markdown]

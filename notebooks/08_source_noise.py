@@ -6,7 +6,6 @@
 # - **After this lesson** you can write the moving-average filter of the paper, predict from a formula what it removes and what it leaves
 #   behind, and choose its width.
 # - **You should know** mean, variance and correlation.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [moving average](../docs/glossary.md#moving-average), standard deviation (sd), *lag-k correlation*: the correlation of a
 #   series with itself $k$ samples later, $\rho_k=\mathrm{mean}\left((x_t-\bar x)(x_{t+k}-\bar x)\right)/\mathrm{var}(x)$.
 #   *White* noise has $\rho_k=0$ for all $k>0$.
@@ -17,12 +16,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="08")
+experiment = open_experiment()
 claim("C6")
 
 # %% [markdown]

@@ -6,7 +6,6 @@
 # - **After this lesson** you can write the generator and one update of it in plain Keras, and find the bottleneck of a generator by
 #   counting dimensions.
 # - **You should know** what a Dense layer and a gradient are. The moving average is explained in notebook 08.
-# - **Running time:** the first cell prints it.
 # - **Terms:** [generator and discriminator](../docs/glossary.md#generator-and-discriminator),
 #   [adversarial loss](../docs/glossary.md#adversarial-loss), [effective rank](../docs/glossary.md#effective-rank).
 #
@@ -15,12 +14,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="09")
+experiment = open_experiment()
 claim("C6")
 
 # %% [markdown]

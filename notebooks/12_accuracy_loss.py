@@ -6,7 +6,6 @@
 # - **After this lesson** you can compute accuracy and loss of a discriminator by hand, say how much of a curve is chance, and name a
 #   property of noise that no such curve shows.
 # - **You should know** the training loop (notebook 11) and the effective rank (notebook 09).
-# - **Running time:** the first cell prints it.
 # - **Terms:** *accuracy*: share of rows that are classified correctly, where a probability above 0.5 means "real".
 #   [Binary cross-entropy](../docs/glossary.md#adversarial-loss): $-\ln D$ for a real row, $-\ln(1-D)$ for a generated one.
 #   *Standard error*: the standard deviation of an estimate over repeated samples.
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import ROOT, check_answer, claim, drawing, open_experiment, say, show, verdict
 
 from enhsim_tf.common.plot_style import GENERATED, QUIET
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment(lesson="12")
+experiment = open_experiment()
 claim("C4", "C5")
 
 # %% [markdown]
@@ -125,9 +123,8 @@ assert abs(np.log(size[-1])) < {"full": 0.1, "smoke": 3.0}[experiment.settings.b
 
 # %%
 import json
-from pathlib import Path
 
-spread = json.loads(Path("../figures/spread.json").read_text())
+spread = json.loads((ROOT / "figures" / "spread.json").read_text())
 smallest, largest = spread["claims"]["C4"]["details"]["sd_ratio"]
 shares = np.array(spread["claims"]["C5"]["values"])
 say(

@@ -6,7 +6,6 @@
 # - **After this lesson** you can build a detector from principal components, set its threshold for a chosen false-alarm rate, and use it
 #   to test synthetic data.
 # - **You should know** the enhancer (notebook 03) and the noise (notebooks 08 to 11), and what a covariance is.
-# - **Running time:** the first cell prints it.
 # - **Terms:** *nominal*: without a fault. [PCA residual](../docs/glossary.md#pca-residual),
 #   [conformal threshold](../docs/glossary.md#conformal-threshold), [false-alarm rate](../docs/glossary.md#false-alarm-rate): the share
 #   of nominal windows that raise an alarm; [recall](../docs/glossary.md#recall): the share of anomalous windows that do;
@@ -17,12 +16,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, slider, verdict
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment(lesson="13")
+experiment = open_experiment()
 claim("C7")
 
 # %% [markdown]

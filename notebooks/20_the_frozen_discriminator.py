@@ -6,7 +6,6 @@
 # - **After this lesson** you can recognise the pitfall in code, explain it, write the step that works, and write the test that would
 #   have found it.
 # - **You should know** adversarial training (notebook 11).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [generator and discriminator](../docs/glossary.md#generator-and-discriminator),
 #   [adversarial loss](../docs/glossary.md#adversarial-loss); *freezing* a network: a step uses its weights and does not change them.
 #
@@ -19,12 +18,11 @@
 import warnings
 
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show
 
-experiment = open_experiment(lesson="20")
+experiment = open_experiment()
 claim("C5")
 
 # %%

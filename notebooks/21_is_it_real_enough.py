@@ -6,7 +6,6 @@
 # - **After this lesson** you can choose measures of similarity, give each a floor, and explain why a detector finds a difference that no
 #   histogram shows.
 # - **You should know** the generator and the effective rank (notebook 09), and the PCA residual (notebook 13).
-# - **Running time:** the first cell prints it.
 # - **Terms:** *power spectrum*: the variance of noise by frequency;
 #   [real-vs-real baseline](../docs/glossary.md#real-vs-real-baseline), also *floor*: the value of a measure between two sets of *real*
 #   windows; [distance of distributions](../docs/glossary.md#distance-of-distributions).
@@ -16,13 +15,12 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, verdict
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, QUIET, REAL
 from enhsim_tf.realism import measures
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, show, verdict
 
-experiment = open_experiment(lesson="21")
+experiment = open_experiment()
 claim("C6", "C8")
 
 # %% [markdown]

@@ -6,7 +6,6 @@
 # - **After this lesson** you can write a score that says how far a window is from the training windows, set a limit for it, and lower the
 #   error on faults by training on simulated ones.
 # - **You should know** the enhancer and ridge regression (notebook 04), and the conformal threshold (notebook 13).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [degraded mode, severity, onset](../docs/glossary.md#degraded-mode-severity-onset),
 #   [NRMSE](../docs/glossary.md#nrmse), [conformal threshold](../docs/glossary.md#conformal-threshold); *out of range*: unlike the windows
 #   that a model was fitted to; *rank correlation*: the correlation of the ranks of two lists, 1 if both have the same order.
@@ -17,12 +16,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, claim, drawing, open_experiment, open_study, say, slider
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import claim, drawing, open_experiment, open_findings, show_finding
 
-experiment = open_experiment(lesson="23")
+experiment = open_experiment()
 claim("C9")
 
 # %% [markdown]
@@ -252,20 +250,17 @@ assert (
 # %% [markdown]
 # ## Does it hold elsewhere?
 #
-# The same question over ten seeds, with networks trained on random faults, too. This figure is from a kept experiment; nothing is trained
-# here.
-
-# %%
-found, tables = open_findings()
-show_finding(found, "degraded_modes")
-
-# %% [markdown]
+# The same question over ten seeds, with networks trained on random faults, too. This figure is from a study; nothing is trained here.
+#
+# ![Error against severity for each degraded mode and six enhancers](../studies/robustness/results/degraded_modes.png)
+#
 # *What to see:* in the mean over the shaded range, the curves that have seen faults lie below the others, though not in each mode:
 # friction gains little, and with dropout the enhanced signal can be no better than the coarse one. Outside, most of them rise. Ridge
 # regression comes near the network in most modes, and is below it in some. On nominal windows, a network that has seen as many nominal
 # windows and no faults is better:
 
 # %%
+found, _ = open_study("robustness")
 errors = found["modes"]["nrmse"]
 for method in ("identity", "paper", "more windows", "randomised", "ridge", "ridge, randomised"):
     print(

@@ -6,7 +6,6 @@
 # - **After this lesson** you can align a simulator with a window in clock, level and gain, use what is left as a detector, and compare
 #   detectors fairly with scores of one line.
 # - **You should know** ridge regression (notebook 04), the PCA residual and the conformal threshold (notebooks 13 and 22).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [residual](../docs/glossary.md#residual), [false-alarm rate](../docs/glossary.md#false-alarm-rate),
 #   [NRMSE](../docs/glossary.md#nrmse), [AUC-PR](../docs/glossary.md#auc-pr); *own threshold*: set without knowing the time that is
 #   judged; *matched threshold*: set such that all detectors have the same false alarms there.
@@ -16,12 +15,11 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, drawing, open_experiment, open_study, say, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import drawing, open_experiment, open_labelled, open_residual, show_finding
 
-experiment = open_experiment(lesson="24")  # nothing of the paper's example is used here
+experiment = open_experiment()  # of the paper's example, only the budget is used here
 is_full = experiment.settings.budget == "full"
 
 # %% [markdown]
@@ -403,18 +401,16 @@ if is_full:
 # ## A real spacecraft
 #
 # The study used six channels of NASA's SMAP satellite, published with the anomalies that its operators labelled
-# ([docs/spacecraft.md](../docs/spacecraft.md)). Nothing is computed here; what was found is kept. First: is the enhanced signal nearer to
+# ([study](../studies/spacecraft/README.md)). Nothing is computed here; what was found is kept. First: is the enhanced signal nearer to
 # the telemetry than the square wave? All are aligned with each window, as above.
-
-# %%
-found, _ = open_labelled()
-show_finding(found, "errors")
-
-# %% [markdown]
+#
+# ![Median error of the coarse, ridge and enhanced signal on each channel](../studies/spacecraft/results/errors.png)
+#
 # *What to see:* on every channel, the enhanced signal (blue dot) is nearer than the square wave. Ridge regression that is aligned by its
 # own shape (hollow triangle) is as near; this gain needs no network.
 
 # %%
+found, tables = open_study("spacecraft")
 errors = {name: about["nrmse"] for name, about in found["channels"].items()}
 differences = {name: each["enhanced"] - each["ridge, own clock"] for name, each in errors.items()}
 alike = [name for name, difference in differences.items() if abs(difference) < 0.01]
@@ -434,7 +430,9 @@ for each in errors.values():
 # detector were set after the results of one seed on the judged time had been seen.
 
 # %%
-residual_rows = open_residual()
+from studies.spacecraft.residual import summarise
+
+residual_rows = summarise(tables["residual"])
 rows = {f"trained on: {name}": about for name, about in found["arms"].items()}
 rows |= {f"one line: {name}": about for name, about in found["controls"].items()}
 summary = {

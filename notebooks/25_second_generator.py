@@ -7,7 +7,6 @@
 #   network that maximises a likelihood), and compare generators by measures with a floor.
 # - **You should know** the generator and discriminator (notebooks 09 and 10), the effective rank and the real-vs-real baseline
 #   (notebook 21).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [effective rank](../docs/glossary.md#effective-rank), [AUC](../docs/glossary.md#auc),
 #   [real-vs-real baseline](../docs/glossary.md#real-vs-real-baseline), also *floor*; *autoregression*: each sample is predicted from the
 #   samples before it; *likelihood*: the probability density that a model gives to data that it did not generate.
@@ -18,13 +17,12 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, drawing, open_experiment, open_study, say
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, ENHANCED, GENERATED, QUIET, REAL
 from enhsim_tf.realism import measures, two_sample
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import drawing, open_experiment, open_noise
 
-experiment = open_experiment(lesson="25")
+experiment = open_experiment()
 is_full = experiment.settings.budget == "full"
 number = 1_000 if is_full else 60
 window = 500
@@ -259,7 +257,7 @@ np.testing.assert_allclose(mine, tiny.generate(5, 3), rtol=1e-2, atol=1e-3)
 # a moving average extracts (notebook 08), and is compared with that.
 
 # %%
-from enhsim_tf.reproduce.noise_gallery import GALLERY
+from studies.common.noise_gallery import GALLERY
 
 wheel = GALLERY["interference"].draw(2 * number * window, np.random.default_rng(7)).reshape(2, number, window)
 parts = [experiment.data.windows("train", number, "second generator"), experiment.data.windows("test", None)]
@@ -365,7 +363,7 @@ if is_full:
 # noise (means over the seeds that each model has):
 
 # %%
-published = open_noise()
+published, _ = open_study("noise_models")
 rungs = (
     "Gaussian",
     "autoregression",

@@ -7,7 +7,6 @@
 #   a random split of overlapping windows), and say what a network must find to be worth its training.
 # - **You should know** ridge regression with cross-validation over blocks of time (notebook 04), the PCA residual and the conformal
 #   threshold (notebook 13).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [NRMSE](../docs/glossary.md#nrmse), [ridge regression](../docs/glossary.md#ridge-regression),
 #   [nearest windows](../docs/glossary.md#nearest-windows), [residual](../docs/glossary.md#residual); a *baseline* is a simple method that a
 #   complicated one must beat; a *block of time* is a contiguous stretch of telemetry.
@@ -17,13 +16,12 @@
 
 # %%
 import numpy as np
+from lesson_tools import check_answer, drawing, open_experiment, open_study, say, slider
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
 from enhsim_tf.enhancer import ridge as packaged
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import drawing, open_battery, open_experiment, open_factorial
 
-experiment = open_experiment(lesson="26")
+experiment = open_experiment()
 is_full = experiment.settings.budget == "full"
 
 # %% [markdown]
@@ -478,13 +476,13 @@ assert verdicts["random fifths"] and not verdicts["blocks of time"]
 # %% [markdown]
 # ## What published runs say
 #
-# Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([docs/battery.md](../docs/battery.md)): near
+# Two studies of this project compare enhancers. The *battery* is a real pair of simulators ([study](../studies/battery/README.md)): near
 # 1 C and at 15 °C it is *gentle*; in the *hard* regime, at −5 °C, it is discharged deeply, and the map is less linear. The *factorial
 # experiment* combines windows, extraction, enhancer and generator in all ways and measures false alarms
-# ([docs/what_holds.md](../docs/what_holds.md)).
+# ([report](../docs/report.md)).
 
 # %%
-battery = open_battery()
+battery, _ = open_study("battery")
 chosen = ("coarse itself", "nearest windows", "paper's network", "ridge, all columns", "ridge and network")
 print(f"{'NRMSE on nominal orbits':26}" + "".join(f"{regime:>18}" for regime in battery["regimes"]))
 for name in chosen:
@@ -501,7 +499,7 @@ for regime, found in battery["regimes"].items():
     )
 
 # %%
-factorial = open_factorial()
+factorial, _ = open_study("factorial")
 contrasts = factorial["contrasts"]
 told = {
     "the network instead of ridge regression, both with residual windows": "network, ridge",

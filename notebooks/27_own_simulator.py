@@ -6,7 +6,6 @@
 # - **After this lesson** you can pair a simulator with telemetry, judge enhancers on held-out time, and see what the difference from the
 #   enhanced run shows of a fault, and what it does not.
 # - **You should know** ridge regression (notebook 04) and the conformal threshold (notebook 13).
-# - **Running time:** the first cell prints it; most of it is for the networks that the report compares.
 # - **Terms:** [window](../docs/glossary.md#window), [NRMSE](../docs/glossary.md#nrmse),
 #   [residual](../docs/glossary.md#residual): telemetry minus enhanced run. A *block of time* is a contiguous stretch: neighbouring windows
 #   overlap, so that only blocks of time can be held out honestly.
@@ -14,23 +13,17 @@
 # **What the paper says** (section 1): the enhanced simulator should "perform similarly to much more sophisticated simulators". The
 # paper's example has a square wave as its simulator. Here the pair is real: a satellite's battery over low orbits, with a coarse
 # single-particle model as the simulator and a Doyle-Fuller-Newman model with sensor noise in the place of the vehicle
-# ([docs/battery.md](../docs/battery.md)).
+# ([battery study](../studies/battery/README.md)).
 
 # %%
-from pathlib import Path
-
 import numpy as np
+from lesson_tools import ROOT, check_answer, drawing, say
 
 from enhsim_tf import clean, read_source
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
-from enhsim_tf.reproduce.lesson import check_answer, say
-from enhsim_tf.reproduce.notebook import drawing, open_experiment
 
-experiment = open_experiment(
-    lesson="27"
-)  # nothing of the paper's example is used here; it tells the running time
-folder = Path("..") / "examples" / "battery"
+folder = ROOT / "examples" / "battery"
 cleaned = clean(read_source(folder / "telemetry.csv")["volts"])
 telemetry, simulator = cleaned.longest, read_recording(folder / "simulator.csv")
 say(

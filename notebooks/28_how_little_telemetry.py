@@ -7,7 +7,6 @@
 #   the same few windows, and read a learning curve with a rule that was fixed before the experiment.
 # - **You should know** ridge regression by blocks of time (notebook 04), the PCA residual and the conformal threshold (notebook 13), and
 #   residual windows (notebook 26).
-# - **Running time:** the first cell prints it.
 # - **Terms:** [conformal threshold](../docs/glossary.md#conformal-threshold), [residual](../docs/glossary.md#residual); a *learning curve*
 #   is a result over the amount of data; *excess*: the false-alarm rate minus the one that the threshold was set for; *cross-fitting*: each
 #   window is scored by a model that was fitted to the other blocks of time; *recall at the real rate*: the share of anomalies found when
@@ -21,16 +20,15 @@
 import dataclasses
 
 import numpy as np
+from lesson_tools import check_answer, drawing, open_experiment, open_study, say, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.enhancer import ridge as packaged
-from enhsim_tf.reproduce.learning_curve.cells import World
-from enhsim_tf.reproduce.lesson import check_answer, say, slider
-from enhsim_tf.reproduce.notebook import drawing, open_curve, open_experiment, show_finding
+from studies.few_windows.cells import World
 
-experiment = open_experiment(lesson="28")
+experiment = open_experiment()
 is_full = experiment.settings.budget == "full"
 
 # %% [markdown]
@@ -265,9 +263,11 @@ slider(draw, "number of real windows", NUM_REAL, shown=NUM_REAL[:2])
 # where its excess is at most half of that of the real windows, if these have an excess of more than half a point, and its recall at the
 # real rate is at most 3 points lower. Real windows *suffice* from the number on from which their excess stays at most half a point. The
 # methods are described in [docs/noise.md](../docs/noise.md). Each sentence below is computed from the table.
+#
+# ![False alarms and recall over the number of real windows](../studies/few_windows/results/learning_curve.png)
 
 # %%
-from enhsim_tf.reproduce.learning_curve.findings import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
+from studies.few_windows.findings import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
 
 excess = {name: values - RATE for name, values in alarms.items()}
 pays_here = [
@@ -290,11 +290,9 @@ say(
 )
 
 # %%
-found, rows = open_curve()
-show_finding(found, "learning_curve")
+found, tables = open_study("few_windows")
 
 
-# %%
 def in_words(numbers):
     return ", ".join(f"{number:,}" for number in numbers) or "none of the numbers tried"
 

@@ -1,1 +1,1 @@
-"""The notebooks that teach the paper, figure by figure; the `.py` is the source of the `.ipynb` beside it."""
+"""Lessons that teach the paper, figure by figure; the `.py` is the source of the `.ipynb` beside it."""

@@ -1,45 +1,32 @@
-"""`python -m notebooks.build`: executes the sources `NN_name.py` and writes `NN_name.ipynb` beside them.
+"""`python -m notebooks.build 04 05`: executes lessons at full budget and writes each notebook beside its source.
 
-Each notebook is stamped with the checksums of its source and of the findings that it shows, and the budget it ran at.
-`--check` executes nothing and says which notebooks are no longer what these are; exit code 1 if there is one.
-`--prose` takes new prose into executed notebooks whose code is unchanged, and executes nothing either.
+The scripts `NN_name.py` are the sources. Run `python -m enhsim_tf.reproduce` first: a lesson then finds every stage in the cache, and no
+progress bar stays in its notebook. If only prose has changed, `jupytext --update --to ipynb NN_name.py` keeps the outputs.
 """
 
 import argparse
-import json
 import os
 import re
 import sys
-import time
 from pathlib import Path
 
 import jupytext
-import nbclient
 import nbformat
-from jupyter_client.manager import KernelManager
+from nbclient import NotebookClient
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file, sha256
-from enhsim_tf.reproduce.lesson import STATIC, TIMES
+from notebooks.lesson_tools import BUDGET, FULL, ROOT, STATIC
 
 FOLDER = Path(__file__).parent
-STAMP = "enhsim_tf"  # the notebook's metadata that hold its stamp
-MAX_BYTES = 1_000_000
-FINDINGS = {
-    "open_findings(": "robustness",
-    "open_labelled(": "labelled",
-    "open_residual(": "labelled/residual.csv",
-    "open_curve(": "learning_curve",
-    "open_battery(": "battery",
-    "open_factorial(": "factorial",
-    "open_noise(": "noise",
-}  # what a source calls, and whose findings it shows: those of an experiment, or one of its tables
+STAMP = "enhsim_tf"  # the metadata of a notebook that hold its budget and the checksums of the findings that it shows
+STUDY = re.compile(r'open_study\("(\w+)"\)')
 SOLUTION = re.compile(r"```python\n(.*?)```", re.DOTALL)  # the code of a folded solution
 CHECK = "check_answer("  # what a cell calls that checks an answer
-TIMEOUT_S = 1_800  # for one cell: a fresh clone trains in it
+TIMEOUT_S = 1_800  # for one cell: in a fresh clone it trains
 
 
 def sources() -> list[Path]:
-    """The notebooks' sources, in the order of their numbers."""
+    """The sources of the lessons, in the order of their numbers."""
     return sorted(FOLDER.glob("[0-9][0-9]_*.py"))
 
 
@@ -50,9 +37,13 @@ def read(source: Path) -> nbformat.NotebookNode:
         "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
         "language_info": {"name": "python"},
     }
+    _number_cells(notebook)
+    return notebook
+
+
+def _number_cells(notebook: nbformat.NotebookNode) -> None:
     for number, cell in enumerate(notebook.cells):
         cell.id = f"cell-{number:02}"
-    return notebook
 
 
 def solve(notebook: nbformat.NotebookNode) -> None:
@@ -76,25 +67,15 @@ def solve(notebook: nbformat.NotebookNode) -> None:
         at = notebook.cells.index(check) + 1
         added = [nbformat.v4.new_code_cell(text, metadata={"solved": True}) for text in (code, check.source)]
         notebook.cells[at:at] = added
-    for number, cell in enumerate(notebook.cells):
-        cell.id = f"cell-{number:02}"
+    _number_cells(notebook)
 
 
-def execute(
-    source: Path,
-    budget: str,
-    cache: Path | None = None,
-    kernel: KernelManager | None = None,
-    solved: bool = False,
-) -> nbformat.NotebookNode:
-    """Executes a source in a kernel, in the folder of the notebooks as Jupyter does, and stamps it.
+def execute(source: Path, budget: str = FULL, solved: bool = False) -> nbformat.NotebookNode:
+    """Executes a source in a kernel of its own, in the folder of the lessons, as Jupyter does.
 
     Args:
         source: One of `sources()`.
         budget: `full` or `smoke`.
-        cache: Where finished stages are kept; None keeps them where `reproduce` does.
-        kernel: A kernel that goes on to live, with what it has imported; it was started, if at all, for this budget and
-            cache. The notebook finds no name of an earlier one. None: a kernel of the notebook's own.
         solved: Whether the exercises are solved, see `solve`.
 
     Raises:
@@ -103,197 +84,68 @@ def execute(
     notebook = read(source)
     if solved:
         solve(notebook)
-    found = os.pathsep.join(path for path in (str(FOLDER.parent), os.environ.get("PYTHONPATH")) if path)
-    environment = os.environ | {"ENHSIM_TF_BUDGET": budget, STATIC: "1", "PYTHONPATH": found}
-    environment |= {} if cache is None else {"ENHSIM_TF_CACHE": str(cache)}
-    client = nbclient.NotebookClient(
+    client = NotebookClient(
         notebook,
-        km=kernel,
         timeout=TIMEOUT_S,
         kernel_name="python3",
-        resources={"metadata": {"path": str(source.parent)}},
+        resources={"metadata": {"path": str(FOLDER)}},
         record_timing=False,
         coalesce_streams=True,
         extra_arguments=["--IPKernelApp.log_level=ERROR"],
     )
-    if kernel is not None and kernel.has_kernel:
-        _forget(kernel)
-    client.execute(env=environment, cleanup_kc=kernel is None)
-    notebook.metadata["language_info"] = {
-        "name": "python"
-    }  # what the kernel says of itself differs from machine to machine
-    notebook.metadata[STAMP] = {
-        "source": source.name,
-        "sha256": sha256(source),
-        "findings": findings(source),
-        "budget": budget,
-    }
+    client.execute(env=os.environ | {BUDGET: budget, STATIC: "1"})
+    notebook.metadata["language_info"] = {"name": "python"}  # what the kernel adds differs between machines
+    notebook.metadata[STAMP] = {"budget": budget, "findings": findings(source)}
     return notebook
 
 
-def _forget(kernel: KernelManager) -> None:
-    """Takes all names that a notebook has left from its kernel."""
-    channels = kernel.client()
-    channels.start_channels()
-    try:
-        channels.wait_for_ready()
-        reply = channels.execute("%reset -f", reply=True, timeout=60)
-        if reply["content"]["status"] != "ok":
-            raise RuntimeError(f"The kernel keeps its names: {reply['content']}")
-    finally:
-        channels.stop_channels()
-
-
-def findings(source: Path, figures: Path = FOLDER.parent / "figures") -> dict[str, str]:
-    """Checksums of the findings of experiments that a source shows, by the experiment's name."""
-    text = source.read_text(encoding="utf-8")
-    shown = [name for call, name in FINDINGS.items() if call in text]
-    return {
-        name: sha256(figures / (name if Path(name).suffix else f"{name}/findings.json")) for name in shown
-    }
+def findings(source: Path) -> dict[str, str]:
+    """Checksums of the findings of studies that a lesson opens, by the name of the study."""
+    opened = sorted(set(STUDY.findall(source.read_text(encoding="utf-8"))))
+    return {name: sha256(ROOT / "studies" / name / "results" / "findings.json") for name in opened}
 
 
 def faults(source: Path) -> list[str]:
-    """What is wrong with the notebook beside a source; nothing if it is the source, executed at full budget."""
+    """Why the notebook beside a source is not this source, executed at full budget; empty if it is."""
     path = source.with_suffix(".ipynb")
     if not path.is_file():
-        return ["not there"]
-    notebook, expected, found = nbformat.read(path, as_version=4), read(source), []
+        return ["there is no notebook"]
+    notebook, wanted = nbformat.read(path, as_version=4), read(source)
     stamp = notebook.metadata.get(STAMP, {})
-    if stamp.get("sha256") != sha256(source) or [cell.source for cell in notebook.cells] != [
-        cell.source for cell in expected.cells
-    ]:
-        found.append("stale: its source has changed")
-    if stamp.get("findings", {}) != findings(source):
-        found.append("stale: the findings that it shows have changed")
-    if stamp.get("budget") != "full":
-        found.append(f"executed at {stamp.get('budget', 'no')} budget")
-    if not all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code"):
-        found.append("not executed from first to last cell")
-    if path.stat().st_size >= MAX_BYTES:
-        found.append(f"{path.stat().st_size:,} bytes, {MAX_BYTES:,} or more")
-    return found
-
-
-def take_prose(source: Path) -> bool:
-    """Takes the prose of a source into the executed notebook beside it, whose outputs stay.
-
-    Args:
-        source: One of `sources()`.
-
-    Returns:
-        Whether the notebook has changed.
-
-    Raises:
-        ValueError: If its code or the findings that it shows have changed, so that it must be executed.
-    """
-    path = source.with_suffix(".ipynb")
-    executed, wanted = nbformat.read(path, as_version=4), read(source)
-    old, new = ([cell for cell in each.cells if cell.cell_type == "code"] for each in (executed, wanted))
-    if [cell.source for cell in old] != [cell.source for cell in new]:
-        raise ValueError("its code has changed: execute it")
-    if executed.metadata[STAMP].get("findings", {}) != findings(source):
-        raise ValueError("the findings that it shows have changed: execute it")
-    for before, after in zip(old, new, strict=True):
-        after.outputs, after.execution_count = before.outputs, before.execution_count
-    wanted.metadata = executed.metadata
-    wanted.metadata[STAMP]["sha256"] = sha256(source)
-    if wanted == executed:
-        return False
-    with replace_file(path) as temporary:
-        nbformat.write(wanted, temporary)
-    return True
-
-
-def take_all_prose() -> int:
-    """Takes the prose of all sources, prints what became of each, and returns the exit code."""
-    failed = False
-    for source in sources():
-        try:
-            said = "new prose" if take_prose(source) else "unchanged"
-        except ValueError as error:
-            said, failed = str(error), True
-        print(f"{source.stem:32} {said}")
-    return int(failed)
-
-
-def check() -> int:
-    """Prints what is wrong with each notebook and returns the exit code."""
-    wrong = {source.stem: faults(source) for source in sources()}
-    lost = set(FOLDER.glob("*.ipynb")) - {source.with_suffix(".ipynb") for source in sources()}
-    wrong |= {path.stem: ["it has no source"] for path in lost}
-    for name, reasons in wrong.items():
-        print(f"{name:32} {'; '.join(reasons) or 'current'}")
-    return int(any(wrong.values()))
-
-
-def keep_time(source: Path, budget: str, seconds: float) -> None:
-    """Keeps how long a notebook took, which its first cell tells when it is executed next."""
-    path = FOLDER / TIMES
-    took = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    took.setdefault(source.stem[:2], {})[budget] = round(seconds)
-    with replace_file(path) as temporary:
-        temporary.write_text(json.dumps(took, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-
-
-def build(budget: str, only: str | None, solved: bool = False) -> int:
-    """Executes the notebooks, all or the one that is named by its number.
-
-    A smoke build goes to `smoke/`, and one with solved exercises to `solved/`.
-    """
-    chosen = [source for source in sources() if only in (None, source.stem, source.stem[:2])]
-    if not chosen:
-        print(
-            f"error: Expected --only with one of {', '.join(source.stem[:2] for source in sources())}. Received: {only!r}.",
-            file=sys.stderr,
-        )
-        return 2
-    from enhsim_tf.reproduce.notebook import open_experiment, prepare
-
-    prepare(open_experiment(budget))  # so that no progress bar of a training stays in a notebook
-    folder = FOLDER
-    if solved or budget == "smoke":
-        folder = make_folder(FOLDER.parent / ("solved" if solved else "smoke"))
-    for source in chosen:
-        began = time.perf_counter()
-        notebook = execute(source, budget, solved=solved)
-        if not solved:
-            keep_time(source, budget, time.perf_counter() - began)
-        path = folder / source.with_suffix(".ipynb").name
-        with replace_file(path) as temporary:
-            nbformat.write(notebook, temporary)
-        print(
-            f"{source.stem:32} {time.perf_counter() - began:6.1f} s {path.stat().st_size / 1e3:6.0f} kB",
-            flush=True,
-        )
-    return 0
+    wrong = {
+        "its source has changed": [cell.source for cell in notebook.cells]
+        != [cell.source for cell in wanted.cells],
+        "the findings that it shows have changed": stamp.get("findings") != findings(source),
+        "it was not executed at full budget": stamp.get("budget") != FULL,
+        "a cell was not executed": not all(
+            cell.execution_count for cell in notebook.cells if cell.cell_type == "code"
+        ),
+    }
+    return [reason for reason, is_true in wrong.items() if is_true]
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command."""
+    known = {source.stem[:2]: source for source in sources()}
     parser = argparse.ArgumentParser(prog="python -m notebooks.build", description=__doc__.split("\n\n")[0])
     parser.add_argument(
-        "--budget",
-        choices=("full", "smoke"),
-        default="full",
-        help="smoke writes into smoke/ (default: full)",
-    )
-    parser.add_argument("--only", metavar="NN", help="one notebook, for example 04")
-    parser.add_argument(
-        "--check", action="store_true", help="say which notebooks are stale, and execute nothing"
+        "lessons", nargs="*", metavar="NN", help="numbers of lessons (default: all), for example 04"
     )
     parser.add_argument(
-        "--prose",
-        action="store_true",
-        help="take new prose into notebooks whose code is unchanged, and execute nothing",
-    )
-    parser.add_argument(
-        "--solved", action="store_true", help="with the exercises solved, for lecturers; writes into solved/"
+        "--solved", action="store_true", help="with solved exercises, for lecturers; into solved/"
     )
     options = parser.parse_args(arguments)
-    if options.check:
-        return check()
-    return take_all_prose() if options.prose else build(options.budget, options.only, options.solved)
+    if unknown := set(options.lessons) - set(known):
+        parser.error(
+            f"Expected numbers of lessons: {', '.join(known)}. Received: {', '.join(sorted(unknown))}."
+        )
+    folder = make_folder(ROOT / "solved") if options.solved else FOLDER
+    for number in options.lessons or known:
+        notebook = execute(known[number], solved=options.solved)
+        with replace_file(folder / known[number].with_suffix(".ipynb").name) as temporary:
+            nbformat.write(notebook, temporary)
+        print(f"{known[number].stem} written", flush=True)
+    return 0
 
 
 if __name__ == "__main__":

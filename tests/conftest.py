@@ -30,6 +30,26 @@ from enhsim_tf.keras_tools.tensorflow_settings import apply_settings  # noqa: E4
 apply_settings()  # tests that import Keras directly use the package's settings
 
 ROOT = Path(__file__).parents[1]
+SLOW = "--slow"
+
+
+def pytest_addoption(parser):
+    parser.addoption(SLOW, action="store_true", help="also run the tests that are marked as slow")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leaves the slow tests out, unless they are asked for."""
+    if config.getoption(SLOW):
+        return
+    left = [item for item in items if item.get_closest_marker("slow")]
+    if left:
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if item not in set(left)]
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if not config.getoption(SLOW):
+        terminalreporter.write_line(f"The slow tests were left out. All tests: python -m pytest {SLOW}")
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -52,7 +52,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="fit an enhanced simulator to nominal telemetry",
         description="Fits an enhanced simulator to each channel of nominal telemetry. Its coarse simulator is a square wave, or the commands in an\n"
         "array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
-        "report evaluates the simulator on it. A fit takes about a minute and a half per channel on two cores.",
+        "report evaluates the simulator on it.",
         epilog=EXIT,
         **form,
     )
@@ -79,7 +79,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         default="best",
         metavar="MODEL",
         help=f"noise model: {', '.join(name.replace(' ', '-') for name in NOISES)} (default: best, the simplest one that held-out telemetry does not "
-        "tell from real noise; paper: the GAN of the paper)",
+        "tell from real noise)",
     )
     fit.add_argument(
         "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"
@@ -173,7 +173,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--engine", choices=("local", "ray"), help="run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS"
     )
     large.add_argument(
-        "--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models (docs/scenarios.md)"
+        "--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models (docs/large_data_sets.md)"
     )
     _add_seed(generate, None)  # None shows that the option was not given: a scenario file may contain the seed
 

@@ -52,8 +52,8 @@ def run_generate(options: argparse.Namespace) -> int:
         write_series_labelled,
         write_windows_labelled,
     )
+    from enhsim_tf.datasets.mix import make_mix
     from enhsim_tf.datasets.places import parse_place, split_limits
-    from enhsim_tf.datasets.scenario_file import make_mix
 
     scenarios = [parse_scenario(text) for text in options.scenario]
     if options.windows is None and options.continuous is None:

@@ -9,8 +9,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel.engines import parse_workers
 from enhsim_tf.datasets.generate import generate_data_set
 from enhsim_tf.datasets.labelled_windows import parse_scenario
+from enhsim_tf.datasets.mix import Mix, ModelShare, make_mix
 from enhsim_tf.datasets.plan import Plan, make_plan
-from enhsim_tf.datasets.scenario_file import Mix, ModelShare, make_mix, read_mix
 from enhsim_tf.enhanced_simulator.model_folder import chosen_of, folder_of, models_of
 
 
@@ -46,6 +46,8 @@ def make_plans(options: argparse.Namespace) -> dict[Path, Plan]:
             "Expected scenarios in one place. Received: --scenarios with --scenario or --nominal-share. Put them all in the file."
         )
     else:
+        from enhsim_tf.datasets.scenario_file import read_mix  # loads pydantic
+
         mix = read_mix(options.scenarios)
     num_windows = _one("windows", mix.num_windows, options.windows)
     seed = _one("seed", mix.seed, options.seed, 0)

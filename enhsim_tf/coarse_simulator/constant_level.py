@@ -4,6 +4,9 @@ It simulates nothing but the level. Everything else that the telemetry does is n
 simulator generates noise around levels that occurred in the telemetry.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
@@ -49,5 +52,14 @@ class ConstantLevel(SquareWaveSimulator):
         return np.asarray(time_s, np.float64)
 
     def get_config(self) -> dict:
-        """The settings as plain JSON types, from which `SquareWaveSimulator.from_config` restores the simulator."""
+        """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
         return {"level": self.level, "spread": self.spread, "period_s": self.waves[0].period_s}
+
+
+def waves_or_level(config: Mapping[str, Any]) -> SquareWaveSimulator:
+    """Restores a simulator from the output of `get_config`: a constant level, or square waves.
+
+    Args:
+        config: The settings.
+    """
+    return ConstantLevel(**config) if "level" in config else SquareWaveSimulator.from_config(config)

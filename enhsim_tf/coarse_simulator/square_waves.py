@@ -178,10 +178,6 @@ class SquareWaveSimulator:
     @classmethod
     def from_config(cls, config: dict) -> "SquareWaveSimulator":
         """Restores a simulator from the output of `get_config`."""
-        if "level" in config:
-            from enhsim_tf.coarse_simulator.constant_level import ConstantLevel  # imported here, because it is derived from this class
-
-            return ConstantLevel(**config)
         return cls([SquareWave(**wave) for wave in config["waves"]])
 
 

@@ -1,22 +1,16 @@
 """Atomic writing of files and folders, and checksums.
 
-Everything the package writes goes to a temporary path beside its destination and is renamed when it is complete. A killed
-process therefore leaves either the old content or the new content, never a part of it. On Linux, a folder that replaces
-another one is exchanged with it in a single step, if the file system supports this. Elsewhere the exchange takes two renames:
-if the process is killed between them, the old content remains under a temporary name, and the next call of `replace_folder` or
-`remove_leftovers` restores it.
+Everything the package writes goes to a temporary path beside its destination and is renamed when it is complete. A folder that
+replaces another one takes two renames. A killed process leaves the old content or the new content, never a part of it; if it is killed
+between the two renames, the next call of `replace_folder` or `remove_leftovers` brings the old content back.
 """
 
 import contextlib
-import ctypes
-import functools
 import hashlib
 import json
 import os
 import re
 import shutil
-import socket
-import sys
 import time
 import urllib.parse
 import uuid
@@ -24,25 +18,34 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import filelock
+
 from enhsim_tf.common.errors import InputError
 
-_LEFT = re.compile(r"\.(?P<name>.*?)\.(?P<host>[\w-]+)\.(?P<process>\d+)\.[0-9a-f]{8}(?P<suffix>\.\w+|)")
-_MAX_CHARACTERS = 160  # of an encoded name; two temporary names add 40 each, and most file systems allow 255
+_LEFT = re.compile(r"\.(?P<name>.+)\.(?P<kind>[0-9a-f]{8}|old)\.enhsim_tf(?P<suffix>\.\w+)?")
+_MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names reserved by Windows
-_HERE, _RENAME_EXCHANGE = -100, 2  # AT_FDCWD and RENAME_EXCHANGE, see renameat2(2)
-_OLD_S = 24 * 3600  # every running process writes at least once in this time
+_OLD_S = 24 * 3600  # no file takes longer to write
 
 
-def _temporary(path: Path, kind: str = "tmp") -> Path:
-    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}.{uuid.uuid4().hex[:8]}.{kind}")
+def _beside(path: Path, kind: str, suffix: str = "") -> Path:
+    return path.with_name(f".{path.name}.{kind}.enhsim_tf{suffix}")
 
 
-@functools.cache
-def _host() -> str:
-    """Identifies the machine and container in which a process number is valid: at most 17 characters, without dots."""
-    name, container = socket.gethostname(), "/proc/self/ns/pid"
-    identity = name + (os.readlink(container) if os.path.islink(container) else "")
-    return f"{re.sub(r'[^A-Za-z0-9-]', '-', name)[:8]}-{hashlib.sha256(identity.encode(errors='replace')).hexdigest()[:8]}"
+def _temporary(path: Path, suffix: str = "") -> Path:
+    return _beside(path, uuid.uuid4().hex[:8], suffix)
+
+
+@contextlib.contextmanager
+def _locked(path: Path, blocking: bool = True) -> Iterator[None]:
+    """Holds a lock beside a path. The operating system releases it when this process ends for any reason."""
+    lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), blocking=blocking)
+    with lock:
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                os.unlink(lock.lock_file)  # while it is held: filelock notices that the file is another, and tries again
 
 
 def encode_name(name: str) -> str:
@@ -90,7 +93,7 @@ def make_folder(path: str | os.PathLike) -> Path:
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = _temporary(path / "probe.tmp")
+        probe = _temporary(path / "probe")
         probe.touch()
         probe.unlink()
     except OSError as error:
@@ -106,7 +109,7 @@ def replace_file(path: str | os.PathLike) -> Iterator[Path]:
         path: The file to write.
     """
     path = Path(path)
-    temporary = _temporary(path).with_suffix(path.suffix)  # some writers choose the format by the suffix
+    temporary = _temporary(path, path.suffix)  # some writers choose the format by the suffix
     try:
         yield temporary
         os.replace(temporary, path)
@@ -126,47 +129,31 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
     path = Path(path)
     make_folder(path.parent)
     remove_leftovers(path.parent, path.name)
-    temporary, old = _temporary(path), _temporary(path, "old")
-    temporary.mkdir()
-    try:
-        yield temporary
-        while True:
-            if os.path.lexists(path):
-                if keep is not None and keep(path):
-                    return
-                if _exchange(temporary, path):
-                    return
-                with contextlib.suppress(FileNotFoundError):  # another process has moved it in the meantime
-                    os.replace(path, old)
-            try:
-                os.replace(temporary, path)
-                return
-            except OSError:
-                if not os.path.lexists(path):
-                    raise
-                _remove(old)  # another process has written the folder in the meantime
-    finally:
-        _remove(temporary)
-        if os.path.lexists(old):
-            if os.path.lexists(path):
-                _remove(old)
-            else:  # interrupted between the two renames: only the old content exists
-                os.replace(old, path)
+    temporary, old = _temporary(path), _beside(path, "old")
+    with _locked(temporary):  # held as long as this process writes
+        try:
+            temporary.mkdir()
+            yield temporary
+            with _locked(old):
+                _restore(path)
+                if keep is None or not os.path.lexists(path) or not keep(path):
+                    try:
+                        if os.path.lexists(path):
+                            os.replace(path, old)
+                        os.replace(temporary, path)
+                    finally:
+                        _restore(path)
+        finally:
+            _remove(temporary)
 
 
-def _exchange(first: Path, second: Path) -> bool:
-    """Exchanges two files or folders in one step, so that readers find a complete one at every moment.
-
-    Returns:
-        Whether they were exchanged. Not every system and file system supports this.
-    """
-    if not sys.platform.startswith("linux"):
-        return False
-    try:
-        rename = ctypes.CDLL(None, use_errno=True).renameat2
-    except (OSError, AttributeError):  # a C library without it
-        return False
-    return rename(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _RENAME_EXCHANGE) == 0
+def _restore(path: Path) -> None:
+    """Brings the old content back if there is no new content, and otherwise removes it."""
+    old = _beside(path, "old")
+    if os.path.lexists(path):
+        _remove(old)
+    elif os.path.lexists(old):
+        os.replace(old, path)
 
 
 def _remove(path: Path) -> None:
@@ -177,64 +164,29 @@ def _remove(path: Path) -> None:
 
 
 def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
-    """Removes the temporary files of killed processes, and restores old content that they had only moved aside.
+    """Removes what killed processes left, and restores old content that they had only moved aside.
 
-    A temporary file of this machine is removed if its process is dead and kept if its process is alive. A temporary folder of
-    another machine, which may share the file system, is removed if nothing was written to it for a day.
+    A temporary folder is left if no process holds its lock. A temporary file is left if it is older than a day.
 
     Args:
         folder: The folder in which `replace_folder` or `replace_file` was writing.
-        name: Considers only temporary files for this destination name. None: for every name.
+        name: Considers only what was to get this name. None: every name.
     """
     folder = Path(folder)
-    for left in folder.glob(".*"):
+    for left in folder.glob(".*.enhsim_tf*"):
         named = _LEFT.fullmatch(left.name)
-        if named is None or (name is not None and named["name"] != name):
+        if named is None or name not in (None, named["name"]) or named["suffix"] == ".lock":
             continue
-        if named["host"] == _host() and int(named["process"]) != os.getpid():
-            is_left = not _is_alive(int(named["process"]))
+        if named["kind"] == "old":
+            with _locked(left):
+                _restore(folder / named["name"])
+        elif left.is_dir():
+            with contextlib.suppress(filelock.Timeout), _locked(left, blocking=False):
+                _remove(left)
         else:
-            is_left = left.is_dir() and not left.is_symlink() and _last_written(left) < _now(folder) - _OLD_S
-        if not is_left:
-            continue
-        if named["suffix"] == ".old" and not os.path.lexists(folder / named["name"]):
-            with contextlib.suppress(OSError):  # another process was quicker
-                os.replace(left, folder / named["name"])
-        else:
-            _remove(left)
-
-
-def _now(folder: Path) -> float:
-    """The current time of the file system's clock, which may be another machine's, in seconds since 1970."""
-    probe = _temporary(folder / "probe.tmp")
-    try:
-        probe.touch()
-        return probe.stat().st_mtime
-    except OSError:
-        return time.time()
-    finally:
-        with contextlib.suppress(OSError):
-            probe.unlink(missing_ok=True)
-
-
-def _is_alive(process: int) -> bool:
-    if os.name != "posix":  # on Windows, os.kill with signal 0 would end the process
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # the process belongs to another user, or the number is out of range
-        return True
-    return True
-
-
-def _last_written(folder: Path) -> float:
-    """Time of the last change in a folder, in seconds since 1970; the current time if the folder is being moved away."""
-    try:
-        return max(path.stat().st_mtime for path in (folder, *folder.rglob("*")))
-    except OSError:
-        return time.time()
+            with contextlib.suppress(FileNotFoundError):
+                if left.stat().st_mtime < time.time() - _OLD_S:
+                    left.unlink()
 
 
 def write_json(path: str | os.PathLike, content: Any) -> None:

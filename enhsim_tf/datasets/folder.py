@@ -18,8 +18,8 @@ import filelock
 from enhsim_tf.common.atomic_files import sha256, write_json
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import read_json
+from enhsim_tf.datasets.mix import MOST_WINDOWS
 from enhsim_tf.datasets.plan import FORMAT, MOST_VALUES, Plan, plan_key
-from enhsim_tf.datasets.scenario_file import MOST_WINDOWS
 from enhsim_tf.datasets.shard import Record, shard_file, shard_schema
 
 MANIFEST, JOURNAL, _LOCK = "_manifest.json", "_journal.jsonl", ".lock"  # readers of Parquet folders skip such names
@@ -106,8 +106,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
         content = read_json(path, _MOST_BYTES)
-        if not isinstance(content, dict) or content["format"] != FORMAT:
-            raise ValueError("another format")
+        if not isinstance(content, dict):
+            raise ValueError("not a JSON object")
+        if content["format"] != FORMAT:
+            raise InputError(
+                f"Expected a data set of the format {FORMAT}. Received: {str(content['format'])[:80]!r} in {folder}. Generate it again in another --out."
+            )
         settings, shards = content["settings"], content["shards"]
         counts = [settings["windows"], settings["shard"], settings["window"]]
         if (
@@ -121,6 +125,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         content["shards"] = None if shards is None else [_record_of(number, each) for number, each in enumerate(shards)]
     except FileNotFoundError:
         raise InputError(f"Expected a data set written by `generate`. Received: {folder}, without a {MANIFEST}.") from None
+    except InputError:
+        raise
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = " ".join(str(error).split())[:80]
         raise InputError(

@@ -17,7 +17,7 @@ from enhsim_tf.coarse_simulator.schedule import ScheduledMode
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import label_samples, label_windows, write_table, write_timeeval
-from enhsim_tf.datasets.scenario_file import Mix
+from enhsim_tf.datasets.mix import Mix
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,17 +152,22 @@ def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
-def window_columns(window: int, has_mask: bool = True) -> dict[str, "pa.DataType"]:
+def window_columns(window: int) -> dict[str, "pa.DataType"]:
     """Returns the columns of labelled windows and their types.
 
     Args:
         window: Length of a window in samples.
-        has_mask: Whether the windows have an end and a mask. Those of earlier versions have not.
     """
     import pyarrow as pa
 
-    columns = {"window": pa.list_(pa.float32(), window), "scenario": pa.string(), "severity": pa.float32(), "onset": pa.int32()}
-    return columns | ({"end": pa.int32(), "mask": pa.list_(pa.bool_(), window)} if has_mask else {})
+    labels = {
+        "scenario": pa.string(),
+        "severity": pa.float32(),
+        "onset": pa.int32(),
+        "end": pa.int32(),
+        "mask": pa.list_(pa.bool_(), window),
+    }
+    return {"window": pa.list_(pa.float32(), window)} | labels
 
 
 def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> dict[Degraded, int]:

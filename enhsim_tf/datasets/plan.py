@@ -15,12 +15,10 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.scenario_file import MOST_MODELS, MOST_WINDOWS, Mix, ModelShare
-from enhsim_tf.enhanced_simulator.safe_loading import read_description
+from enhsim_tf.datasets.mix import MOST_MODELS, MOST_WINDOWS, Mix, ModelShare
 from enhsim_tf.enhanced_simulator.saving import MANIFEST, check_saved, settings_of
 
-FORMAT = "enhsim_tf.datasets.generate/1"
-LABELS = "onset, end and mask of the changed samples"  # in the settings of a data set; earlier versions labelled from the onset on
+FORMAT = "enhsim_tf.datasets.generate/2"
 _SHARD = 8_192  # default windows per shard, for windows of up to 512 samples
 _SHARD_VALUES = 2**22  # default values per shard, for longer windows
 MOST_VALUES = 2**26  # maximum values per shard: 256 MiB, which a worker holds in memory
@@ -113,7 +111,6 @@ class Plan:
                 for part in self.mix.scenarios
             ],
             "models": [{"name": model.name, "share": model.share, "sha256": model.sha256} for model in self.models],
-            "labels": LABELS,
             "versions": {name: importlib.metadata.version(name) for name in _VERSIONS},
         }
 
@@ -156,19 +153,10 @@ def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) 
 def _model_of(share: ModelShare, folder: Path) -> Model:
     """Reads checksum, window length and interval of a saved simulator without loading its networks."""
     check_saved(folder)
-    interval_s = settings_of(folder).get("interval_s")
+    settings = settings_of(folder)
+    interval_s, window = settings.get("interval_s"), settings.get("window")
     if type(interval_s) not in (int, float) or not 0 < interval_s <= sys.float_info.max:
         raise InputError(f"Expected interval_s to be a number above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
-    return Model(share.name, folder, share.share, sha256(folder / MANIFEST), _window_of(folder), float(interval_s))
-
-
-def _window_of(folder: Path) -> int:
-    """Returns the window length in samples: the input width in the description of the enhancer."""
-    try:
-        network = read_description(folder / "enhancer.keras")
-        window = network["config"]["layers"][0]["config"]["batch_shape"][1]
-        if type(window) is not int or not 2 <= window <= MOST_VALUES:
-            raise ValueError(f"windows of {window!r} samples")
-    except (ValueError, KeyError, IndexError, TypeError) as error:
-        raise InputError(f"Expected an enhancer with a fixed input width. Received: {folder} ({' '.join(str(error).split())}).") from None
-    return window
+    if type(window) is not int or not 2 <= window <= MOST_VALUES:
+        raise InputError(f"Expected window to be a number of samples in settings.json. Received: {str(window)[:40]} in {folder}.")
+    return Model(share.name, folder, share.share, sha256(folder / MANIFEST), window, float(interval_s))

@@ -3,8 +3,7 @@
 Each shard has a random seed of its own, and the networks always compute batches of the same size. The bytes of a shard are
 therefore the same in every worker and in every order of generation.
 
-The columns are `window` (a list of float32), `label_columns.LABELS`, and `model` if the plan has several models. Windows of data
-sets of earlier versions have neither an `end` nor a `mask`.
+The columns are `window` (a list of float32), `label_columns.LABELS`, and `model` if the plan has several models.
 """
 
 import functools
@@ -21,7 +20,7 @@ from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import NOMINAL, label_windows
 from enhsim_tf.datasets.labelled_windows import window_columns
-from enhsim_tf.datasets.plan import FORMAT, LABELS, Plan
+from enhsim_tf.datasets.plan import FORMAT, Plan
 from enhsim_tf.enhanced_simulator.batches import complete_labelled_batch
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
 
@@ -157,7 +156,7 @@ def shard_schema(settings: dict[str, Any], key: str) -> "pa.Schema":
     """
     import pyarrow as pa
 
-    columns = window_columns(settings["window"], settings.get("labels") == LABELS)
+    columns = window_columns(settings["window"])
     if len(settings["models"]) > 1:
         columns["model"] = pa.string()
     return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})

@@ -1,7 +1,7 @@
 """Checks of the arguments that the methods of the enhanced simulator and its training share."""
 
 import operator
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -112,22 +112,6 @@ def is_finite(arrays: Iterable[np.ndarray]) -> bool:
         arrays: Arrays, such as the weights of a network.
     """
     return all(np.isfinite(each).all() for each in arrays)
-
-
-def check_saved_numbers(are_finite: Mapping[str, bool]) -> None:
-    """Checks before a simulator is saved that its numbers are finite.
-
-    Args:
-        are_finite: Whether all numbers are finite, for each part of the simulator.
-
-    Raises:
-        InputError: If those of a part are not.
-    """
-    bad = [name for name, is_good in are_finite.items() if not is_good]
-    if bad:
-        raise InputError(
-            f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
-        )
 
 
 def check_finite(windows: np.ndarray) -> np.ndarray:

@@ -3,10 +3,10 @@
 import dataclasses
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.noise.rung_names import BEST, BY_OPTION
+from enhsim_tf.noise.rung_names import BEST, SAVED
 
 ENHANCERS = ("coarse", "ridge", "ridge and network", "network")  # rungs of `enhancer.ladder` for windows at their own level and gain
-NOISES = (BEST, *BY_OPTION)
+NOISES = (BEST, *SAVED)
 FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
 LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows

@@ -17,7 +17,7 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import noise_choice
 from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import BY_OPTION, FOLLOWERS, GANS, NETWORKS, STREAMS
+from enhsim_tf.noise.rung_names import BY_OPTION, FOLLOWERS, GANS, NETWORKS, SAVED, STREAMS
 from enhsim_tf.realism.two_sample import boosted_trees
 from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.telemetry.quantisation import Levels
@@ -141,7 +141,7 @@ def choose_noise(
         notes.append("there is too little telemetry to judge noise models; whole residual windows are drawn")
         return fit_noise("residual windows", everything, training, notes), []
     models, judgements, judge = {}, [], HeldOutJudge(learnt, judged, training)
-    for option in BY_OPTION:
+    for option in SAVED:
         try:
             model = fit_noise(option, learnt, training, notes)
             judgements.append(judge.judge(option, model))

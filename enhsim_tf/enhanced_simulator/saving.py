@@ -1,112 +1,84 @@
-"""Saves and loads trained models: `.keras` files, arrays, `settings.json`, and `manifest.json` with their checksums.
+"""Saves and loads trained models: `arrays.npz`, `settings.json`, and `manifest.json` with the format and the checksums of both.
 
-There are two formats. A simulator of square waves consists of its enhancer and its noise. A run model (`runs`) also has the nominal
-run and the range of the training runs. The noise is two networks, or arrays (`noise.states`).
+There are two kinds of model: simulators of square waves, and models of recorded runs (`runs`). Of both, everything with more than a
+few numbers is an array: the weights of the enhancer, the noise and, of a run, its values and its range. No code is saved: networks
+are built again from the shapes of their weights.
 """
 
 import os
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
-from enhsim_tf.enhanced_simulator.safe_loading import check_network
+from enhsim_tf.noise.states import NoiseState, state_of
 
-if TYPE_CHECKING:
-    from enhsim_tf.keras_tools.backend import keras
-    from enhsim_tf.noise.states import NoiseState
-
-MANIFEST, SETTINGS = "manifest.json", "settings.json"
+MANIFEST, SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
-_OURS = b'"enhsim_tf.EnhancedSimulator/'  # near the beginning of every manifest, in all versions of the format
-_FORMAT = "enhsim_tf.EnhancedSimulator/1"
-RUNS_FORMAT = "enhsim_tf.EnhancedSimulator/runs-1"
-_NETWORKS = ("enhancer.keras", "generator.keras", "discriminator.keras")
-_NOISE = "noise.npz"
-_RUN_FILES = ("range.npz", "nominal.npz")
-_FILES = {  # the possible files of each format, beside the settings
-    _FORMAT: (set(_NETWORKS), {"enhancer.keras", _NOISE}),
-    RUNS_FORMAT: ({*_NETWORKS, *_RUN_FILES}, {"enhancer.keras", _NOISE, *_RUN_FILES}),
+_MOST_BYTES = 2**28  # maximum size of all arrays; the weights of the paper's enhancer are 55 MB
+_NUMBER = "2"  # of the format
+_FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
+WAVES_FORMAT, RUNS_FORMAT = _FAMILY + _NUMBER, f"{_FAMILY}runs-{_NUMBER}"
+_KINDS = {
+    WAVES_FORMAT: "a simulator of square waves, for --windows or --continuous",
+    RUNS_FORMAT: "a model of recorded runs, for --coarse",
 }
-_MOST_BYTES = 2**28  # maximum size of arrays
 
 
 def write_saved(
-    folder: str | os.PathLike,
-    networks: Mapping[str, "keras.Model"],
-    settings: Mapping[str, Any],
-    others: Mapping[str, Callable[[Path], None]] | None = None,
-    form: str = _FORMAT,
+    folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any], form: str = WAVES_FORMAT
 ) -> None:
     """Writes a model to a folder atomically: if a step fails, the folder is left unchanged.
 
     Args:
         folder: The folder. A model that was saved there before is replaced.
-        networks: The networks by name: `enhancer`, `generator` and `discriminator`.
+        arrays: For each part of the model, such as `enhancer`, its arrays by name.
         settings: All other settings, in plain JSON types.
-        others: Further files by name, each with the function that writes it.
         form: The format.
 
     Raises:
-        InputError: If the folder contains something other than a saved simulator; it is left unchanged.
+        InputError: If the folder contains something other than a saved model, or if a number is not finite; it is left unchanged.
     """
     folder = Path(folder)
     if is_foreign(folder):
         raise InputError(f"Expected a new folder, an empty one, or a saved simulator. Received: {folder}, which contains something else.")
+    bad = [part for part, named in arrays.items() if not all(np.isfinite(each).all() for each in named.values())]
     with replace_folder(folder) as temporary:
-        for name, network in networks.items():
-            network.save(temporary / f"{name}.keras", include_optimizer=False)
-        for name, write in (others or {}).items():
-            write(temporary / name)
-        write_json(temporary / SETTINGS, settings)
-        checksums = {file.name: sha256(file) for file in sorted(temporary.iterdir())}
-        write_json(temporary / MANIFEST, {"format": form, "sha256": checksums})
+        try:
+            write_json(temporary / SETTINGS, settings)
+        except ValueError:  # JSON has no NaN and no infinity
+            bad.append("settings")
+        if bad:
+            raise InputError(
+                f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
+            )
+        np.savez(temporary / _ARRAYS, **{f"{part}/{name}": each for part, named in arrays.items() for name, each in named.items()})
+        write_json(temporary / MANIFEST, {"format": form, "sha256": {name: sha256(temporary / name) for name in (_ARRAYS, SETTINGS)}})
 
 
-def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Writes arrays to a compressed `.npz` file.
-
-    Args:
-        path: Path of the file.
-        arrays: The arrays by name.
-    """
-    with open(path, "wb") as file:
-        np.savez_compressed(file, **arrays)
-
-
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Reads the arrays that `write_arrays` wrote. Files that are too large are refused."""
-    return load_npz(path, _MOST_BYTES)
-
-
-def noise_file(noise: "NoiseState") -> dict[str, Callable[[Path], None]]:
-    """Returns the file of a noise model that consists of arrays, for `write_saved`; empty if it consists of networks."""
-    return {_NOISE: lambda path: write_arrays(path, noise.arrays)} if noise.arrays else {}
-
-
-def read_noise(folder: Path, settings: Mapping[str, Any], networks: "Mapping[str, keras.Model]") -> Any:
-    """Restores the noise model of a saved model.
+def saved_noise(model: Any) -> NoiseState:
+    """Returns what is saved of a noise model.
 
     Args:
-        folder: The folder.
-        settings: Settings of the noise.
-        networks: The networks that were loaded.
-    """
-    from enhsim_tf.noise.states import model_from
+        model: The noise model.
 
-    path = folder / _NOISE
-    return model_from(settings, networks, read_arrays(path) if path.is_file() else {})
+    Raises:
+        InputError: If it consists of networks.
+    """
+    state = state_of(model)
+    if state.networks:
+        raise InputError("Expected a noise model of arrays. Received: a GAN, whose networks are not saved. Fit another noise model.")
+    return state
 
 
 def is_foreign(folder: Path) -> bool:
     """Whether a path exists and is neither an empty folder nor a saved simulator. A damaged simulator counts as a saved one."""
     manifest = folder / MANIFEST
-    is_ours = manifest.is_file() and _OURS in _beginning_of(manifest)  # other programs write files of this name too
+    is_ours = manifest.is_file() and f'"{_FAMILY}'.encode() in _beginning_of(manifest)  # other programs write files of this name too
     is_empty = folder.is_dir() and not any(folder.iterdir())
     return os.path.lexists(folder) and not (is_ours or is_empty)
 
@@ -117,12 +89,12 @@ def _beginning_of(path: Path) -> bytes:
 
 
 def is_run_model(folder: str | os.PathLike) -> bool:
-    """Whether a folder holds a run model, by the format in its manifest."""
+    """Whether a folder holds a model of recorded runs, by the format in its manifest."""
     return _json_of(Path(folder), MANIFEST).get("format") == RUNS_FORMAT
 
 
-def check_saved(folder: str | os.PathLike, form: str = _FORMAT) -> None:
-    """Verifies the checksums of a saved model without loading its networks.
+def check_saved(folder: str | os.PathLike, form: str = WAVES_FORMAT) -> None:
+    """Verifies the checksums of a saved model without loading it.
 
     Args:
         folder: The folder.
@@ -133,25 +105,19 @@ def check_saved(folder: str | os.PathLike, form: str = _FORMAT) -> None:
     """
     folder = Path(folder)
     manifest = _json_of(folder, MANIFEST)
-    if manifest.get("format") in _FILES and manifest["format"] != form:
-        kinds = {
-            _FORMAT: "a simulator of square waves, for --windows or --continuous",
-            RUNS_FORMAT: "a model of recorded runs, for --coarse",
-        }
-        raise InputError(f"Expected {kinds[form]}. Received: {folder}, which is {kinds[manifest['format']]}. Give the other kind of model.")
-    if manifest.get("format") != form or set(manifest) != {"format", "sha256"} or not _is_complete(manifest["sha256"], form):
-        raise InputError(
-            f"Expected the format {form}. Received: {str(manifest.get('format'))[:80]!r} in {folder}. Save the simulator with this version."
-        )
-    for name, expected in manifest["sha256"].items():
+    found, checksums = str(manifest.get("format")), manifest.get("sha256")
+    if found in _KINDS and found != form:
+        raise InputError(f"Expected {_KINDS[form]}. Received: {folder}, which is {_KINDS[found]}. Give the other kind of model.")
+    if found != form:
+        number = found.removeprefix(_FAMILY).removeprefix("runs-")
+        raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number[:80]} in {folder}. Fit it again.")
+    if not isinstance(checksums, dict) or set(checksums) != {_ARRAYS, SETTINGS}:
+        raise InputError(f"Expected the checksums of {_ARRAYS} and {SETTINGS}. Received: others in {folder / MANIFEST}. Fit it again.")
+    for name, expected in checksums.items():
         if not (folder / name).is_file() or sha256(folder / name) != expected:
             raise InputError(
-                f"Expected {name} to be unchanged since it was saved. Received: a missing or damaged file in {folder}. Save the simulator again."
+                f"Expected {name} to be unchanged since it was saved. Received: a missing or damaged file in {folder}. Fit it again."
             )
-
-
-def _is_complete(checksums: Any, form: str) -> bool:
-    return isinstance(checksums, dict) and any(set(checksums) == {SETTINGS, *files} for files in _FILES[form])
 
 
 def settings_of(folder: str | os.PathLike) -> dict[str, Any]:
@@ -179,36 +145,34 @@ def _json_of(folder: Path, name: str) -> dict[str, Any]:
 
 
 def read_saved(
-    folder: str | os.PathLike, make: Callable[[Mapping[str, "keras.Model"], Mapping[str, Any]], Any], form: str = _FORMAT
+    folder: str | os.PathLike,
+    make: Callable[[Mapping[str, Mapping[str, np.ndarray]], Mapping[str, Any]], Any],
+    form: str = WAVES_FORMAT,
 ) -> Any:
-    """Loads a saved model, in Keras' safe mode.
+    """Loads a saved model.
 
     Args:
         folder: A folder written by `write_saved`.
-        make: Function that creates the model from the networks and the settings.
+        make: Function that creates the model from the arrays of each part and the settings.
         form: The expected format.
 
     Returns:
-        The simulator, as returned by `make`.
+        The model, as returned by `make`.
 
     Raises:
         InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
     """
-    from enhsim_tf.keras_tools.backend import keras, tf  # imported here, because checking a folder does not need TensorFlow
-
     folder = Path(folder)
     check_saved(folder, form)
     settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
     try:
-        saved = [folder / name for name in _NETWORKS if (folder / name).is_file()]
-        for path in saved:
-            check_network(path)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", UserWarning)  # Keras only warns about layers without weights in the file
-            networks = {path.stem: keras.saving.load_model(path, compile=False, safe_mode=True) for path in saved}
-        if sha256(folder / MANIFEST) != as_checked:  # another process replaced the simulator, so the networks may be mixed
+        arrays: dict[str, dict[str, np.ndarray]] = {}
+        for name, each in load_npz(folder / _ARRAYS, _MOST_BYTES).items():
+            part, _, rest = name.partition("/")
+            arrays.setdefault(part, {})[rest] = each
+        if sha256(folder / MANIFEST) != as_checked:  # another process replaced the model, so the settings may be those of the other
             raise ValueError("the simulator was replaced while it was read; try again")
-        return make(networks, settings)
-    except (*READ_ERRORS, UserWarning, tf.errors.OpError) as error:
+        return make(arrays, settings)
+    except READ_ERRORS as error:
         reason = (str(error).splitlines() or [""])[0]
-        raise InputError(f"Expected networks and settings that load in safe mode. Received: {folder} ({reason}).") from None
+        raise InputError(f"Expected the arrays and settings of a model. Received: {folder} ({reason}).") from None

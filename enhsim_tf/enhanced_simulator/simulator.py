@@ -5,12 +5,12 @@ import functools
 import itertools
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.constant_level import waves_or_level
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, held_samples, simulate_schedule
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
@@ -18,16 +18,17 @@ from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.batches import add_changed, complete_batch, complete_labelled_batch
 from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
-from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, check_saved_numbers, config_of, is_finite
+from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of
 from enhsim_tf.enhanced_simulator.noise_fitting import noise_windows
 from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
-from enhsim_tf.enhanced_simulator.saving import noise_file, read_noise, read_saved, write_saved
+from enhsim_tf.enhanced_simulator.saving import read_saved, saved_noise, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
+from enhsim_tf.enhancer.rung_networks import network_from, weights_of
 from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.gan import num_overlapping
-from enhsim_tf.noise.states import state_of
+from enhsim_tf.noise.states import model_from
 from enhsim_tf.telemetry.parquet_store import write_windows
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
@@ -483,41 +484,32 @@ class EnhancedSimulator(NoisyOutput):
         return cycle[(begin + np.arange(num_windows)) % len(cycle)]
 
     def save(self, folder: str | os.PathLike) -> None:
-        """Saves the simulator to a folder: its networks, its noise, `settings.json`, and `manifest.json` with their checksums.
+        """Saves the simulator to a folder: `arrays.npz`, `settings.json`, and `manifest.json` with their checksums.
 
         Args:
             folder: The folder. A simulator that was saved there before is replaced.
 
         Raises:
-            InputError: If the folder contains something other than a saved simulator, or if a number of the simulator is not
-                finite; the folder is left unchanged.
+            InputError: If the folder contains something other than a saved simulator, if a number of the simulator is not finite,
+                or if its noise is a GAN, which is not saved; the folder is left unchanged.
         """
-        noise = state_of(self.noise)
-        numbers = np.array([self.interval_s, self.offset, self.scale, *([] if self.quantisation is None else [self.quantisation.step])])
-        check_saved_numbers(
-            {
-                "enhancer": is_finite(self.enhancer.get_weights()),
-                **{name: is_finite(network.get_weights()) for name, network in noise.networks.items()},
-                "noise": bool(noise.networks) or noise.is_finite,
-                "units or levels": is_finite([numbers, *([] if self.levels is None else [self.levels])]),
-            }
-        )
+        noise = saved_noise(self.noise)
         settings = {
             "coarse": config_of(self.coarse),
             "noise": dict(noise.settings),
+            "window": self.window,
             "interval_s": self.interval_s,
             "offset": self.offset,
             "scale": self.scale,
             "levels": None if self.levels is None else self.levels.tolist(),
             "quantisation": None if self.quantisation is None else dataclasses.asdict(self.quantisation),
             "trained": self.trained,
-            "keras": keras.__version__,
         }
-        write_saved(folder, {"enhancer": self.enhancer, **noise.networks}, settings, noise_file(noise))
+        write_saved(folder, {"enhancer": weights_of(self.enhancer), "noise": noise.arrays}, settings)
 
     @classmethod
     def load(cls, folder: str | os.PathLike) -> "EnhancedSimulator":
-        """Loads a saved simulator, in Keras' safe mode.
+        """Loads a saved simulator.
 
         Args:
             folder: A folder written by `save`.
@@ -528,15 +520,17 @@ class EnhancedSimulator(NoisyOutput):
         Raises:
             InputError: If the folder was not written by `save`, or if a file in it has changed since.
         """
-        return read_saved(folder, functools.partial(cls._from_saved, Path(folder)))
+        return read_saved(folder, cls._from_saved)
 
     @classmethod
-    def _from_saved(cls, folder: Path, networks: Mapping[str, keras.Model], settings: Mapping[str, Any]) -> "EnhancedSimulator":
-        coarse = SquareWaveSimulator.from_config(settings["coarse"])
-        noise = read_noise(folder, settings["noise"], networks)
-        units = settings["interval_s"], settings["offset"], settings["scale"], settings.get("levels")
-        quantisation = None if settings.get("quantisation") is None else Levels(**settings["quantisation"])
-        return cls(coarse, networks["enhancer"], noise, *units, settings["trained"], quantisation)
+    def _from_saved(cls, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> "EnhancedSimulator":
+        coarse, enhancer = waves_or_level(settings["coarse"]), network_from(arrays["enhancer"])
+        if enhancer.input_shape != enhancer.output_shape or enhancer.input_shape[1] != settings["window"]:
+            raise ValueError("an enhancer of another window length than the settings say")
+        noise = model_from(settings["noise"], {}, arrays.get("noise", {}))
+        units = settings["interval_s"], settings["offset"], settings["scale"], settings["levels"]
+        quantisation = None if settings["quantisation"] is None else Levels(**settings["quantisation"])
+        return cls(coarse, enhancer, noise, *units, settings["trained"], quantisation)
 
 
 def _noise_rng(seed: int) -> np.random.Generator:

@@ -37,7 +37,7 @@ class TrustedRange:
     def score(self, coarse: np.ndarray) -> np.ndarray:
         """Scores how far coarse windows are outside the training range. A share `rate` of nominal windows scores above 1.
 
-        Across degraded modes, the score is correlated with the error of the enhanced window; docs/REPORT.md gives the rank
+        Across degraded modes, the score is correlated with the error of the enhanced window; studies/robustness/README.md gives the rank
         correlation. The score does not measure whether the coarse simulator itself is accurate.
 
         Args:

@@ -4,18 +4,15 @@ The score is computed from coarse windows only. It needs neither a network nor t
 error of the coarse simulator itself.
 """
 
-import os
+from collections.abc import Mapping
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.common.size_limits import load_npz
 
 _CHUNK = 2_048  # number of windows scored at a time
 _MAX_KEPT = 10_000  # maximum number of training windows whose coordinates are kept
-_MAX_FILE_BYTES = 2**28  # upper limit for the size of a saved score; actual files are about a thousand times smaller
 _FITTED = ("mean", "unit", "components", "coordinates")
 
 
@@ -112,38 +109,33 @@ class OutOfRange:
         nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
         return np.sqrt((left + self.weight * nearest) / windows.shape[1]) / self._unit
 
-    def save(self, path: str | os.PathLike) -> None:
-        """Saves the fitted score to an `.npz` file, which is usually much smaller than one megabyte.
-
-        Args:
-            path: The file.
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The numbers of the fitted score by name, usually much less than one megabyte.
 
         Raises:
             InputError: If the score is not fitted.
         """
         self._check_fitted()
-        with replace_file(path) as temporary, open(temporary, "wb") as file:
-            np.savez_compressed(file, explained=self.explained, weight=self.weight, **{name: getattr(self, f"_{name}") for name in _FITTED})
+        return {name: np.asarray(getattr(self, name)) for name in ("explained", "weight")} | {
+            name: np.asarray(getattr(self, f"_{name}")) for name in _FITTED
+        }
 
     @classmethod
-    def load(cls, path: str | os.PathLike) -> "OutOfRange":
-        """Loads a score that `save` wrote. No code in the file is executed.
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "OutOfRange":
+        """Restores a score from its `arrays`.
 
         Args:
-            path: The file.
+            arrays: The numbers by name.
 
         Raises:
-            InputError: If the file was not written by `save`.
+            ValueError: If the arrays are not those of a score.
         """
-        try:
-            kept = load_npz(path, _MAX_FILE_BYTES)
-            loaded = cls(float(kept["explained"]), float(kept["weight"]))
-            for name in _FITTED:
-                setattr(loaded, f"_{name}", kept[name])
-            loaded._score(np.zeros((1, len(loaded._mean))))  # fails if the shapes of the arrays do not match
-        except (ValueError, KeyError, TypeError, IndexError) as error:
-            raise InputError(f"Expected a file written by OutOfRange.save. Received: {path} ({type(error).__name__}).") from None
-        return loaded
+        restored = cls(float(arrays["explained"]), float(arrays["weight"]))
+        for name in _FITTED:
+            setattr(restored, f"_{name}", arrays[name])
+        restored._score(np.zeros((1, len(restored._mean))))  # fails if the shapes of the arrays do not match
+        return restored
 
     def _check_fitted(self) -> None:
         if not hasattr(self, "_mean"):

@@ -5,7 +5,7 @@
 - The C library glibc keeps the memory that TensorFlow frees. By default, it returns every block above 32 MB to the operating
   system, which then has to clear the same pages again for each gradient of the enhancer's widest layer.
 
-Variables that the user has set keep their values, see `docs/environment.md`.
+Variables that the user has set keep their values, see `docs/speed.md`.
 """
 
 import os

@@ -15,6 +15,8 @@ GANS = ("paper", "convolutional")
 """Options whose rungs are GANs."""
 GAN_RUNGS = tuple(BY_OPTION[option] for option in GANS)
 """Names of these rungs."""
+SAVED = tuple(option for option in BY_OPTION if option not in GANS)
+"""Options whose noise models can be saved."""
 NETWORKS = ("autoregressive network", *GANS)
 """Options whose rungs train networks."""
 BEST = "best"

@@ -27,7 +27,7 @@ BASIC, WHOLE, OURS = "basic", "whole", "ours"
 Measured = dict[str, float]
 
 BATTERY_COARSE_S, BATTERY_FINE_S = 0.00669, 0.0501
-"""Seconds that one orbit takes in two battery simulators: figures/battery/speed.parquet at d552a99, gentle regime, mean of ten seeds."""
+"""Seconds that one orbit takes in two battery simulators: studies/battery/results/speed.parquet, gentle regime, mean of ten seeds."""
 LOUDER = 1.10
 """Real noise that is louder by this factor is as different as the tolerance on its scale allows."""
 

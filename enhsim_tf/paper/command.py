@@ -149,7 +149,7 @@ def run(options: argparse.Namespace) -> int:
     from enhsim_tf.paper.report import as_text, read_published, results, write_page
 
     chosen = choose_figures(options.only, list(FIGURES))
-    pipeline = Pipeline(settings, Stages(options.cache or default_cache(), options.fresh, tell), **place)
+    pipeline = Pipeline(settings, Stages(options.cache or default_cache(), options.fresh, tell, speaks=True), **place)
     early = [name for name in chosen if not FIGURES[name].needs_training]
     draw(early, pipeline, folder, options)
     if early:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from enhsim_tf.common.console import Progress
 from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.paper import noise, square_wave
@@ -71,7 +70,7 @@ class Pipeline:
         depends = self.settings.of("telemetry")
         if self.own:
             depends = {"name": self.own.name, "checksum": zlib.crc32(self.own.values.tobytes()), "interval": self.own.interval}
-        folder = self.stages.run("telemetry", self._make_telemetry, depends, VERSION["telemetry"])
+        folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
         kept = ParquetStore(folder / "telemetry.parquet")
         if self.store is None:
             return kept.read()
@@ -119,12 +118,12 @@ class Pipeline:
         """Folder of the trained enhancer and its history."""
         _ = self.telemetry
         depends = self.settings.of("windows", "enhancer")
-        return self.stages.run("enhancer", self._train_enhancer, depends, VERSION["enhancer"], ["telemetry"])
+        return self.stages.run("enhancer", self._train_enhancer, depends, ["telemetry"], VERSION["enhancer"])
 
     def _train_enhancer(self, folder: Path) -> None:
         train = self.windows("train", self.settings.num_windows, "training windows")
         held_out = self.windows("test", min(200, self.settings.num_windows), "validation windows")
-        told = Progress(self.stages.tell, "enhancer     ").loop("epoch", self.settings.epochs)
+        told = self.stages.progress.loop("epoch", self.settings.epochs)
         watch = keras.callbacks.LambdaCallback(on_epoch_end=lambda epoch, logs: told(epoch + 1))
         network, validation = build_enhancer(self.settings), (held_out["coarse"], held_out["target"])
         history = train_enhancer(network, train["coarse"], train["target"], self.settings, validation, [watch])
@@ -161,7 +160,7 @@ class Pipeline:
         """Folder of both networks after the paper's number of iterations, and of the history, which goes on beyond it."""
         _ = self.telemetry
         depends = self.settings.of("windows", "noise", "noise GAN")
-        return self.stages.run("noise GAN", self._train_gan, depends, VERSION["noise GAN"], ["telemetry"])
+        return self.stages.run("noise GAN", self._train_gan, depends, ["telemetry"], VERSION["noise GAN"])
 
     def _train_gan(self, folder: Path) -> None:
         chosen, unit = self.settings, np.float32(self.noise_unit)
@@ -169,7 +168,7 @@ class Pipeline:
         networks = noise.build_generator(chosen), noise.build_discriminator(chosen)
         gan, followed = noise.NoiseGAN(*networks, chosen), []
         gan.compile()
-        told = Progress(self.stages.tell, "noise GAN    ").loop("iteration", chosen.rounds * chosen.iterations)
+        told = self.stages.progress.loop("iteration", chosen.rounds * chosen.iterations)
 
         def follow(iteration: int) -> None:
             generated = noise.generate_noise(networks[0], FOLLOWED, chosen, self.draw("followed noise"))
@@ -221,7 +220,7 @@ class Pipeline:
         if name not in self._measured:
             _ = self.enhancer_folder, self.gan_folder
             depends, before = self.settings.of("windows", "noise", "claims"), ["telemetry", "enhancer", "noise GAN"]
-            folder = self.stages.run(name, lambda folder: save_arrays(folder, make(self)), depends, version, before)
+            folder = self.stages.run(name, lambda folder: save_arrays(folder, make(self)), depends, before, version)
             self._measured[name] = {key: float(value) for key, value in load_arrays(folder).items()}
         return self._measured[name]
 

@@ -2,9 +2,8 @@
 
 import os
 import shlex
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from enhsim_tf.reproduce.settings import LOCATION
 
@@ -30,20 +29,6 @@ def figure_caption(name: str, experiment: "Experiment") -> str:
     options += ["--seed", str(settings.seed)] if settings.seed else []
     options += ["--only", name.split("_")[0]]
     return f"seed {settings.seed} · {settings.budget} budget · {shlex.join(['python', '-m', 'enhsim_tf.reproduce', *options])}"
-
-
-def experiment_caption(found: Mapping[str, Any], command: str) -> str:
-    """The caption line of the figures of an experiment: its `seeds`, its `budget` and its command."""
-    seeds = found["seeds"]
-    is_gapless = seeds[-1] - seeds[0] == len(seeds) - 1
-    several = f"{seeds[0]} to {seeds[-1]}" if is_gapless else ", ".join(map(str, seeds))
-    ran = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {several}"
-    return f"{ran} · {found['budget']} budget · {command}"
-
-
-def in_seeds(seeds: Sequence[int]) -> str:
-    """The number of seeds as text."""
-    return "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
 
 
 def _as_typed(path: Path) -> str:

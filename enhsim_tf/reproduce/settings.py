@@ -9,6 +9,8 @@ only: those of the fields that have a value for `smoke`.
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from enhsim_tf.common.errors import InputError
 
 OUR_CHOICE = "our choice"
@@ -50,9 +52,12 @@ class TelemetrySettings:
         "one function a row",
     )
     interval_s: float = setting(1.0, "s", f"{OUR_CHOICE}: a window of 500 samples then covers slightly more than one orbit", "-")
-    noise: str = setting("white", "process", f"{OUR_CHOICE}: the simplest process; noise_processes has others", '"noise"')
     noise_sd: float = setting(
-        0.1, "1", f"{OUR_CHOICE}: Gaussian, small compared with the waves and still visible", "-", "noise added to every value"
+        0.1,
+        "1",
+        f"{OUR_CHOICE}: white Gaussian noise, small compared with the waves and still visible",
+        '"noise"',
+        "noise added to every value",
     )
     num_samples: int = setting(
         2_073_600, "samples", f"{OUR_CHOICE}: 24 days, so that the test part has 1,000 disjoint windows", smoke=120_000
@@ -68,6 +73,10 @@ class TelemetrySettings:
         "the original waveform",
         "noisy",
     )
+
+    def draw_noise(self, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Draws the noise of the example telemetry, float64 of the shape of the noiseless `signal`."""
+        return rng.normal(0.0, self.noise_sd, signal.shape)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,153 +164,6 @@ class DetectorSettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class RobustnessSettings:
-    """The experiment on robustness: `python -m enhsim_tf.reproduce --experiment robustness`."""
-
-    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: a signed-rank test of 10 pairs can reach p = 0.002", smoke=2)
-    first_seed: int = setting(
-        2_000,
-        "seed",
-        f"{OUR_CHOICE}: results are reported on seeds from here on; designs were chosen on 100 to 199, and seed 1,000 was used once before",
-    )
-    num_windows: int = setting(
-        1_000, "windows", f"{OUR_CHOICE}: training windows of each arm; as many held-out windows set its threshold", smoke=200
-    )
-    num_anomalous: int = setting(
-        150,
-        "windows",
-        f"{OUR_CHOICE}: anomalous windows of each kind and severity, the same places for all kinds, severities and arms",
-        smoke=6,
-    )
-    num_anomalous_varied: int = setting(
-        30, "windows", f"{OUR_CHOICE}: anomalous windows where the noise scale and the share of real windows are varied", smoke=3
-    )
-    num_resplits: int = setting(
-        40, "re-splits", f"{OUR_CHOICE}: maximum number of resamples for the real-vs-real baseline; fewer for expensive measures", smoke=5
-    )
-    num_trace_samples: int = setting(
-        20_000, "samples", f"{OUR_CHOICE}: length of the continuous trace, which has two anomalies of each kind", smoke=8_000
-    )
-    false_alarm_rate: float = setting(
-        0.01, "share", f"{OUR_CHOICE}: target rate of each threshold, on held-out windows of the training arm"
-    )
-    max_order: int = setting(200, "samples", f"{OUR_CHOICE}: largest order of the fitted autoregression; AIC selects the order", smoke=40)
-    block: int = setting(250, "samples", f"{OUR_CHOICE}: block length of the bootstrap; shorter blocks break the correlation of the noise")
-
-
-@dataclasses.dataclass(frozen=True)
-class SecondSettings:
-    """The residual pipeline: noise is the residual of the enhancer, and the convolutional GAN learns it."""
-
-    num_windows: int = setting(
-        15_000, "windows", f"{OUR_CHOICE}: more windows, so that the enhancer does not memorise their noise", smoke=60
-    )
-    epochs: int = setting(2, "epochs", f"{OUR_CHOICE}: fewer epochs: half the paper's steps, with a decaying learning rate")
-    held_out: float = setting(
-        0.0, "share", f"{OUR_CHOICE}: no windows are held out: coarse windows repeat, so the enhancer cannot memorise their noise"
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class ModesSettings:
-    """The detailed test of degraded modes, a part of the experiment on robustness."""
-
-    num_windows: int = setting(300, "windows", f"{OUR_CHOICE}: test windows in each mode at each severity", smoke=40)
-    windows_per_configuration: int = setting(50, "windows", f"{OUR_CHOICE}: 300 configurations are sampled", smoke=5)
-
-
-@dataclasses.dataclass(frozen=True)
-class LadderSettings:
-    """The experiment on noise that no generator was designed for: `python -m enhsim_tf.reproduce --experiment noise`."""
-
-    num_seeds: int = setting(2, "seeds", f"{OUR_CHOICE}: fourteen families take hours for each seed; --seeds asks for more", smoke=1)
-    first_seed: int = setting(
-        3_008, "seed", f"{OUR_CHOICE}: models and rule were fixed before it; former ones were judged on seeds from 3000 on"
-    )
-    num_windows: int = setting(5_000, "windows", f"{OUR_CHOICE}: windows of true noise that the models learn", smoke=120)
-    num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
-    gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
-    num_anomalous: int = setting(30, "windows", f"{OUR_CHOICE}: anomalous windows of each kind and severity", smoke=3)
-
-
-@dataclasses.dataclass(frozen=True)
-class CurveSettings:
-    """The experiment on how few real windows suffice: `python -m enhsim_tf.reproduce --experiment learning-curve`."""
-
-    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
-    first_seed: int = setting(4_000, "seed", f"{OUR_CHOICE}: no design was chosen on these seeds")
-    num_real: tuple[int, ...] = setting(
-        (5, 10, 20, 50, 100, 300, 1_000, 10_000), "windows", f"{OUR_CHOICE}: disjoint windows of the real record", smoke=(5, 20)
-    )
-    num_windows: int = setting(1_500, "windows", f"{OUR_CHOICE}: most windows for training, as many as the paper's enhancer", smoke=60)
-    num_judged: int = setting(1_000, "windows", f"{OUR_CHOICE}: disjoint test windows, and as many for the matched rate", smoke=40)
-    num_anomalous: int = setting(60, "windows", f"{OUR_CHOICE}: test windows with an anomaly of each kind", smoke=6)
-
-
-@dataclasses.dataclass(frozen=True)
-class CurveNetworkSettings:
-    """Networks of the experiment on how few real windows suffice. They take minutes each, so they have fewer seeds than its other arms."""
-
-    num_seeds: int = setting(2, "seeds", f"{OUR_CHOICE}: the first seeds; of the autoregressive network", smoke=1)
-    num_real: tuple[int, ...] = setting(
-        (5, 10, 20, 50, 100),
-        "windows",
-        f"{OUR_CHOICE}: from which the autoregressive network learns; more suffice alone on most noise",
-        smoke=(20,),
-    )
-    num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
-    num_slow_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; of the GANs and the classifiers")
-    num_real_gans: tuple[int, ...] = setting((20,), "windows", f"{OUR_CHOICE}: from which the GANs learn")
-    gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
-    num_real_classifiers: tuple[int, ...] = setting(
-        (20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
-    )
-    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
-
-
-@dataclasses.dataclass(frozen=True)
-class FactorialSettings:
-    """The factorial experiment: `python -m enhsim_tf.reproduce --experiment factorial`. Its other settings are those of robustness."""
-
-    num_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: the first seeds of the experiment on robustness; 32 cells for each", smoke=1)
-
-
-@dataclasses.dataclass(frozen=True)
-class LabelledSettings:
-    """The study of real telemetry with labelled anomalies: `python -m enhsim_tf.reproduce --experiment labelled`."""
-
-    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with the seeds 0, 1, ...", smoke=1)
-    num_windows: int = setting(2_500, "windows", f"{OUR_CHOICE}: about every offset in a channel of the data set once", smoke=60)
-    epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
-    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
-    num_arm_windows: int = setting(
-        2_000, "windows", f"{OUR_CHOICE}: training windows of each arm; as many held-out windows set its threshold", smoke=200
-    )
-    num_folds: int = setting(
-        5, "blocks of time", f"{OUR_CHOICE}: real windows set thresholds in the block that a detector was not fitted to", smoke=3
-    )
-    false_alarm_rate: float = setting(0.01, "share", f"{OUR_CHOICE}: as in the experiment on robustness")
-    max_order: int = setting(60, "samples", f"{OUR_CHOICE}: largest order of the fitted autoregression; AIC selects the order", smoke=20)
-    block: int = setting(50, "samples", f"{OUR_CHOICE}: block length of the bootstrap: half a period")
-
-
-@dataclasses.dataclass(frozen=True)
-class BatterySettings:
-    """The study of a pair of battery simulators: `python -m enhsim_tf.reproduce --experiment battery`."""
-
-    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
-    first_seed: int = setting(3_000, "seed", f"{OUR_CHOICE}: designs were chosen on seeds below")
-    fit_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days of telemetry, to which the simulator is fitted", smoke=4)
-    more_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: as many again, for detectors trained on more real telemetry", smoke=4)
-    test_orbits: int = setting(60, "orbits", f"{OUR_CHOICE}: four days on which everything is judged", smoke=4)
-    coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
-    fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
-    paper_epochs: int = setting(40, "epochs", "paper, section 2.2", "40", smoke=1)
-    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "about 1,000", smoke=4)
-    num_network_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: autoencoders and the noise GAN take most of the time", smoke=1)
-
-
-@dataclasses.dataclass(frozen=True)
 class Settings:
     """All groups of settings, the budget and the seed."""
 
@@ -311,15 +173,6 @@ class Settings:
     noise: NoiseSettings = NoiseSettings()
     adversarial: AdversarialSettings = AdversarialSettings()
     detectors: DetectorSettings = DetectorSettings()
-    second: SecondSettings = SecondSettings()
-    robustness: RobustnessSettings = RobustnessSettings()
-    modes: ModesSettings = ModesSettings()
-    factorial: FactorialSettings = FactorialSettings()
-    ladder: LadderSettings = LadderSettings()
-    curve: CurveSettings = CurveSettings()
-    curve_networks: CurveNetworkSettings = CurveNetworkSettings()
-    labelled: LabelledSettings = LabelledSettings()
-    battery: BatterySettings = BatterySettings()
     budget: str = "full"
     seed: int = 0
 
@@ -329,18 +182,19 @@ def groups(settings: Settings) -> dict[str, Any]:
     return {name: group for name in vars(settings) if dataclasses.is_dataclass(group := getattr(settings, name))}
 
 
-def make_settings(budget: str = "full", seed: int = 0, **turned: Any) -> Settings:
+def make_settings(budget: str = "full", seed: int = 0, kind: type[Settings] = Settings, **turned: Any) -> Settings:
     """The settings at a budget, with some of them changed.
 
     Args:
         budget: `full`, or `smoke` for the smaller counts.
         seed: Seed of all random draws.
+        kind: `Settings`, or a class with further groups.
         **turned: Changed settings as `group__field=value`, for example `noise__dropout=0.3`.
 
     Raises:
         InputError: If the budget, a group or a field is unknown.
     """
-    settings = Settings(budget=budget, seed=seed)
+    settings = kind(budget=budget, seed=seed)
     known = {f"{name}__{field.name}" for name, group in groups(settings).items() for field in dataclasses.fields(group)}
     unknown = sorted(set(turned) - known)
     if budget not in BUDGETS or unknown:

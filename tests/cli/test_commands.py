@@ -22,9 +22,7 @@ from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.enhanced_simulator import report_measure
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.gan import NoiseGAN
-from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.surrogates import GaussianNoise
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf"]
@@ -50,8 +48,7 @@ def dirty():
 
 def small(window=60, interval_s=10.0):
     """A simulator with narrow, untrained networks."""
-    generator, discriminator = build_generator(window, 4, 8, seed=0), build_discriminator(window, 8, seed=0)
-    noise = NoiseGAN(generator, discriminator, scale=0.1, seed=0)
+    noise = GaussianNoise(0.1, window)
     return EnhancedSimulator(SquareWaveSimulator([SquareWave(400)]), build_enhancer(window, 16, seed=0), noise, interval_s)
 
 
@@ -71,7 +68,7 @@ def world(tmp_path_factory):
         small().save(folder / "models" / name)
     small().save(folder / "single" / "volts")
     small().save(folder / "damaged" / "volts")
-    (folder / "damaged" / "volts" / "enhancer.keras").write_bytes(b"no network")
+    (folder / "damaged" / "volts" / "arrays.npz").write_bytes(b"no network")
     (folder / "empty").mkdir()
     (folder / "foreign" / "volts").mkdir(parents=True)
     (folder / "foreign" / "volts" / "notes.txt").write_text("mine")
@@ -128,7 +125,7 @@ def test_help_lists_all_choices(capsys):
     for command, words in (
         ("generate", [*MODES, "stuck:0.5"]),
         ("score", DETECTORS),
-        ("fit", ["influxdb://", "convolutional", "paper"]),
+        ("fit", ["influxdb://", "autoregression"]),
         ("inject", INJECTIONS),
     ):
         with pytest.raises(SystemExit):
@@ -395,7 +392,7 @@ WRONG = {
     "models that are not there": (["generate", "nowhere", "--windows", "5", "--out", "x.parquet"], "nowhere"),
     "models of a name no file can have": (["generate", "x" * 300, "--windows", "5", "--out", "x.parquet"], "xxx"),
     "models that are none": (["generate", "WORLD/empty", "--windows", "5", "--out", "x.parquet"], "empty"),
-    "models that are damaged": (["generate", "WORLD/damaged", "--windows", "5", "--out", "x.parquet"], "enhancer.keras"),
+    "models that are damaged": (["generate", "WORLD/damaged", "--windows", "5", "--out", "x.parquet"], "arrays.npz"),
     "channel that was not fitted": ([*GENERATE, "--windows", "5", "--channel", "amps"], "'amps'"),
     "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 channels"),
     "training data as text": (["generate", "WORLD/single", "--windows", "5", "--out", "x.csv"], "x.csv"),

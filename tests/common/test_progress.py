@@ -14,10 +14,10 @@ import pytest
 
 from enhsim_tf.common import console
 from enhsim_tf.common.console import SILENT, Progress, time_left
+from enhsim_tf.common.stages import Stages, Turns
 from enhsim_tf.reproduce.paper import measurements
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import make_settings
-from enhsim_tf.reproduce.stages import Stages, Turns
 
 ROOT = Path(__file__).parents[2]
 SPOKEN = re.compile(r"(.*) ([\d,]+) of ([\d,]+), (\d+) %(, about [\d.]+ (s|min|h) left)?")

@@ -23,8 +23,8 @@ from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.datasets import generate
 from enhsim_tf.datasets.folder import locked
 from enhsim_tf.datasets.generate import generate_data_set, verify
+from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.datasets.scenario_file import Mix
 from enhsim_tf.datasets.shard import shard_file
 from tests.faults.small_data_set import PlainMaker, plan
 

@@ -23,7 +23,7 @@ from enhsim_tf.datasets.labelled_windows import (
     write_series_labelled,
     write_windows_labelled,
 )
-from enhsim_tf.datasets.scenario_file import make_mix
+from enhsim_tf.datasets.mix import make_mix
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise.surrogates import GaussianNoise
 

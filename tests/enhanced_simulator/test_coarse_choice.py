@@ -8,7 +8,7 @@ import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.coarse_simulator.commands import HELD, CommandTraces
-from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
+from enhsim_tf.coarse_simulator.constant_level import ConstantLevel, waves_or_level
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
@@ -165,7 +165,7 @@ def test_a_constant_level_follows_the_mean_of_each_window():
     pairs = cut_pairs([telemetry(values)], coarse, np.array([0, 400, 900]), 64, follow=True)
     np.testing.assert_allclose(pairs.shift, [values[s : s + 64].mean() - 5 for s in (0, 400, 900)], atol=1e-5)
     np.testing.assert_array_equal(pairs.gain, 1.0)
-    assert SquareWaveSimulator.from_config(coarse.get_config()).get_config() == coarse.get_config()
+    assert waves_or_level(coarse.get_config()).get_config() == coarse.get_config()
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
-TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2, noise="convolutional", seed=3, enhancer="network")
+TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2, noise="residual windows", seed=3, enhancer="network")
 DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")
 
 

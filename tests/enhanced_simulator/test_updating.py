@@ -13,9 +13,6 @@ from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 from enhsim_tf.enhanced_simulator.updating import update_simulator
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.gan import NoiseGAN
-from enhsim_tf.noise.generator import build_generator
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.series import Telemetry
@@ -95,9 +92,8 @@ def test_a_wave_of_another_period_is_not_taken():
         WindowBootstrap(SD * np.random.default_rng(1).standard_normal((50, WINDOW)).astype(np.float32)),
         MatchedWindowBootstrap(SD * np.random.default_rng(1).standard_normal((50, WINDOW)), np.zeros((50, min(64, WINDOW)))),
         GaussianAutoregression([0.5], SD, WINDOW),
-        NoiseGAN(build_generator(WINDOW, 4, 8, seed=0), build_discriminator(WINDOW, 8, seed=0), scale=0.02, seed=0),
     ],
-    ids=["windows", "matched windows", "autoregression", "networks"],
+    ids=["windows", "matched windows", "autoregression"],
 )
 def test_the_size_of_each_noise_model_is_updated(noise):
     old = known(noise=noise)

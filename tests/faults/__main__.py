@@ -1,10 +1,9 @@
-"""Fault injection into the real commands with tiny networks: `python -m tests.faults fleet|reproduce --out docs/faults.json`.
+"""Fault injection into the real commands with tiny networks: `python -m tests.faults fleet|reproduce --out faults.json`.
 
 Each try starts a command, injects a fault at a random moment, runs the same command again until it succeeds, and
 compares the results with those of an undisturbed run: every byte of the data set of `generate`; every figure's
 arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
-tries the same on a smaller scale; this takes minutes for `fleet` and about an hour for `reproduce`. `python -m tests.faults page --out
-docs/faults.json` fills the table of docs/faults.md from the file.
+tries the same on a smaller scale; this takes minutes for `fleet` and about an hour for `reproduce`. docs/large_data_sets.md quotes it.
 """
 
 import argparse
@@ -17,11 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.atomic_files import write_json
-from enhsim_tf.reproduce.publish.results import fill_pages
 from tests.faults import of_data_sets, of_reproduce
 from tests.faults.in_common import MISSED
-
-ROOT = Path(__file__).parents[2]
 
 BENCHES = {
     "fleet": (of_data_sets.DataSetBench, of_data_sets.FAULTS),
@@ -30,31 +26,9 @@ BENCHES = {
 TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)"), 20)  # of the others 3
 
 
-def as_markdown(table):
-    """The table of the page: the faults, the command, the number of tries, and the outcomes."""
-    commands = {"fleet": "`generate --workers`", "reproduce": "`enhsim_tf.reproduce`"}
-    lines = ["| fault | command | tries | outcome |", "|---|---|---|---|"]
-    for row in table:
-        outcomes = row["outcomes"]
-        words = "; ".join(f"{count} × {outcome}" if len(outcomes) > 1 else outcome for outcome, count in outcomes.items())
-        lines.append(f"| {row['fault']} | {commands[row['of']]} | {row['tries']} | {words} |")
-    return (
-        "\n".join(lines)
-        + "\n\nFrom `docs/faults.json`, which `python -m tests.faults fleet --out docs/faults.json` and the same with `reproduce` wrote."
-    )
-
-
-def fill_page(table):
-    """Writes the table into the page on faults."""
-    fill_pages(ROOT, {"faults": as_markdown(table)})
-
-
 def main():
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description="Faults, tried for real.")
-    choices = [*BENCHES, "page"]
-    parser.add_argument(
-        "of", choices=choices, help="what is tried: large data sets, or the cache of the paper's reproduction; page: nothing"
-    )
+    parser.add_argument("of", choices=BENCHES, help="what is tried: large data sets, or the cache of the paper's reproduction")
     parser.add_argument("--tries", type=int, help="of each fault (default: 20 of those that kill, 3 of the others)")
     parser.add_argument(
         "--only",
@@ -67,9 +41,6 @@ def main():
     options = parser.parse_args()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore SIGINT, and so would their child processes
     kept = json.loads(options.out.read_text()) if options.out.exists() else []
-    if options.of == "page":
-        fill_page(kept)
-        return 0
     make, faults = BENCHES[options.of]
     table = [row for row in kept if row["of"] != options.of or (options.only and row["fault"] not in options.only)]
     with tempfile.TemporaryDirectory() as folder:

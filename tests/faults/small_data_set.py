@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
+from enhsim_tf.datasets.mix import Mix, ScenarioShare  # noqa: E402
 from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
-from enhsim_tf.datasets.scenario_file import Mix, ScenarioShare  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
 from enhsim_tf.noise.surrogates import GaussianNoise  # noqa: E402
 

@@ -20,11 +20,11 @@ from hypothesis import strategies as st
 from enhsim_tf.__main__ import main
 from enhsim_tf.common.atomic_files import encode_name
 from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of
-from enhsim_tf.reproduce.publish.page import write_page
+from enhsim_tf.reproduce.report import write_page
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
-from tests.fuzzing.of_folders import write_model
+from tests.hostile.folders import write_model
 
 NAMES = (
     "..", ".", "../../up", "/etc/passwd", "..\\..\\up", "C:\\up", "a/b", ".hidden", "CON", "nul", "com1", "LPT9", "Aux ", "trailing.", " lead",

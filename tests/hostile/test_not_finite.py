@@ -9,8 +9,8 @@ import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import Model, Plan
-from enhsim_tf.datasets.scenario_file import Mix
 from enhsim_tf.datasets.shard import make_windows
 from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
@@ -27,7 +27,7 @@ from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
-TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2, noise="convolutional", enhancer="network")
+TINY = FitOptions(window=64, num_windows=40, epochs=1, noise="residual windows", enhancer="network")
 PLACES = np.arange(1_500)
 WAVE = np.sin(2 * np.pi * PLACES / 60)
 NOISE = 0.1 * np.random.default_rng(0).standard_normal(1_500)

@@ -13,7 +13,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.model_folder import folder_of
 from enhsim_tf.telemetry.influx_store import parse_location
 from enhsim_tf.telemetry.sources import read_source
-from tests.fuzzing.of_folders import write_model
+from tests.hostile.folders import write_model
 from tests.hostile.test_names import table_of
 
 TOKEN, PASSWORD = "token-0123456789abcdef==", "pass-0123456789"

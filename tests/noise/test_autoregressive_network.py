@@ -12,7 +12,7 @@ from enhsim_tf.noise.autoregressive_network import AutoregressiveNetwork
 from enhsim_tf.noise.calibration import mixture_probabilities
 from enhsim_tf.noise.selection import LEAST_DISJOINT, Selection, window_statistics
 from enhsim_tf.realism.measures import autocorrelation, effective_rank, log_scales
-from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise
+from studies.common.noise_processes import AutoregressiveNoise
 
 SAMPLES = 64
 

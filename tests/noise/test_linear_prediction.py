@@ -7,7 +7,7 @@ from scipy.linalg import solve_toeplitz
 
 from enhsim_tf.noise.linear_prediction import LinearPrediction
 from enhsim_tf.noise.surrogates import GaussianAutoregression
-from enhsim_tf.reproduce.noise_processes import AutoregressiveNoise, FractionalGaussianNoise
+from studies.common.noise_processes import AutoregressiveNoise, FractionalGaussianNoise
 
 SAMPLES = 40
 

@@ -12,7 +12,7 @@ import pytest
 
 from enhsim_tf.realism import measures as fidelity
 from enhsim_tf.realism.real_floor import MEASURES, RealFloor, evaluate
-from enhsim_tf.reproduce.robustness import negative_controls
+from tests.realism import negative_controls
 
 NUM_WINDOWS, SAMPLES = 200, 500
 NAMES = [measure.name for measure in MEASURES]

@@ -1,114 +1,46 @@
-"""Tests of the book without building it: its table of contents, its links and the check of its pages."""
+"""The book without building it, the marked tables of its pages, and the code of CONTRIBUTING.md."""
 
 import re
-from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+import yaml
 
+import enhsim_tf
 from book import __main__ as command
-from book import api_pages
-from book.contents import DOCS, with_other_pages
-from book.from_readme import relink
-from book.html_check import problems
+from book import tables
+from enhsim_tf.common.errors import InputError
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text("utf-8")
-PAGES = sorted((ROOT / "book").glob("*.md"))
-INCLUDED = re.compile(r'\.\./README\.md\n:start-after: "(.*)"\n:end-before: "(.*)"')
 
 
-def entries(page):
-    """Names that the tables of contents of a page list, from the root of the repository, with patterns as they are."""
-    text = page.read_text("utf-8")
-    if page.stem == "index":
-        text = with_other_pages(text, sorted(path.stem for path in DOCS.glob("*.md")))
-    lines = [line for table in re.findall(r"```\{toctree\}\n(.*?)```", text, re.S) for line in table.splitlines()]
-    names = [re.sub(r"^.* <|>$", "", line) for line in lines if line and not line.startswith(":")]
-    return [name.removeprefix("/") if name.startswith("/") else f"book/{name}" for name in names]
+def entries(node):
+    """Names of the files in a part of the table of contents, and its patterns."""
+    if isinstance(node, dict):
+        return [value for key, value in node.items() if key in ("root", "file", "glob")] + entries(list(node.values()))
+    return [name for part in node for name in entries(part)] if isinstance(node, list) else []
 
 
-def test_every_page_and_notebook_is_in_the_table_of_contents_once():
-    listed = [entry for page in PAGES for entry in entries(page)]
-    sources = [
-        *PAGES,
-        *DOCS.glob("*.md"),
-        *(ROOT / "notebooks").glob("*.ipynb"),
-        *(ROOT / f"{name}.md" for name in ("SECURITY", "CONTRIBUTING", "CHANGELOG")),
-    ]
-    names = {path.relative_to(ROOT).with_suffix("").as_posix() for path in sources} - {"book/index"}
-    assert len(names) > 40
-    assert {name: [entry for entry in listed if fnmatchcase(name, entry)] for name in names} == {
-        name: [entry for entry in listed if fnmatchcase(name, entry)][:1] or ["one"] for name in names
-    }
-    assert [entry for entry in listed if entry != "book/api/*" and not any(fnmatchcase(name, entry) for name in names)] == []
+def test_every_page_is_in_the_table_of_contents():
+    listed = entries(yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8")))
+    patterns = {name for name in listed if "*" in name}
+    assert {f"docs/{page.stem}" for page in (ROOT / "docs").glob("*.md")} <= set(listed)
+    assert patterns == {"notebooks/*", "studies/*/README"}
+    assert [name for name in set(listed) - patterns if not (ROOT / f"{name}.md").is_file()] == []
 
 
-def test_pages_that_no_line_names_stand_in_the_place_of_their_pattern():
-    index = "/docs/b\nothers: /docs/R*\nTitle </docs/c>\nothers: /docs/*\nlast\n"
-    assert with_other_pages(index, ["R", "a", "b", "c", "d"]) == "/docs/b\n/docs/R\nTitle </docs/c>\n/docs/a\n/docs/d\nlast\n"
+def test_links_between_pages_lead_to_files():
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "studies").rglob("README.md")]
+    links = [(page, link) for page in pages for link in re.findall(r"\]\((?!\w+:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))]
+    assert len(links) > 50
+    assert [(page.name, link) for page, link in links if not (page.parent / link).exists()] == []
 
 
-def test_the_first_page_includes_the_readme():
-    (included,) = [INCLUDED.findall(page.read_text("utf-8")) for page in PAGES if page.stem == "index"]
-    ((begin, end),) = included
-    assert README.count(begin) == README.count(end) == 1 and README.index(begin) < README.index(end)
-    assert len(README.splitlines()) <= 150
-
-
-def test_links_of_the_readme_lead_from_a_page_to_files_and_to_its_own_sections():
-    text = relink(README, "README.md", "book/page.md")
-    links = re.findall(r"\]\((?!\w+:)([^)#\s]+)(#[^)\s]+)?\)", text)
-    assert len(links) > 10
-    for path, section in links:
-        target = ROOT / "book" / path
-        assert target.is_file(), path
-        if section:
-            headings = re.findall(r"^#+ (.*)", README + target.read_text("utf-8"), re.M)
-            assert section[1:] in {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}, section
-
-
-def test_links_to_the_readme_lead_to_the_book():
-    text = "[a](../README.md), [b](b.md#x), [c](../README.md#what-a-practitioner-should-do), [d](https://e.org/README.md)"
-    found = relink(text, "docs/page.md", "docs/page.md")
-    assert found == "[a](../book/index.md), [b](b.md#x), [c](../book/index.md#what-a-practitioner-should-do), [d](https://e.org/README.md)"
-    with pytest.raises(KeyError):
-        relink("[a](#a-section-that-nothing-lists)", "README.md", "book/page.md")
-
-
-def test_every_module_but_those_of_the_commands_is_on_one_page_of_the_reference():
-    modules = [module for found in api_pages.pages().values() for module in found]
-    paths = [
-        path.relative_to(ROOT).with_suffix("")
-        for path in (ROOT / "enhsim_tf").rglob("*.py")
-        if path.name not in ("__init__.py", "__main__.py")
-    ]
-    assert sorted(modules) == sorted(".".join(path.parts) for path in paths if path.parts[1] != "cli")
-
-
-def test_docstrings_are_turned_from_markdown_code():
-    assert api_pages.prepare_docstring("function", ["Adds `a` to ``b``.", "", ":func:`c`"]) == ["Adds ``a`` to ``b``.", "", ":func:`c`"]
-    assert api_pages.prepare_docstring("data", ["Maps: `a`."]) == ["", "Maps: ``a``."]
-
-
-def test_the_check_of_pages_finds_what_is_broken_and_what_is_loaded(tmp_path):
-    (tmp_path / "good.html").write_text(
-        '<link rel="stylesheet" href="a.css"><h1 id="top"></h1><a href="https://x.org">x</a>', encoding="utf-8"
-    )
-    (tmp_path / "a.css").write_text("a { color: red }", encoding="utf-8")
-    assert list(problems(tmp_path)) == []
-    (tmp_path / "bad.html").write_text(
-        '<script src="https://x.org/a.js"></script><a href="good.html#top"></a><a href="good.html#none"></a><img src="no.png"><a href="#here"></a>',
-        encoding="utf-8",
-    )
-    (tmp_path / "b.css").write_text("@font-face { src: url(https://x.org/a.woff) }", encoding="utf-8")
-    assert sorted(problems(tmp_path)) == [
-        "b.css: loads from a network",
-        "bad.html: loads https://x.org/a.js",
-        "bad.html: there is no file no.png",
-        "bad.html: there is no place #here",
-        "bad.html: there is no place good.html#none",
-    ]
+def test_the_reference_lists_the_public_names():
+    assert set(re.findall(r"^   (\w+)$", (ROOT / "book" / "api.md").read_text(encoding="utf-8"), re.M)) == set(enhsim_tf.__all__)
 
 
 def test_missing_packages_are_named_in_one_line(monkeypatch, capsys, tmp_path):
@@ -118,15 +50,39 @@ def test_missing_packages_are_named_in_one_line(monkeypatch, capsys, tmp_path):
     assert said.count("\n") == 1 and "sphinx, myst_nb" in said and not (tmp_path / "book").exists()
 
 
-def test_a_formula_becomes_mathml():
-    pytest.importorskip("docutils.utils.math")
-    from docutils import nodes
+# the marked tables
 
-    from book import mathml
 
-    class Writer:
-        body: list[str] = []
+def test_no_marked_table_is_stale():
+    assert list(tables.stale(ROOT)) == [], "run `python -m book --tables`"
 
-    with pytest.raises(nodes.SkipNode):
-        mathml.visit_block(Writer, nodes.math_block("", r"\frac{a}{2}"))
-    assert re.sub(r"\s+", "", "".join(Writer.body)).count("<mfrac><mi>a</mi><mn>2</mn></mfrac>") == 1
+
+def test_another_processor_is_not_another_result():
+    assert tables.agree("| C1 | partly | error 0.093; 1,200 |", "| C1 | partly | error 0.106; 1,000 |")
+    assert not tables.agree("| C1 | partly | error 0.093 |", "| C1 | partly | error 0.5 |")
+    assert not tables.agree("| C1 | partly | error 0.093 |", "| C1 | reproduced | error 0.093 |")
+
+
+def test_a_table_stands_between_its_markers():
+    page = "before\n<!-- a: generated -->\nold\n<!-- end of a -->\nafter\n"
+    assert tables.fill_part(page, "a", "new", "page.md") == page.replace("old", "new")
+    with pytest.raises(InputError, match="markers of 'b' once in page.md"):
+        tables.fill_part(page, "b", "new", "page.md")
+
+
+# the code of CONTRIBUTING.md
+
+
+def test_the_examples_for_contributors_work(tmp_path):
+    names = {"np": np, "pd": pd, "Path": Path, "Any": Any, "Cleaning": None, "InputError": InputError}
+    for block in re.findall(r"```python\n(\S.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.S):
+        exec(block, names)
+    windows = np.array([[0.0, 1.0], [2.0, 3.0], [0.0, 4.0]])
+    assert names["WindowRange"]().fit(windows).score(windows).tolist() == [0, 0, 3]
+    assert names["Ramp"](4.0).run(np.arange(6)).ravel().tolist() == [0, 0.25, 0.5, 0.75, 0, 0.25]
+    (tmp_path / "x.jsonl").write_text('{"volts": 1.5, "mode": "on"}\n{"volts": 2.5, "mode": "off"}\n')
+    (channel,) = names["read_json_lines"](tmp_path / "x.jsonl", None, None, None).values()
+    assert channel.tolist() == [1.5, 2.5]
+    (tmp_path / "bad.jsonl").write_text("{")
+    with pytest.raises(InputError):
+        names["read_json_lines"](tmp_path / "bad.jsonl", None, None, None)

@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.common import figure
 from enhsim_tf.reproduce import __main__ as command
-from enhsim_tf.reproduce import figure
+from enhsim_tf.reproduce import report as page
 from enhsim_tf.reproduce.__main__ import main, parse
 from enhsim_tf.reproduce.paper import claims, figures
 from enhsim_tf.reproduce.paper.figures import FIGURES
-from enhsim_tf.reproduce.publish import page
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf.reproduce"]
@@ -352,55 +352,3 @@ def test_the_captions_say_commands_that_draw_the_same_again(tmp_path, monkeypatc
         again, first = (parse(words) for words in (shlex.split(line.split(" · ")[2])[3:], ["--only", "fig02", *means]))
         assert Path(again.telemetry or ".").resolve() == Path(first.telemetry or ".").resolve()
         assert {**vars(again), "telemetry": None} == {**vars(first), "telemetry": None}
-
-
-def test_a_full_run_into_figures_fills_the_readme_and_no_other_run_does(pretended, tmp_path):
-    readme = "# Title\n" + (ROOT / "README.md").read_text(encoding="utf-8").split("\n", 1)[1]
-    (tmp_path / "README.md").write_text(readme, encoding="utf-8")
-    (tmp_path / "docs").mkdir()
-    page = (ROOT / "docs" / "what_holds.md").read_text(encoding="utf-8")
-    (tmp_path / "docs" / "what_holds.md").write_text(page, encoding="utf-8")
-    for arguments in (["--out", "elsewhere"], ["--budget", "smoke"], ["--only", "fig02"]):
-        assert pretended(*arguments) == 0
-        assert (tmp_path / "README.md").read_text(encoding="utf-8") == readme
-        assert (tmp_path / "docs" / "what_holds.md").read_text(encoding="utf-8") == page
-    assert pretended() == 0
-    filled = (tmp_path / "docs" / "what_holds.md").read_text(encoding="utf-8")
-    assert filled.count("| words (words) |") == filled.count("| words |") == 9
-    assert (tmp_path / "README.md").read_text(encoding="utf-8").startswith("# [Re, in part] Title\n")
-
-
-def test_a_foreign_readme_does_not_stop_a_run(pretended, tmp_path):
-    (tmp_path / "README.md").write_text("# My own project\n")
-    assert pretended() == 0
-    assert (tmp_path / "README.md").read_text() == "# My own project\n"
-
-
-def test_a_part_of_an_experiment_does_not_take_the_place_of_the_whole(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    header = "chan_id,spacecraft,anomaly_sequences,class,num_values\n"
-    for folder, names in (("shown", "AB"), ("mine", "AC")):
-        Path(folder).mkdir()
-        Path(folder, "labeled_anomalies.csv").write_text(header + "".join(f'{name},X,"[[5, 9]]",[point],100\n' for name in names))
-    labelled = ["--experiment", "labelled", "--data"]
-    assert command.out_folder(parse([*labelled, "mine"])) == Path("figures")  # nothing is shown yet
-    Path("figures/labelled").mkdir(parents=True)
-    Path("figures/labelled/findings.json").write_text(json.dumps({"channels": ["A"], "skipped": {"B": "why"}}))
-    for arguments, out in {
-        "--experiment robustness": "figures",
-        "--experiment robustness --seeds 2": "figures_part",
-        "--experiment factorial": "figures",
-        "--experiment factorial --seeds 1": "figures_part",
-        "--experiment robustness --environment shot --budget smoke": "smoke_part",
-        "--experiment battery": "figures",
-        "--experiment battery --seeds 2": "figures_part",
-        "--experiment labelled --data shown": "figures",
-        "--experiment labelled --data shown --channels A": "figures_shown",
-        "--experiment labelled --data mine": "figures_mine",
-        "--experiment labelled --data mine --out figures": "figures",
-        "--telemetry mine/x.csv": "figures_x",
-        "": "figures",
-    }.items():
-        options = parse(arguments.split())
-        assert command.out_folder(options) == Path(out), arguments
-        assert command.is_other(options) == (out != "figures" and "x.csv" not in arguments or "--out" in arguments), arguments

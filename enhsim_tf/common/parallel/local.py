@@ -3,7 +3,6 @@
 import collections
 import concurrent.futures
 import contextlib
-import itertools
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -77,11 +76,9 @@ def run_local(initialize: Callable[[], Any], items: Iterator[Any], workers: int 
     Raises:
         InputError: If the function raises one, or if the processes keep dying.
     """
-    first = list(itertools.islice(items, workers or num_cpus()))
-    num_processes, retry, items, failures = max(1, len(first)), collections.deque(), itertools.chain(first, items), WorkerFailures()
-    del first
+    num_processes, retry, failures = workers or num_cpus(), collections.deque(), WorkerFailures()
     while True:
-        with _pool(initialize, num_processes) as pool:
+        with _pool(initialize, num_processes) as pool:  # it starts a process when an item is submitted and none is idle
             running: dict[concurrent.futures.Future, Any] = {}
             try:
                 while True:

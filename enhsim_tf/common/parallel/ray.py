@@ -116,30 +116,19 @@ def _cluster() -> Iterator[Any]:
     local = {} if address else {"object_store_memory": 100_000_000, "include_dashboard": False}  # only small objects are exchanged
     _check_address(address)
     try:
-        starting = _Starting(f"at {address}" if address else "that starts here", (*_REFUSALS, ray.exceptions.RayError))
-        with starting, warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # Ray warns of a server that does not answer before it raises
-            ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # Ray warns of a server that does not answer before it raises
+                ray.init(address or "local", logging_level=logging.ERROR, log_to_driver=False, **local)
+        except Exception as error:
+            # for a node that does not start in time, Ray raises a plain Exception
+            if type(error) is not Exception and not isinstance(error, (*_REFUSALS, ray.exceptions.RayError)):
+                raise
+            where = f"at {address}" if address else "that starts here"
+            raise InputError(f"Expected a Ray cluster {where}. Received: {_last_line(error)}.") from None
         yield ray
     finally:
         ray.shutdown()  # also after a failed start, since Ray would keep trying to reach the server
-
-
-class _Starting:
-    """Turns the errors that Ray raises for a missing cluster into an `InputError`.
-
-    For a node that does not start in time, Ray raises a plain `Exception`.
-    """
-
-    def __init__(self, where: str, kinds: tuple[type[Exception], ...]):
-        self.where, self.kinds = where, kinds
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
-        if kind is Exception or isinstance(error, self.kinds):
-            raise InputError(f"Expected a Ray cluster {self.where}. Received: {_last_line(error)}.") from None
 
 
 def _check_address(address: str | None) -> None:

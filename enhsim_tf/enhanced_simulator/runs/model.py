@@ -276,10 +276,10 @@ class RunModel(NoisyOutput):
             folder: The folder. A model that was saved there before is replaced.
 
         Raises:
-            InputError: If the folder contains something other than a saved model, or if a number of the model is not finite; the
-                folder is left unchanged.
+            InputError: If the folder contains something other than a saved model, if a number of the model is not finite, or if its
+                noise is a GAN, which is not saved; the folder is left unchanged.
         """
-        saving.save_run_model(self, folder)
+        saving.save_run_model(folder, self.rung, self.noise, self.coverage, self.nominal, self.delay_s, self.trained, self.quantisation)
 
     @classmethod
     def load(cls, folder: str | os.PathLike, coarse: CoarseSimulator | None = None) -> "RunModel":
@@ -293,7 +293,7 @@ class RunModel(NoisyOutput):
             InputError: If the folder was not written by `save`, a file in it has changed since, or the simulator has other
                 columns than the model.
         """
-        model = saving.load_run_model(folder)
+        model = cls(**saving.load_run_model(folder))
         if coarse is not None:
             if set(model.columns) - set(coarse.columns):
                 raise InputError(

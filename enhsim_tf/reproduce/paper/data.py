@@ -16,7 +16,6 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimula
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.training_pairs import paired_windows
 from enhsim_tf.noise.extraction import extract_noise, noise_unit
-from enhsim_tf.reproduce.noise_gallery import GALLERY
 from enhsim_tf.reproduce.paper.signals import sines
 from enhsim_tf.reproduce.settings import Settings
 from enhsim_tf.telemetry.parquet_store import ParquetStore
@@ -91,24 +90,6 @@ def draw(settings: Settings, purpose: str) -> np.random.Generator:
     return np.random.default_rng([settings.seed, zlib.crc32(purpose.encode())])
 
 
-def draw_noise(settings: Settings, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The noise of the example telemetry, float64 of the shape of the signal.
-
-    Args:
-        settings: All settings; `telemetry.noise` names the process.
-        signal: The noiseless signal, shape `(num_samples,)`, on which one of the processes depends.
-        rng: Random generator.
-
-    Raises:
-        InputError: If there is no process of that name.
-    """
-    chosen = settings.telemetry
-    if chosen.noise not in GALLERY:
-        raise InputError(f"Expected telemetry.noise to be one of {', '.join(GALLERY)}. Received: {chosen.noise!r}.")
-    process = GALLERY[chosen.noise]
-    return chosen.noise_sd / process.standard_deviation * process.draw(len(signal), rng, signal)
-
-
 def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -> None:
     """Writes the telemetry to the store: the paper's example or a real channel.
 
@@ -124,7 +105,7 @@ def fill_store(store: ParquetStore, settings: Settings, source: Source | None) -
     rng = draw(settings, "telemetry")
     for name, (periods, amplitudes) in waves_of(settings).items():
         clean = sines(chosen.interval_s * np.arange(chosen.num_samples), periods, amplitudes)
-        values = (clean + draw_noise(settings, clean, rng)).astype(np.float32)
+        values = (clean + chosen.draw_noise(clean, rng)).astype(np.float32)
         store.write(Telemetry(values, chosen.interval_s, start="2020-01-01T00:00:00+00:00", name=name))
 
 
@@ -245,5 +226,5 @@ class Data:
         channel, rng = self.channels[0], self.draw(f"degraded {scenario}")
         size = sum(channel.amplitudes)
         clean = degrade(channel.truth, self.degraded_times(), scenario, (-size, size), min(channel.periods_s), rng)
-        noise = draw_noise(self.settings, clean.ravel(), self.draw(f"degraded noise {scenario}"))
+        noise = self.settings.telemetry.draw_noise(clean.ravel(), self.draw(f"degraded noise {scenario}"))
         return (clean + noise.reshape(clean.shape) if noisy else clean).astype(np.float32)

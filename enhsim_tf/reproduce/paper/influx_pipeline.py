@@ -10,13 +10,12 @@ import json
 from pathlib import Path
 
 from enhsim_tf.common.atomic_files import sha256, write_json
+from enhsim_tf.common.stages import Stages
 from enhsim_tf.reproduce.paper.data import Source, fill_store
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import Stages
 from enhsim_tf.telemetry.influx_store import InfluxStore, parse_location
 
-_MODULES = ("reproduce.paper.data", "telemetry.influx_store")
 _VERSIONS = "versions.json"  # in the stage's folder: what the store held when it was filled
 
 
@@ -49,7 +48,7 @@ class InfluxExperiment(Experiment):
             fill_store(store, settings, source)
             write_json(folder / _VERSIONS, store.versions())
 
-        folder = self.stages.run("telemetry", place_telemetry, _MODULES, (*depends, str(store.location)))
+        folder = self.stages.run("telemetry", place_telemetry, (*depends, str(store.location)))
         kept = json.loads((folder / _VERSIONS).read_text(encoding="utf-8"))
         if store.versions() != kept:  # the stage was done before: on another server, or its points are deleted since
             fill_store(store, settings, source)

@@ -13,21 +13,16 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.reproduce.paper import measurements
 from enhsim_tf.reproduce.paper.data import Data, Source, fill_store
 from enhsim_tf.reproduce.settings import Settings
-from enhsim_tf.reproduce.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 
 if TYPE_CHECKING:
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.keras_tools.backend import keras
-
-_DATA = ("reproduce.paper.data",)
-_ENHANCER = (*_DATA, "enhancer.network", "keras_tools.training")
-_NOISE = (*_DATA, "noise.gan", "noise.generator", "noise.discriminator", "realism.measures")
-_MEASURED = ("reproduce.paper.pipeline",)  # the results depend on the architecture of the networks
 
 
 class Experiment:
@@ -59,7 +54,7 @@ class Experiment:
             raise InputError(
                 f"Expected a telemetry file. Received: {self.source.path}, which does not exist or is no file. Check the path."
             )
-        return ParquetStore(self.stages.run("telemetry", self._make_telemetry, _DATA, depends))
+        return ParquetStore(self.stages.run("telemetry", self._make_telemetry, depends))
 
     def _make_telemetry(self, folder: Path) -> None:
         fill_store(ParquetStore(folder), self.settings, self.source)
@@ -82,8 +77,7 @@ class Experiment:
             self.settings.noise.moving_average,
             self.settings.seed,
         )
-        helpers = (Experiment.untrained_enhancer,)
-        return self.stages.run("enhancer", self._make_enhancer, _ENHANCER, depends, ("telemetry",), helpers)
+        return self.stages.run("enhancer", self._make_enhancer, depends, ("telemetry",))
 
     def untrained_enhancer(self) -> "keras.Model":
         """The enhancer before training."""
@@ -124,8 +118,7 @@ class Experiment:
         """Folder of the trained noise GAN (the paper's second network), its history and the statistics of its noise during training."""
         _ = self.data
         depends = (self.settings.telemetry, self.settings.split, self.settings.noise, self.settings.adversarial, self.settings.seed)
-        helpers = (Experiment.untrained_noise_networks,)
-        return self.stages.run("noise GAN", self._make_noise, _NOISE, depends, ("telemetry",), helpers)
+        return self.stages.run("noise GAN", self._make_noise, depends, ("telemetry",))
 
     def untrained_noise_networks(self) -> "tuple[keras.Model, keras.Model]":
         """The generator and the discriminator before training."""
@@ -219,7 +212,7 @@ class Experiment:
 
     def _measure(self, name: str, make: Callable[[Path], None]) -> dict[str, np.ndarray]:
         _ = self.enhancer_folder, self.noise_folder
-        return load_arrays(self.stages.run(name, make, _MEASURED, self.settings, after=("telemetry", "enhancer", "noise GAN")))
+        return load_arrays(self.stages.run(name, make, self.settings, after=("telemetry", "enhancer", "noise GAN")))
 
     @functools.cached_property
     def enhancement(self) -> dict[str, np.ndarray]:

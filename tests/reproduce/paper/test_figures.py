@@ -15,13 +15,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from enhsim_tf.common import plot_style
-from enhsim_tf.reproduce.figure import WATERMARK, save
+from enhsim_tf.common.figure import WATERMARK, save
+from enhsim_tf.common.stages import Stages
 from enhsim_tf.reproduce.paper.data import Source
 from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.figures.layer_table import layer_names, layer_rows
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import make_settings
-from enhsim_tf.reproduce.stages import Stages
 
 WINDOW = 500
 CAPTIONS = {  # of the paper's figures that have one

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from enhsim_tf.common.stages import Stages
 from enhsim_tf.reproduce.paper.data import Source
 from enhsim_tf.reproduce.paper.figures import FIGURES
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 from enhsim_tf.reproduce.settings import make_settings
-from enhsim_tf.reproduce.stages import Stages
 
 ROOT = Path(__file__).parents[3]
 SMAP = ROOT / ".." / "shared" / "data" / "smap" / "train"

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from enhsim_tf.reproduce.figure import Figure
+from enhsim_tf.common.figure import Figure
 from enhsim_tf.reproduce.paper.pipeline import Experiment
 
 Arrays = dict[str, np.ndarray]

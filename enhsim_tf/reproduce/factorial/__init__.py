@@ -1,1 +1,0 @@
-"""The factorial experiment: which part of the pipeline (windows, extraction, enhancer or generator) lowers false alarms."""

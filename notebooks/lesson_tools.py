@@ -1,0 +1,247 @@
+"""What the lessons share: the paper's experiment, its figures and claims, published results of studies, pictures, and answers.
+
+Jupyter starts the kernel of a lesson in the folder of the lesson, where it finds this module. Importing it puts the clone on the path, so
+that a lesson finds `enhsim_tf` and `studies` beside it. A lesson takes the paper's pipeline from here only.
+"""
+
+import contextlib
+import io
+import json
+import os
+import sys
+import tempfile
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.figure
+import matplotlib.style
+from IPython.display import Markdown, display
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+from enhsim_tf.common import figure
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.plot_style import STYLE
+from enhsim_tf.common.stages import Stages, default_cache
+from enhsim_tf.reproduce.caption import figure_caption
+from enhsim_tf.reproduce.paper.claims import CLAIMS, judge
+from enhsim_tf.reproduce.paper.figures import FIGURES
+from enhsim_tf.reproduce.paper.pipeline import Experiment
+from enhsim_tf.reproduce.settings import make_settings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FULL, SMOKE = "full", "smoke"
+BUDGET = "ENHSIM_TF_BUDGET"  # environment variable with the budget of the experiment
+STATIC = (
+    "ENHSIM_TF_STATIC"  # set while a lesson is executed to be read: it then holds pictures instead of sliders
+)
+NOT_ANSWERED, RIGHT, NOT_YET = "Not yet answered.", "Right.", "Not yet."
+_SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
+_LEDGER = {known.id: known for known in CLAIMS}
+
+
+# -- the experiment ----------------------------------------------------------------------------------------------------------
+
+
+def open_experiment(budget: str | None = None) -> Experiment:
+    """Opens the paper's experiment with seed 0.
+
+    A stage runs when a cell first asks for it, and is kept for all lessons and for `python -m enhsim_tf.reproduce`.
+
+    Args:
+        budget: `full` or `smoke`; None takes it from the environment variable `ENHSIM_TF_BUDGET`, or `full`.
+
+    Raises:
+        InputError: If there is no such budget.
+    """
+    from enhsim_tf.keras_tools import backend  # noqa: F401  a lesson that imports Keras itself then has the package's settings
+
+    budget = budget or os.environ.get(BUDGET, FULL)
+    if budget not in (FULL, SMOKE):
+        raise InputError(f"Expected {BUDGET} to be {FULL} or {SMOKE}. Received: {budget!r}.")
+    settings = make_settings(budget)
+    print(f"{budget.capitalize()} budget, seed {settings.seed}.")
+    stages = Stages(
+        default_cache(), tell=lambda line: None if line.endswith("(from the cache)") else print(line)
+    )
+    return Experiment(settings, stages, verbose=1)
+
+
+def show(experiment: Experiment, name: str) -> dict[str, Any]:
+    """Shows a figure of the paper as `figures/` holds it.
+
+    Args:
+        experiment: As `open_experiment` returns it.
+        name: One of `FIGURES`.
+
+    Returns:
+        The arrays behind the figure.
+    """
+    arrays, is_smoke = FIGURES[name].arrays(experiment), experiment.settings.budget == SMOKE
+    with tempfile.TemporaryDirectory() as folder:
+        (path,) = figure.save(
+            name, arrays, folder, figure_caption(name, experiment), is_smoke, ("png",), figures=FIGURES
+        )
+        _show_picture(path.read_bytes(), FIGURES[name].alt)
+    return arrays
+
+
+def claim(*ids: str) -> None:
+    """Displays claims of the paper: the sentence and its section."""
+    for known in (_LEDGER[id] for id in ids):
+        place = f"section {known.section}" if known.section[0].isdigit() else known.section
+        display(Markdown(f"> **{known.id}** (paper, {place}): {known.sentence}"))
+
+
+def verdict(experiment: Experiment, *ids: str) -> list[dict[str, Any]]:
+    """Evaluates claims, and displays each verdict with its finding and what the claim is held to.
+
+    Returns:
+        The records as `results.json` stores them.
+    """
+    records = judge(tuple(_LEDGER[id] for id in ids), experiment)
+    for record in records:
+        known, finding = _LEDGER[record["id"]], record["finding"]
+        display(
+            Markdown(
+                f"> **{known.id}: {record['verdict']}.** {finding[0].upper()}{finding[1:]}.\n>\n"
+                f"> *Held to:* {known.statistic}; {known.tolerance}."
+            )
+        )
+    return records
+
+
+def open_study(name: str) -> "tuple[dict[str, Any], dict[str, pd.DataFrame]]":
+    """Reads the published results of a study.
+
+    Args:
+        name: Name of its folder in `studies/`, such as `battery`.
+
+    Returns:
+        Its findings, and its tables by the names of their files.
+
+    Raises:
+        InputError: If there is no such study.
+    """
+    import pandas as pd
+
+    folder = ROOT / "studies" / name / "results"
+    if not (folder / "findings.json").is_file():
+        known = ", ".join(
+            sorted(path.parents[1].name for path in ROOT.glob("studies/*/results/findings.json"))
+        )
+        raise InputError(f"Expected one of the studies {known}. Received: {name!r}.")
+    read = {".parquet": pd.read_parquet, ".csv": pd.read_csv}
+    tables = {path.stem: read[path.suffix](path) for path in sorted(folder.iterdir()) if path.suffix in read}
+    return json.loads((folder / "findings.json").read_text(encoding="utf-8")), tables
+
+
+# -- pictures and sentences --------------------------------------------------------------------------------------------------
+
+
+def say(text: str) -> None:
+    """Displays a sentence with computed numbers as Markdown."""
+    display(Markdown(text))
+
+
+@contextlib.contextmanager
+def drawing(
+    alt: str, columns: int = 1, height: float = 2.4, title: str = "", **shared: bool
+) -> Iterator[Any]:
+    """A row of panels in the common style, displayed when the `with` block ends.
+
+    Args:
+        alt: Text alternative.
+        columns: Number of panels.
+        height: Height in inches.
+        title: What the picture says, above the panels.
+        **shared: What `matplotlib.figure.Figure.subplots` takes, for example `sharey`.
+    """
+    with matplotlib.style.context(STYLE):
+        canvas = matplotlib.figure.Figure(figsize=(7.2, height), layout="constrained")
+        if title:
+            canvas.suptitle(textwrap.fill(title, 96), x=0.012, ha="left", size=9, weight="bold")
+        yield canvas.subplots(1, columns, **shared)
+        picture = io.BytesIO()
+        canvas.savefig(picture, format="png", metadata={"Software": None})
+    _show_picture(picture.getvalue(), alt)
+
+
+def _show_picture(png: bytes, alt: str) -> None:
+    picture, small = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
+    # 48 colours: a third of the bytes, the same to the eye
+    picture.quantize(48, dither=Image.Dither.NONE).save(small, "png", optimize=True)
+    about = {"width": int(picture.width * _SCREEN), "alt": alt}
+    display(
+        {"image/png": small.getvalue(), "text/plain": f"Figure: {alt}"},
+        metadata={"image/png": about},
+        raw=True,
+    )
+
+
+def slider(
+    draw: Callable[[Any], None], label: str, values: Sequence[Any], shown: Sequence[Any], unit: str = ""
+) -> None:
+    """Displays a picture below a slider, or the pictures of a few values in a lesson that is executed to be read.
+
+    Args:
+        draw: Draws the picture for a value, for example with `drawing`.
+        label: What the slider changes.
+        values: The values of the slider, in their order.
+        shown: The values whose pictures are stored; the slider starts at the first one.
+        unit: Unit of the values.
+    """
+    name = f"{label} ({unit})" if unit else label
+    if os.environ.get(STATIC):
+        say(
+            f"*In Jupyter, this cell has a slider for the {name}. Stored here: {', '.join(map(str, shown))}.*"
+        )
+        for value in shown:
+            draw(value)
+        return
+    import ipywidgets
+
+    control = ipywidgets.SelectionSlider(
+        options=list(values),
+        value=shown[0],
+        description=name,
+        continuous_update=False,
+        style={"description_width": "initial"},
+        layout={"width": "80%"},
+    )
+    display(control, ipywidgets.interactive_output(lambda value: draw(value), {"value": control}))
+
+
+# -- answers -----------------------------------------------------------------------------------------------------------------
+
+
+def check_answer(answer: Any, is_right: Callable[[Any], bool], hint: str) -> None:
+    """Says whether a student's answer to an exercise is right.
+
+    Args:
+        answer: The answer; None for a starter cell that was not changed.
+        is_right: Whether an answer is right.
+        hint: What to look at if it is not.
+    """
+    if answer is None:
+        print(NOT_ANSWERED)
+        return
+    try:
+        right = bool(is_right(answer))
+    except (
+        TypeError,
+        ValueError,
+        IndexError,
+        KeyError,
+        AttributeError,
+    ) as error:  # an answer of another type or shape
+        print(f"{NOT_YET} The check cannot use this answer: {error}")
+        return
+    print(RIGHT if right else f"{NOT_YET} {hint}")

@@ -1,0 +1,1 @@
+"""Studies beyond the paper, each with one command: `python -m studies.NAME`."""

@@ -1,0 +1,80 @@
+"""Writes the small recorded pair that ships with the project: `python -m studies.battery.example examples/battery`.
+
+The files need no PyBaMM to be read. Times count seconds.
+
+    telemetry.csv        the fine simulator's voltage through a noisy sensor: what a spacecraft would send
+    simulator.csv        the coarse simulator over the same orbits: voltage, current and temperature
+    simulator_fault.csv  the coarse simulator over other orbits: a nominal orbit, then raised resistance, with its labels
+    telemetry_fault.csv  the telemetry of those orbits
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.common.atomic_files import make_folder, replace_file
+from enhsim_tf.common.console import run_command, tell
+from enhsim_tf.common.errors import InputError
+from studies.battery.faults import SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
+from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
+from studies.battery.simulate import COLUMNS, simulate_all
+
+SEED = 7
+NUM_ORBITS, NUM_FAULT_ORBITS = 32, 4
+FAULT = Fault("raised resistance", 1.0)
+_DIGITS = tuple(zip(COLUMNS, (4, 3, 2), strict=True))
+
+
+def write_example(folder: Path, seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int = NUM_FAULT_ORBITS) -> None:
+    """Simulates the pair in the gentle regime and writes its four files.
+
+    Args:
+        folder: The output folder, which is created.
+        seed: Seed of the loads and of the sensor.
+        num_orbits: Nominal orbits.
+        num_fault_orbits: Orbits of the run with a fault; the first is nominal.
+
+    Raises:
+        InputError: If PyBaMM is not installed or the folder cannot be written to.
+    """
+    import pandas as pd
+
+    folder, regime = make_folder(folder), REGIMES["gentle"]
+    loads, noise = np.random.default_rng([seed, 0]), np.random.default_rng([seed, 1])
+    for number, fault, suffix in ((num_orbits, None, ""), (num_fault_orbits, FAULT, "_fault")):
+        load = draw_load(number + 1, regime, loads)  # in the first orbit, which is left out, the battery reaches its usual temperature
+        runs = simulate_all(load, regime, [fault], onset=2 * ORBIT_SAMPLES)[0]
+        coarse, fine = (run.values[ORBIT_SAMPLES:] for run in runs)
+        times = np.arange(len(coarse)) * int(INTERVAL_S)
+        simulator = pd.DataFrame(
+            {name: [f"{value:.{digits}f}" for value in column] for (name, digits), column in zip(_DIGITS, coarse.T, strict=True)}
+        )
+        simulator.insert(0, "time", times)
+        if fault is not None:
+            is_faulty = times >= ORBIT_SAMPLES * INTERVAL_S
+            simulator["scenario"] = np.where(is_faulty, fault.kind, "nominal")
+            simulator["severity"], simulator["mask"] = np.where(is_faulty, fault.severity, 0.0), is_faulty.astype(int)
+        volts = measure(fine[:, 0], SENSOR_NOISE_V, SENSOR_STEP_V, noise)
+        telemetry = pd.DataFrame({"time": times, "volts": [f"{value:.4f}" for value in volts]})
+        for name, table in (("telemetry", telemetry), ("simulator", simulator)):
+            with replace_file(folder / f"{name}{suffix}.csv") as temporary:
+                table.to_csv(temporary, index=False, lineterminator="\n")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command. An error of the user is reported as one line, with exit code 2."""
+
+    def write() -> int:
+        given = sys.argv[1:] if arguments is None else arguments
+        if len(given) != 1 or given[0].startswith("-"):
+            raise InputError(f"Expected the output folder, such as examples/battery. Received: {' '.join(given) or 'nothing'}. Name one.")
+        write_example(Path(given[0]))
+        tell(f"telemetry and simulator with and without a fault in {given[0]}/")
+        return 0
+
+    return run_command(write, "interrupted; complete files are kept")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,101 @@
+"""Faults of the battery, which both simulators can express, and the sensor that turns a simulated voltage into telemetry."""
+
+import dataclasses
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from studies.battery.orbits import ORBIT_SAMPLES, Regime
+
+SEVERITIES = (0.2, 0.4, 0.6, 0.8, 1.0)
+SIZES = {
+    "raised resistance": (0.002, 0.004, 0.008, 0.016, 0.032),
+    "lost capacity": (0.02, 0.05, 0.1, 0.15, 0.2),
+    "poor heat transfer": (0.2, 0.4, 0.6, 0.75, 0.9),
+    "drifting sensor": (0.005, 0.01, 0.02, 0.04, 0.08),
+    "payload stuck on": (0.2, 0.4, 0.6, 0.8, 1.0),
+}
+"""For each fault its size at each of `SEVERITIES`: added resistance in ohms; lost share of the active material of both electrodes;
+lost share of the heat transfer; drift of the voltage sensor in volts an orbit; share of the regime's `stuck_a`."""
+SENSOR_NOISE_V, SENSOR_STEP_V = 0.002, 5.0 / 4096
+"""Standard deviation of the voltage sensor's noise, and its resolution: 12 bits over 5 V."""
+SENSOR_NOISE_C, SENSOR_STEP_C = 0.1, 0.0625
+"""The same of the temperature sensor, in degrees Celsius."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Fault:
+    """A fault of the battery.
+
+    Args:
+        kind: A key of `SIZES`.
+        severity: One of `SEVERITIES`.
+
+    Raises:
+        InputError: If there is no such fault or severity.
+    """
+
+    kind: str
+    severity: float
+
+    def __post_init__(self):
+        if self.kind not in SIZES or self.severity not in SEVERITIES:
+            raise InputError(
+                f"Expected one of {', '.join(SIZES)} with a severity of {', '.join(map(str, SEVERITIES))}. "
+                f"Received: {self.kind!r} with {self.severity}. Choose one of these."
+            )
+
+    @property
+    def size(self) -> float:
+        """Size of the fault, in the unit of `SIZES`."""
+        return SIZES[self.kind][SEVERITIES.index(self.severity)]
+
+
+ALL = tuple(Fault(kind, severity) for kind in SIZES for severity in SEVERITIES)
+"""Every fault at every severity."""
+_INPUTS = {"raised resistance": "added resistance", "lost capacity": "lost material", "poor heat transfer": "lost heat transfer"}
+
+
+def simulator_inputs(fault: Fault | None) -> dict[str, float]:
+    """The inputs of a simulator of the battery under a fault.
+
+    Args:
+        fault: The fault; None for nominal.
+
+    Returns:
+        The three inputs by name, all 0 for nominal, for a drifting sensor and for a payload that is stuck on.
+    """
+    inputs = dict.fromkeys(_INPUTS.values(), 0.0)
+    if fault is not None and fault.kind in _INPUTS:
+        inputs[_INPUTS[fault.kind]] = fault.size
+    return inputs
+
+
+def load_under(load: np.ndarray, fault: Fault | None, regime: Regime, onset: int) -> np.ndarray:
+    """Returns the load in amperes, with that of a payload that is stuck on from sample `onset`."""
+    if fault is None or fault.kind != "payload stuck on":
+        return load
+    return load + np.where(np.arange(len(load)) >= onset, fault.size * regime.stuck_a, 0.0)
+
+
+def drift_under(num_samples: int, fault: Fault | None, onset: int) -> np.ndarray:
+    """Returns the error of a drifting voltage sensor in volts, shape `(num_samples,)`: 0 up to sample `onset`, then a ramp."""
+    if fault is None or fault.kind != "drifting sensor":
+        return np.zeros(num_samples)
+    return fault.size * np.maximum(np.arange(num_samples) - onset, 0) / ORBIT_SAMPLES
+
+
+def measure(values: np.ndarray, noise_sd: float, step: float, rng: np.random.Generator) -> np.ndarray:
+    """Measures simulated values with a sensor that adds white noise and rounds to its resolution.
+
+    Args:
+        values: Simulated values of any shape.
+        noise_sd: Standard deviation of the sensor's noise.
+        step: Resolution of the sensor.
+        rng: Random number generator.
+
+    Returns:
+        Telemetry, float32 of the same shape.
+    """
+    noisy = values + noise_sd * rng.standard_normal(np.shape(values))
+    return (np.rint(noisy / step) * step).astype(np.float32)

@@ -1,0 +1,112 @@
+"""Records the runs of both simulators that a replicate of the study works with: nominal orbits and faults, in one folder."""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.common.atomic_files import write_json
+from enhsim_tf.common.console import SILENT, Progress
+from enhsim_tf.common.stages import load_arrays, save_arrays
+from studies.battery.faults import ALL, Fault
+from studies.battery.orbits import ORBIT_SAMPLES, Regime, draw_load
+from studies.battery.simulate import MODELS, Run, simulate_all
+
+
+@dataclasses.dataclass(frozen=True)
+class Counts:
+    """Numbers of recorded orbits. Each run has one more, its first, in which the battery reaches its usual temperature.
+
+    Args:
+        fit: Nominal orbits of both simulators, to which the enhanced simulator is fitted.
+        more: Further nominal orbits of both, for detectors that are trained on more real telemetry.
+        test: Nominal orbits of both, on which everything is judged.
+        coarse: Nominal orbits of the coarse simulator alone, from which training data are generated.
+        fault: Orbits of both simulators under each fault at each severity.
+    """
+
+    fit: int
+    more: int
+    test: int
+    coarse: int
+    fault: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """The runs of a replicate.
+
+    Args:
+        runs: float32 arrays of shape `(samples, 3)` with the columns `simulate.COLUMNS`, by `part/fault/model`.
+        about: `seconds` and `orbits` of each simulator, and the number of `reductions` of each run whose current was reduced.
+    """
+
+    runs: dict[str, np.ndarray]
+    about: dict[str, Any]
+
+    def get(self, part: str, model: str, fault: Fault | None = None) -> np.ndarray:
+        """Returns a run, shape `(samples, 3)`.
+
+        Args:
+            part: A field of `Counts`.
+            model: `coarse` or `fine`.
+            fault: The fault; None for nominal.
+        """
+        return self.runs[f"{part}/{key_of(fault)}/{model}"]
+
+
+def key_of(fault: Fault | None) -> str:
+    """The name of a fault at its severity in files, or `nominal`."""
+    return "nominal" if fault is None else f"{fault.kind} {fault.severity:g}"
+
+
+_PARTS = {
+    "fit": ((None,), MODELS),
+    "more": ((None,), MODELS),
+    "test": ((None,), MODELS),
+    "fault": ((None, *ALL), MODELS),
+    "coarse": ((None,), ("coarse",)),
+}
+
+
+def record(folder: Path, counts: Counts, regime: Regime, seed: int, progress: Progress = SILENT) -> None:
+    """Simulates all runs of a replicate and writes them.
+
+    Each part has loads of its own, drawn with the seed. All faults of a part share one load, and begin after its first orbit.
+
+    Args:
+        folder: An existing folder, to which `runs.npz` and `about.json` are written.
+        counts: Numbers of orbits.
+        regime: How hard the battery is used.
+        seed: Seed of the loads.
+        progress: Reports the progress.
+
+    Raises:
+        InputError: If PyBaMM is not installed, or a solver fails at any current.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    kept: dict[str, list[Run]] = {model: [] for model in MODELS}
+    reduced: dict[str, int] = {}
+    told = progress.loop("part", len(_PARTS))
+    for number, (part, (faults, models)) in enumerate(_PARTS.items()):
+        load = draw_load(getattr(counts, part) + 1, regime, np.random.default_rng([seed, number]))
+        for fault, runs in zip(faults, simulate_all(load, regime, faults, models), strict=True):
+            for model, run in zip(models, runs, strict=True):
+                arrays[f"{part}/{key_of(fault)}/{model}"] = run.values
+                kept[model].append(run)
+            if runs[0].reductions:
+                reduced[f"{part}/{key_of(fault)}"] = runs[0].reductions
+        told(number + 1)
+    save_arrays(folder, arrays, "runs")
+    timed = {
+        model: {"seconds": sum(run.seconds for run in runs), "orbits": sum(len(run.values) for run in runs) / ORBIT_SAMPLES}
+        for model, runs in kept.items()
+    }
+    write_json(folder / "about.json", {"timed": timed, "reduced": reduced, "num_runs": len(arrays)})
+
+
+def read(folder: Path) -> Recorded:
+    """Reads what `record` wrote."""
+    return Recorded(load_arrays(folder, "runs"), json.loads((folder / "about.json").read_text(encoding="utf-8")))

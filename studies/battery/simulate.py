@@ -1,0 +1,195 @@
+"""The coarse and the fine simulator of the battery, in PyBaMM (Sulzer et al. 2021), without any report of its use.
+
+The coarse simulator is a single-particle model (SPM) with the book parameters of Chen et al. (2020), at 25 degrees Celsius. The
+fine one is a Doyle-Fuller-Newman model (DFN) of a vehicle that differs from the book. Both have a lumped thermal model. Faults
+are inputs that begin at a given sample, so that one model serves all of them.
+"""
+
+import dataclasses
+import functools
+import os
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from studies.battery.faults import Fault, drift_under, load_under, simulator_inputs
+from studies.battery.orbits import FIRST_CHARGE, INTERVAL_S, ORBIT_SAMPLES, Regime, battery_current
+
+MODELS = ("coarse", "fine")
+COLUMNS = ("volts", "amperes", "celsius")
+"""Columns of a recorded run."""
+ONSET = ORBIT_SAMPLES
+"""First sample of a fault: runs begin with a nominal orbit, in which the battery also reaches its usual temperature."""
+VEHICLE = {"added resistance": 0.008, "lost material": 0.04, "lost heat transfer": 0.4}
+"""How the fine simulator's battery differs from the book, in ohms and shares, beside its temperature and a slower diffusion."""
+_SLOWER_DIFFUSION = 0.7  # of lithium in the negative electrode's particles, as a share of the book's value
+_BOOK_K, _ZERO_K = 298.15, 273.15
+_ONSET_S = 60.0  # a fault grows to its full size in this time
+_MESH = {"x_n": 10, "x_s": 8, "x_p": 10, "r_n": 12, "r_p": 12}
+_TOLERANCES = {"rtol": 1e-4, "atol": 1e-5}
+_VOLTAGE, _TEMPERATURE = "Terminal voltage [V]", "Volume-averaged cell temperature [K]"
+_LIMITS_V = (1.0, 5.5)  # wider than the cell's, so that the solver passes over short excursions
+_KINK_A = 0.2  # where the slope of the current changes by more than this, the solver makes a step
+_REDUCTION, _MOST_REDUCTIONS = 0.9, 8  # after a failure of a solver, the current is multiplied by this, at most so often
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """A recorded run of one simulator.
+
+    Args:
+        values: float32 array of shape `(samples, 3)` with the columns `COLUMNS`.
+        seconds: Time that the solver needed, without building the model.
+        reductions: How often the current was reduced because a solver failed.
+    """
+
+    values: np.ndarray
+    seconds: float
+    reductions: int = 0
+
+
+@functools.cache
+def _pybamm() -> Any:
+    """Imports PyBaMM with its usage reports switched off, which it looks up when it is imported."""
+    os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"
+    try:
+        import pybamm
+    except ImportError:
+        raise InputError(
+            "Expected PyBaMM, which simulates the battery. Received: no such package. Install it: pip install 'enhsim_tf[battery]'."
+        ) from None
+    pybamm.telemetry.disable()  # in case another module imported it first
+    pybamm.set_logging_level("ERROR")
+    return pybamm
+
+
+def check_installed() -> None:
+    """Checks that PyBaMM can be imported.
+
+    Raises:
+        InputError: If it is not installed.
+    """
+    _pybamm()
+
+
+def simulate(model: str, current: np.ndarray, regime: Regime, faults: Sequence[Fault | None], onset: int = ONSET) -> list[Run | None]:
+    """Runs one simulator over a current, once for each fault.
+
+    Args:
+        model: `coarse` or `fine`.
+        current: Current in amperes on the clock of `INTERVAL_S`, shape `(samples,)`; positive discharges the battery.
+        regime: How hard the battery is used.
+        faults: The faults, None for nominal. A payload that is stuck on must be in the current already.
+        onset: First sample of each fault.
+
+    Returns:
+        A run for each fault, or None where the solver failed.
+
+    Raises:
+        InputError: If PyBaMM is not installed, or the model is unknown.
+    """
+    if model not in MODELS:
+        raise InputError(f"Expected one of {', '.join(MODELS)}. Received: model={model!r}. Choose one of these.")
+    pybamm, clock = _pybamm(), np.arange(len(current)) * INTERVAL_S
+    begun = onset * INTERVAL_S
+    kinks = clock[np.flatnonzero(np.abs(np.diff(current, 2)) > _KINK_A) + 1]
+    stops = np.unique(np.concatenate([[0.0], kinks, [time_s for time_s in (begun, begun + _ONSET_S) if time_s < clock[-1]], clock[-1:]]))
+    simulation, found = _build(model, current, clock, regime, begun), []
+    for fault in faults:
+        inputs, started = simulator_inputs(fault), time.perf_counter()
+        try:
+            solution = simulation.solve(stops, t_interp=clock, inputs=inputs)
+            seconds = time.perf_counter() - started
+            times, volts, kelvins = solution.t, solution[_VOLTAGE].data, solution[_TEMPERATURE].data
+        except pybamm.SolverError:
+            found.append(None)
+            continue
+        if times[-1] < clock[-1] or not (np.isfinite(volts).all() and np.isfinite(kelvins).all()):  # stopped at a limit
+            found.append(None)
+            continue
+        columns = (
+            np.interp(clock, times, volts) + drift_under(len(clock), fault, onset),
+            current,
+            np.interp(clock, times, kelvins) - _ZERO_K,
+        )
+        found.append(Run(np.stack(columns, axis=1).astype(np.float32), seconds))
+    return found
+
+
+def _build(model: str, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
+    """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
+    pybamm = _pybamm()
+    is_fine, book = model == "fine", pybamm.ParameterValues("Chen2020")
+    values, kelvins = book.copy(), regime.ambient_k if is_fine else _BOOK_K
+    charged = book.copy()
+    charged.set_initial_state(FIRST_CHARGE)
+    grown = pybamm.Interpolant(np.array([-1.0, begun, begun + _ONSET_S, 1e12]), np.array([0.0, 0.0, 1.0, 1.0]), pybamm.t)
+    added, material, transfer = (pybamm.InputParameter(name) * grown for name in simulator_inputs(None))
+    differs = VEHICLE if is_fine else dict.fromkeys(VEHICLE, 0.0)
+    values["Contact resistance [Ohm]"] = differs["added resistance"] + added
+    for electrode in ("Negative", "Positive"):
+        share = f"{electrode} electrode active material volume fraction"
+        values[share] = book[share] * (1 - differs["lost material"]) * (1 - material)
+        concentration = f"Initial concentration in {electrode.lower()} electrode [mol.m-3]"
+        values[concentration] = charged[concentration]
+    name = "Total heat transfer coefficient [W.m-2.K-1]"
+    values[name] = book[name] * (1 - differs["lost heat transfer"]) * (1 - transfer)
+    name = "Negative particle diffusivity [m2.s-1]"
+    values[name] = book[name] * (_SLOWER_DIFFUSION if is_fine else 1.0)
+    values["Ambient temperature [K]"] = values["Initial temperature [K]"] = kelvins
+    values["Lower voltage cut-off [V]"], values["Upper voltage cut-off [V]"] = _LIMITS_V
+    values["Current function [A]"] = pybamm.Interpolant(clock, current, pybamm.t)
+    build = pybamm.lithium_ion.DFN if is_fine else pybamm.lithium_ion.SPM
+    return pybamm.Simulation(
+        build({"thermal": "lumped", "contact resistance": "true"}),
+        parameter_values=values,
+        solver=pybamm.IDAKLUSolver(**_TOLERANCES, output_variables=[_VOLTAGE, _TEMPERATURE]),
+        var_pts=_MESH,
+    )
+
+
+def simulate_all(
+    load: np.ndarray, regime: Regime, faults: Sequence[Fault | None], models: Sequence[str] = MODELS, onset: int = ONSET
+) -> list[tuple[Run, ...]]:
+    """Runs simulators over a load, once for each fault, driven by the same current.
+
+    Where a solver fails, the current of that run is reduced by a tenth and all simulators run again; each `Run` counts how often.
+
+    Args:
+        load: Load in amperes, shape `(samples,)`, from the start of an orbit.
+        regime: How hard the battery is used.
+        faults: The faults, None for nominal.
+        models: The simulators.
+        onset: First sample of each fault.
+
+    Returns:
+        For each fault a run of each simulator.
+
+    Raises:
+        InputError: If PyBaMM is not installed, or a run fails at the smallest current too.
+    """
+    currents = [battery_current(load_under(load, fault, regime, onset), regime) for fault in faults]
+    found: dict[int, tuple[Run, ...]] = {}
+    for number in range(_MOST_REDUCTIONS + 1):
+        waiting = [place for place in range(len(faults)) if place not in found]
+        for same in _with_equal(currents, waiting):
+            current, chosen = currents[same[0]] * _REDUCTION**number, [faults[place] for place in same]
+            runs = zip(*(simulate(model, current, regime, chosen, onset) for model in models), strict=True)
+            for place, each in zip(same, runs, strict=True):
+                if None not in each:
+                    found[place] = tuple(dataclasses.replace(run, reductions=number) for run in each)
+        if len(found) == len(faults):
+            return [found[place] for place in range(len(faults))]
+    failed = faults[next(place for place in range(len(faults)) if place not in found)]
+    raise InputError(f"Expected loads that the solver can follow. Received: a failure of {failed} at any current. Reduce the load.")
+
+
+def _with_equal(currents: Sequence[np.ndarray], places: Sequence[int]) -> list[list[int]]:
+    """Groups places by equal currents, for which one built model is enough."""
+    groups: dict[bytes, list[int]] = {}
+    for place in places:
+        groups.setdefault(currents[place].tobytes(), []).append(place)
+    return list(groups.values())

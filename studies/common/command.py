@@ -1,0 +1,92 @@
+"""The command that all studies share: `python -m studies.NAME`, its options, its folders and its exit code."""
+
+import argparse
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.common.console import Parser, run_command, tell
+from enhsim_tf.common.errors import InputError
+
+PUBLISHED = Path(__file__).resolve().parents[1]
+
+
+@dataclasses.dataclass(frozen=True)
+class Option:
+    """A further option of a study.
+
+    Args:
+        name: Its name, such as `--environment`.
+        words: What `argparse` takes beside the name.
+    """
+
+    name: str
+    words: dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """The command of a study.
+
+    Args:
+        study: Name of the study and of its folder.
+        description: What the study does, in a sentence.
+        group: The group of settings whose `num_seeds` the option `--seeds` changes.
+        run: Runs the study; it takes the options, the settings and the output folder.
+        options: Further options.
+    """
+
+    study: str
+    description: str
+    group: str
+    run: Callable[[argparse.Namespace, Any, Path], None]
+    options: Sequence[Option] = ()
+
+    def __call__(self, arguments: list[str] | None = None) -> int:
+        """Runs the command. An error of the user is reported as one line, with exit code 2."""
+        return run_command(
+            lambda: self._run(self.parse(arguments)), "interrupted; finished stages are kept, the next run goes on behind them"
+        )
+
+    def parse(self, arguments: list[str] | None = None) -> argparse.Namespace:
+        """Reads the command line without slow imports.
+
+        Raises:
+            InputError: If an option is unknown or its value cannot be used.
+        """
+        parser = Parser(prog=f"python -m studies.{self.study}", description=self.description)
+        parser.add_argument(
+            "--budget", choices=("smoke", "full"), default="full", help="size of the run (default: full, which takes hours)"
+        )
+        parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds (default: that of the published tables)")
+        parser.add_argument(
+            "--out",
+            type=Path,
+            metavar="DIR",
+            help=f"output folder (default: results/{self.study}; the published tables are in studies/{self.study}/results)",
+        )
+        parser.add_argument("--fresh", action="store_true", help="run every stage again instead of using the cache")
+        parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached stages (default: .cache in a checkout)")
+        for option in self.options:
+            parser.add_argument(option.name, **option.words)
+        options = parser.parse_args(arguments)
+        if options.seeds is not None and options.seeds < 1:
+            raise InputError(f"Expected at least one seed. Received: --seeds {options.seeds}.")
+        out = options.out
+        if options.budget == "smoke" and out is not None and out.resolve() == PUBLISHED / self.study / "results":
+            raise InputError(f"Expected another folder for a smoke run than that of the published tables. Received: --out {out}.")
+        return options
+
+    def _run(self, options: argparse.Namespace) -> int:
+        from enhsim_tf.common.atomic_files import make_folder, remove_leftovers
+        from enhsim_tf.common.stages import default_cache
+        from studies.common.settings import make_settings
+
+        out = make_folder(options.out or Path("results") / self.study)
+        remove_leftovers(out)
+        options.cache = make_folder(options.cache or default_cache())
+        turned = {} if options.seeds is None else {f"{self.group}__num_seeds": options.seeds}
+        self.run(options, make_settings(options.budget, **turned), out)
+        tell(f"tables, findings.json and figures in {out}/")
+        return 0

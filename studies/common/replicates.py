@@ -1,0 +1,90 @@
+"""The frame that experiments share: replicates in turn, tables of all of them, and the files that are written from the tables."""
+
+import functools
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enhsim_tf.common.atomic_files import write_json
+from enhsim_tf.common.stages import VERSIONS, Stages, Turns
+from studies.common.tables import KeptTables
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Replicate = Callable[[Stages], "Mapping[str, pd.DataFrame]"]
+"""Computes the tables of one replicate. It returns no table if the replicate is left out."""
+
+
+def seed_by_seed(
+    replicate: "Callable[[str, int, Stages], Mapping[str, pd.DataFrame]]", names: Iterable[str], seeds: Iterable[int]
+) -> list[tuple[str, Replicate]]:
+    """Replicates for `collect`, all names with one seed before the next seed, so that an interrupted run is complete for its first seeds.
+
+    Args:
+        replicate: Computes the tables for a name, a seed and stages.
+        names: What is computed with each seed, for example environments.
+        seeds: The seeds.
+    """
+    names = tuple(names)
+    return [(f"{name}, seed {seed}", functools.partial(replicate, name, seed)) for seed in seeds for name in names]
+
+
+def collect(
+    what: str, replicates: Sequence[tuple[str, Replicate]], cache: Path, fresh: bool, tell: Callable[[str], None]
+) -> "dict[str, pd.DataFrame]":
+    """Computes replicates in turn and joins their tables.
+
+    Args:
+        what: What a replicate is, in the singular.
+        replicates: Name and function of each replicate, in the order in which they are computed.
+        cache: Folder of cached stages.
+        fresh: Whether to run every stage again instead of using the cache.
+        tell: Called with a line about each replicate and stage.
+    """
+    import pandas as pd
+
+    parts: dict[str, list[pd.DataFrame]] = {}
+    turns = Turns(what, len(replicates), tell)
+    for name, replicate in replicates:
+        turns.begin(name)
+        stages = Stages(cache, fresh, tell, speaks=not sys.stdout.isatty())
+        for each, table in replicate(stages).items():
+            parts.setdefault(each, []).append(table)
+        turns.end(stages)
+        from enhsim_tf.keras_tools.backend import keras
+
+        keras.backend.clear_session()  # frees the memory of the replicate's networks
+    return {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}
+
+
+def write_results(
+    tables: "Mapping[str, pd.DataFrame]",
+    kept: KeptTables,
+    summarise: "Callable[[dict[str, pd.DataFrame]], dict[str, Any]]",
+    figures: Mapping[str, Any],
+    folder: Path,
+    about: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Writes the tables of an experiment, and the findings and figures that are computed from the written tables.
+
+    Args:
+        tables: The tables by name.
+        kept: How they are written.
+        summarise: Computes the findings.
+        figures: The figures by name.
+        folder: An existing folder.
+        about: What the findings also hold; versions of packages are joined with those of all experiments.
+
+    Returns:
+        The findings.
+    """
+    from studies.common.figures import save_all
+
+    kept.write(tables, folder)
+    found = summarise(kept.read(folder))
+    found |= {**about, "versions": VERSIONS | about.get("versions", {})}
+    write_json(folder / "findings.json", found)
+    save_all(figures, found, folder, kept.command)
+    return found

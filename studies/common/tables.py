@@ -1,0 +1,69 @@
+"""Tables of an experiment in compact files, small enough to be committed."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclasses.dataclass(frozen=True)
+class KeptTables:
+    """The tables that an experiment stores, one Parquet file each.
+
+    Args:
+        names: Names of the tables.
+        labels: Columns with few distinct values, which are stored as dictionaries.
+        digits: Decimals that numbers are rounded to.
+        kind: Word for messages: an `experiment` or a `study`.
+        command: The command that produces them.
+        digits_of: Decimals of tables that differ from `digits`.
+    """
+
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    digits: int
+    kind: str
+    command: str
+    digits_of: Mapping[str, int] = dataclasses.field(default_factory=dict)
+
+    def write(self, tables: "Mapping[str, pd.DataFrame]", folder: Path) -> None:
+        """Writes all tables: labels as dictionaries, and numbers rounded to the precision that their counts support.
+
+        Args:
+            tables: By name.
+            folder: An existing folder.
+        """
+        for name, table in tables.items():
+            compact = table.reset_index(drop=True)
+            for column in compact.columns:
+                if column in self.labels:
+                    compact[column] = compact[column].astype("category")
+                elif compact[column].dtype == np.float64:
+                    compact[column] = compact[column].round(self.digits_of.get(name, self.digits)).astype(np.float32)
+            with replace_file(folder / f"{name}.parquet") as temporary:
+                compact.to_parquet(temporary, compression="zstd", index=False)
+
+    def read(self, folder: Path) -> "dict[str, pd.DataFrame]":
+        """Reads the tables that `write` wrote.
+
+        Raises:
+            InputError: If one is missing.
+        """
+        import pandas as pd
+
+        missing = [name for name in self.names if not (folder / f"{name}.parquet").is_file()]
+        if missing:
+            raise InputError(f"Expected the tables of the {self.kind} in {folder}. Received: no {missing[0]}.parquet. Run {self.command}.")
+        tables = {name: pd.read_parquet(folder / f"{name}.parquet") for name in self.names}
+        for table in tables.values():
+            for column in set(self.labels) & set(table.columns):
+                table[column] = table[column].astype(str)  # categories back to strings
+        return tables

@@ -1,0 +1,190 @@
+"""The cells of one replicate: the signal of each enhancer, the noise of each generator, and the detectors that are trained on their sum."""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.detection import evaluation
+from enhsim_tf.enhancer.ridge import fit_ridge
+from enhsim_tf.enhancer.training_pairs import paired_windows
+from enhsim_tf.noise.surrogates import GaussianAutoregression
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.telemetry.windows import random_window_starts
+from studies.factorial.cells import (
+    AUTOREGRESSION,
+    CONVOLUTIONAL_GAN,
+    DETECTORS,
+    FEW,
+    MANY,
+    MOVING_AVERAGE,
+    PAPER_GAN,
+    REFERENCES,
+    RIDGE,
+    WHOLE_WINDOWS,
+    Cell,
+    cells_by_source,
+)
+from studies.robustness.replicate import Replicate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from enhsim_tf.noise.gan import NoiseGAN
+    from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN
+
+Enhance = Callable[[np.ndarray], np.ndarray]
+TRAINING, THRESHOLD = "arms, training", "arms, threshold"
+"""Purposes of windows: to train a detector, and to set its threshold. They draw the same windows as in the study of robustness."""
+
+
+class Pipelines:
+    """All cells of one environment and seed. Networks are trained when they are first needed.
+
+    Args:
+        replicate: The replicate of the study of robustness that provides the data and both networks.
+    """
+
+    def __init__(self, replicate: Replicate):
+        self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
+        self.data, self.train = replicate.experiment.data, replicate.experiment.data.channels[0].train
+        self.window, self.seed = self.settings.telemetry.window, self.settings.seed
+        self.enhancer = functools.cache(self._enhancer)
+        self.extracted = functools.lru_cache(maxsize=1)(self._extracted)
+        self._model: tuple[tuple[object, ...], object] | None = None
+
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """The table `cells`. The cells whose noise is learnt from the same windows are a stage, so that an interrupted run goes on."""
+        import pandas as pd
+
+        chosen = self.settings
+        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.noise, chosen.adversarial, chosen.second, chosen.seed)
+        depends += (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.robustness.max_order)
+        parts = {"references": list(REFERENCES)} | {" ".join(filter(None, source)): cells for source, cells in cells_by_source().items()}
+        found = []
+        for name, cells in parts.items():
+            make = functools.partial(self._make, cells)
+            folder = self.stages.run(f"cells {name}", make, depends, ("telemetry",))
+            found.append(pd.read_parquet(folder / "cells.parquet"))
+        return {"cells": pd.concat(found, ignore_index=True)}
+
+    def _make(self, cells: list[str | Cell], folder: Path) -> None:
+        import pandas as pd
+
+        about = {"environment": self.settings.telemetry.noise, "seed": self.seed}
+        rows = [{**about, "cell": getattr(cell, "name", cell), **row} for cell in cells for row in self.judged(cell)]
+        pd.DataFrame(rows).to_parquet(folder / "cells.parquet")
+
+    @functools.cached_property
+    def _trial(self) -> evaluation.Trial:
+        return self.replicate.trial()
+
+    def judged(self, cell: str | Cell) -> list[dict[str, object]]:
+        """Trains the detectors on a cell or a reference and judges them on real telemetry.
+
+        Returns:
+            A row for each detector: alarms and windows over all blocks of time, and recall as the mean over kinds and severities.
+        """
+        import pandas as pd
+
+        from enhsim_tf.detection import registry
+
+        detectors = {name: registry.DETECTORS[name] for name in DETECTORS}
+        training, held_out = (self.arm(cell, purpose) for purpose in (TRAINING, THRESHOLD))
+        tables = evaluation.evaluate_arm(training, held_out, self._trial, detectors, self.seed)
+        alarms, recall = (pd.DataFrame(tables[name]).groupby("detector", sort=False) for name in ("alarms", "recall"))
+        rows = alarms[["alarms", "windows"]].sum().join(recall[["recall", "recall_at_real_rate"]].mean()).reset_index()
+        return rows.to_dict("records")
+
+    def arm(self, cell: str | Cell, purpose: str) -> np.ndarray:
+        """Windows of a cell or of a reference, of shape `(windows, samples)`.
+
+        Args:
+            cell: The cell, or the name of a reference.
+            purpose: `TRAINING` for the windows that train a detector, `THRESHOLD` for those that set its threshold.
+        """
+        number = self.settings.robustness.num_windows
+        if cell == "real":
+            part = "train" if purpose == TRAINING else "calibration"
+            return self.data.windows(part, number, f"{purpose}, real")["target"]
+        coarse = self.data.windows("train", number, purpose)["coarse"]
+        if cell == "coarse":
+            return coarse
+        rng = np.random.default_rng(int(self.data.draw(purpose).integers(2**31)))
+        return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, rng)
+
+    def number(self, windows: str) -> int:
+        """Number of windows that a level of the factor `windows` stands for."""
+        return {FEW: self.settings.telemetry.num_windows, MANY: self.settings.second.num_windows}[windows]
+
+    def training_starts(self, windows: str) -> np.ndarray:
+        """Start of each training window of the enhancers: those of the paper's network, and those of the residual pipeline."""
+        rng = self.data.draw("training windows") if windows == FEW else np.random.default_rng(self.seed)
+        return random_window_starts([self.train], self.window, self.number(windows), rng)
+
+    def pairs(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coarse windows and telemetry of the training part."""
+        return paired_windows(self.train, self.data.channels[0].coarse, starts, self.window)
+
+    def _enhancer(self, enhancer: str, windows: str) -> Enhance:
+        """The function that maps coarse windows to the signal of an enhancer."""
+        if enhancer == RIDGE:
+            starts = self.training_starts(windows)
+            return fit_ridge(*self.pairs(starts), starts).predict
+        return self._paper_network() if windows == FEW else self.replicate.second.simulator.enhance
+
+    def _paper_network(self) -> Enhance:
+        from enhsim_tf.enhancer.network import enhance
+        from enhsim_tf.keras_tools.backend import keras
+
+        path = self.replicate.experiment.enhancer_folder / "enhancer.keras"
+        return functools.partial(enhance, keras.saving.load_model(path, compile=False, safe_mode=True))
+
+    def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
+        """Windows of the noise that a generator learns, of shape `(windows, samples)`; the arguments are `Cell.source`."""
+        number = self.number(windows)
+        if extraction == MOVING_AVERAGE:
+            return self.data.noise_windows("train", number, "noise windows")
+        starts = random_window_starts([self.train], self.window, number, np.random.default_rng([self.seed, 1]))
+        coarse, target = self.pairs(starts)
+        return target - self.enhancer(enhancer, windows)(coarse)
+
+    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | NoiseGAN | ConvolutionalGAN":
+        """The fitted noise model of a cell. The last one is kept, because both purposes and some cells share it."""
+        key = (*cell.source, cell.generator)
+        if self._model is None or self._model[0] != key:
+            fit = {
+                WHOLE_WINDOWS: WindowBootstrap.fit,
+                AUTOREGRESSION: self._autoregression,
+                PAPER_GAN: self._paper_gan,
+                CONVOLUTIONAL_GAN: self._convolutional_gan,
+            }[cell.generator]
+            self._model = (key, fit(self.extracted(*cell.source)))
+        return self._model[1]
+
+    def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
+        return GaussianAutoregression.fit(noise, min(self.settings.robustness.max_order, self.window - 1))
+
+    def _convolutional_gan(self, noise: np.ndarray) -> "ConvolutionalGAN":
+        from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
+
+        return fit_convolutional_gan(noise, self.settings.adversarial.num_iterations, self.seed)
+
+    def _paper_gan(self, noise: np.ndarray) -> "NoiseGAN":
+        from enhsim_tf.noise.gan import NoiseGAN
+
+        training = self.settings.adversarial
+        gan = NoiseGAN(
+            *self.replicate.experiment.untrained_noise_networks(),
+            batch_size=training.batch_size,
+            learning_rate=training.learning_rate,
+            latent_span=self.settings.noise.latent_span,
+            mixed_batch=training.mixed_batch,
+            generated_in_training_mode=training.generated_in_training_mode,
+            scale=self.data.units[2],
+            seed=self.seed,
+        )
+        gan.fit(noise, training.num_iterations, training.record_every, verbose=False)
+        return gan

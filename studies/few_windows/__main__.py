@@ -1,0 +1,30 @@
+"""`python -m studies.few_windows`: how few real windows suffice, and from how few a simulator pays."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from enhsim_tf.common.console import tell
+from studies.common.command import Command
+from studies.common.environments import FAMILIES, NOISES, environment_option, environments
+from studies.noise_models.names import chosen_rungs, rungs_option
+
+
+def run(options: argparse.Namespace, settings: Any, out: Path) -> None:
+    """Runs the study."""
+    from studies.few_windows.run import run
+
+    run(settings, options.cache, out, environments(options, NOISES), chosen_rungs(options.rungs, ()), options.fresh, tell)
+
+
+command = Command(
+    "few_windows",
+    "Varies the number of real windows from which detectors and simulators learn.",
+    "curve",
+    run,
+    [environment_option(FAMILIES), rungs_option()],
+)
+
+if __name__ == "__main__":
+    sys.exit(command())

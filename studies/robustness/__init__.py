@@ -1,0 +1,1 @@
+"""Study: detectors trained on every kind of training data, over seeds and kinds of noise."""

@@ -1,0 +1,120 @@
+"""The figures of the study of robustness, drawn from its findings alone."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib.figure
+import numpy as np
+from matplotlib.axes import Axes
+
+from enhsim_tf.common.figure import Figure
+from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, GREY_TINT, QUIET, REAL, label_ends, new_sheet, panels
+from studies.robustness.degraded_modes import LARGEST_TRAINED
+
+Findings = Mapping[str, Any]
+_ROWS = {  # label, colour and marker of each arm that is shown
+    "coarse": ("coarse simulator", COARSE, "s"),
+    "truth": ("perfect simulator, no noise", COARSE, "s"),
+    "enhanced + GAN": ("paper: enhancer + GAN", GENERATED, "D"),
+    "enhanced + bootstrap": ("paper: enhancer + blocks", GENERATED, "D"),
+    "residual + AR": ("residual + autoregression", ENHANCED, "o"),
+    "residual + convolutional GAN": ("residual + convolutional GAN", ENHANCED, "o"),
+    "residual + bootstrap": ("residual + blocks", ENHANCED, "o"),
+    "real": ("real telemetry", REAL, "o"),
+}
+_LEAST = 2e-4  # smaller rates are drawn here, because the axis is logarithmic
+
+
+def false_alarms(found: Findings) -> matplotlib.figure.Figure:
+    """False alarms by training data, a kind of noise a panel."""
+    figure, down = new_sheet(
+        DOUBLE,
+        4.6,
+        "Residual blocks keep false alarms near the target of 1 %",
+        "Real nominal windows that are flagged, by training data. Large mark and bar: mean over seven detectors with its 95 % interval "
+        "over seeds and blocks of time. Small marks: single detectors; rates below 0.02 % are drawn at 0.02 %. Line: the target, 1 %.",
+    )
+    environments = found["environments"]
+    columns = min(2, len(environments))
+    grid = panels(figure, down + 0.22, -(-len(environments) // columns), columns, gap=(0.42, 0.16), sharey=True, sharex=True)
+    left = 1.95 / DOUBLE
+    width = (1 - left - 0.04) / columns
+    for number, (axes, name) in enumerate(zip(grid.ravel(), environments, strict=False)):
+        place = axes.get_position()
+        axes.set_position([left + (number % columns) * width, place.y0, width - 0.03, place.height])
+        for height, (arm, (_, colour, marker)) in enumerate(_ROWS.items()):
+            _row(axes, -height, found["arms"][arm]["by_environment"][name], colour, marker)
+        axes.axvline(0.01, color=QUIET, linewidth=0.6, zorder=0)
+        axes.set_xscale("log")
+        axes.set_xlim(_LEAST * 0.8, 1.2)
+        axes.set_xticks([0.001, 0.01, 0.1, 1.0], ["0.1", "1", "10", "100"])
+        axes.minorticks_off()
+        axes.set_title(f"{name} noise")
+        axes.set_yticks(-np.arange(len(_ROWS)), [label for label, _, _ in _ROWS.values()])
+    for axes in grid[-1]:
+        axes.set_xlabel("false alarms (%)")
+    return figure
+
+
+def _row(axes: Axes, height: float, about: Mapping[str, Any], colour: str, marker: str) -> None:
+    mean, low, high = (max(about["false_alarms"][key], _LEAST) for key in ("mean", "low", "high"))
+    each = np.maximum(list(about["detectors"].values()), _LEAST)
+    axes.plot(each, np.full(len(each), height), "|", color=colour, markersize=5, alpha=0.75)
+    axes.plot([low, high], [height] * 2, color=colour, linewidth=2.2, alpha=0.45)
+    axes.plot(mean, height, marker, color=colour, markersize=4)
+
+
+_METHODS = {
+    "identity": (COARSE, "-.", "coarse"),
+    "paper": (GENERATED, "--", "paper's network"),
+    "ridge, randomised": (REAL, ":", "ridge on faults"),
+    "randomised": (ENHANCED, "-", "network on faults"),
+}
+
+
+def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
+    """Error against severity, a degraded mode a panel."""
+    figure, down = new_sheet(
+        DOUBLE,
+        3.9,
+        "Enhancers trained on faults have smaller errors than the paper's",
+        "Root-mean-square error with respect to the true degraded signal, in standard deviations of the nominal signal; means over seeds. "
+        "“On faults”: trained on random configurations of all modes, with severities in the grey area.",
+    )
+    curves = found["modes"]["by_mode"]
+    modes = [mode for mode in curves["paper"] if mode != "nominal"]
+    grid = panels(figure, down + 0.22, 2, 3, right=1.2, gap=(0.42, 0.36), sharex=True)
+    for axes, mode in zip(grid.ravel(), modes, strict=True):
+        axes.axvspan(0, LARGEST_TRAINED, color=GREY_TINT, zorder=0)
+        for method, (colour, style, _) in _METHODS.items():
+            axes.plot(*np.transpose(curves[method]["nominal"] + curves[method][mode]), style, color=colour)
+        axes.set_title(mode.replace("_", " "))
+        axes.set_ylim(0, None)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+    last = modes[2]
+    label_ends(grid[0, -1], {label: ([curves[method][last][-1][1]], colour) for method, (colour, _, label) in _METHODS.items()})
+    for axes in grid[-1]:
+        axes.set_xlabel("severity")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("error (sd)")
+    return figure
+
+
+FIGURES: dict[str, Figure] = {
+    "false_alarms": Figure(
+        1,
+        "False alarms by training data",
+        "Four panels, one for each kind of noise. Eight kinds of training data from top to bottom, the false-alarm rate on a logarithmic "
+        "axis: a mark with an interval for the mean over detectors, a small mark for each detector, and a line at one per cent.",
+        false_alarms,
+    ),
+    "degraded_modes": Figure(
+        2,
+        "Error in degraded modes",
+        "Six panels, one for each degraded mode: error against severity for the coarse signal, the paper's enhancer, and ridge regression "
+        "and a network that were trained on faults; the severities of training are shaded.",
+        degraded_modes,
+    ),
+}
+"""The study's figures by name; `Figure.draw` takes the findings."""

@@ -1,0 +1,182 @@
+"""Findings of the study of robustness, computed from its published tables alone."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.detection import metrics
+from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from studies.common.environments import NOISES
+from studies.common.statistics import holm, mean_interval, wilcoxon_signed_rank
+from studies.common.tables import KeptTables
+from studies.robustness.degraded_modes import LARGEST_TRAINED, METHODS, SCORED
+from studies.robustness.replicate import ARMS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+REPLICATE = ["environment", "seed"]
+CONTRASTS = {
+    "paper": tuple(("enhanced + GAN", f"enhanced{other}") for other in ("", " + AR", " + bootstrap")),
+    "second": tuple(("residual + convolutional GAN", other) for other in ("residual + AR", "residual + bootstrap", "real")),
+}
+"""Declared before the runs for each of the two GANs: against other noise or none, and for the second against real telemetry."""
+KEPT = KeptTables(
+    ("alarms", "recall", "degraded"),
+    labels=("environment", "arm", "detector", "kind", "method", "mode"),
+    digits=4,
+    kind="study",
+    command="python -m studies.robustness",
+    digits_of={"recall": 3},  # shares of 150 windows, in the largest table
+)
+
+
+def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
+    """All numbers of the README and the figures.
+
+    Args:
+        tables: As `KEPT.read` gives them.
+
+    Returns:
+        Plain JSON types: what was run, and an entry for each question.
+    """
+    rate = rates(tables["alarms"])
+    environments = [name for name in NOISES if name in set(rate["environment"])]
+    return {
+        "environments": environments,
+        "seeds": sorted(int(seed) for seed in rate["seed"].unique()),
+        "num_replicates": int(rate.groupby(REPLICATE).ngroups),
+        "num_windows": int(rate["windows"].median()),
+        "arms": arms(tables["alarms"], tables["recall"], environments),
+        "controls": controls(tables["alarms"], tables["recall"]),
+        "contrasts": {family: contrasts(tables["alarms"], pairs) for family, pairs in CONTRASTS.items()},
+        "modes": modes(tables["degraded"]),
+    }
+
+
+def rates(alarms: "pd.DataFrame") -> "pd.DataFrame":
+    """False-alarm rate of each environment, seed, arm and detector, over all blocks of time: column `rate`."""
+    counts = alarms.groupby([*REPLICATE, "arm", "detector"], as_index=False)[["alarms", "windows"]].sum()
+    return counts.assign(rate=counts["alarms"] / counts["windows"])
+
+
+def trained(table: "pd.DataFrame") -> "pd.DataFrame":
+    """The rows of detectors that are trained on an arm, without scores of one line."""
+    return table[table["detector"].isin(list(DETECTORS))]
+
+
+def by_block(alarms: "pd.DataFrame") -> "pd.DataFrame":
+    """Mean false-alarm rate of the trained detectors in each block of time; one column per arm.
+
+    Blocks can differ in size by one window. The alarms of each block are divided by the mean number of windows per block, so that
+    the mean over blocks is the rate of the replicate.
+    """
+    blocks = trained(alarms)
+    groups = blocks.groupby([*REPLICATE, "arm", "detector"])["windows"]
+    share = blocks["alarms"] * groups.transform("size") / groups.transform("sum")
+    return blocks.assign(share=share).groupby([*REPLICATE, "block", "arm"])["share"].mean().unstack("arm")
+
+
+def arms(alarms: "pd.DataFrame", recall: "pd.DataFrame", environments: Sequence[str]) -> dict[str, Any]:
+    """False alarms, recall and the criterion of claim C8 for each arm."""
+    cells = [*REPLICATE, "arm", "detector"]
+    rate = trained(rates(alarms)).set_index(cells)["rate"]
+    found = trained(recall).groupby(cells)[["recall", "recall_at_real_rate"]].mean()
+    per_detector, recalls = (each.groupby(["arm", "environment", "detector"]).mean() for each in (rate, found))
+    mean_rate, blocks = rate.groupby([*REPLICATE, "arm"]).mean().unstack("arm"), by_block(alarms)
+    kept = keeps_the_rule(per_detector, recalls["recall"])
+    return {
+        arm: {
+            "false_alarms": _share(mean_interval(blocks[arm])),
+            "gap_closed": float(np.mean([metrics.gap_closed(row[arm], row["coarse"], row["real"]) for _, row in mean_rate.iterrows()])),
+            **{name: float(recalls.loc[arm, name].mean()) for name in recalls},
+            "recalls_at_real_rate": recalls.loc[arm, "recall_at_real_rate"].groupby("detector").mean().to_dict(),
+            "criterion": {"met": int(kept[arm].sum()), "of": len(kept)},
+            "by_environment": {
+                name: {
+                    "false_alarms": _share(mean_interval(blocks[arm].xs(name), ["seed"])),
+                    "recall_at_real_rate": float(recalls.loc[(arm, name), "recall_at_real_rate"].mean()),
+                    "detectors": per_detector[arm, name].to_dict(),
+                }
+                for name in environments
+            },
+        }
+        for arm in ARMS
+    }
+
+
+def _share(found: Mapping[str, float]) -> dict[str, float]:
+    """The interval of a share, limited to 1: a bootstrap sample of the larger blocks can exceed it."""
+    return {name: min(value, 1.0) for name, value in found.items()}
+
+
+def keeps_the_rule(rate: "pd.Series", recall: "pd.Series") -> "pd.DataFrame":
+    """Whether each row meets the criterion of claim C8; one column per arm.
+
+    The false-alarm rate has to be at most twice that of training on real telemetry plus one percentage point, and recall at most
+    five points lower.
+
+    Args:
+        rate: False-alarm rates, indexed by `arm` and more.
+        recall: Recall, indexed likewise.
+    """
+    rates, recalls = rate.unstack("arm"), recall.unstack("arm")
+    return rates.le(2 * rates["real"] + 0.01, axis=0) & recalls.ge(recalls["real"] - 0.05, axis=0)
+
+
+def controls(alarms: "pd.DataFrame", recall: "pd.DataFrame") -> dict[str, Any]:
+    """False alarms and recall of scores of one line of code, with thresholds set on real windows."""
+    rate = rates(alarms).groupby("detector")["rate"].mean()
+    found = recall.groupby("detector")[["recall", "recall_at_real_rate"]].mean()
+    return {name: {"false_alarms": float(rate[name]), **found.loc[name].astype(float).to_dict()} for name in CONTROLS}
+
+
+def contrasts(alarms: "pd.DataFrame", pairs: Sequence[tuple[str, str]]) -> list[dict[str, Any]]:
+    """Differences between arms in the log-odds of a false alarm, as means over detectors.
+
+    Replicates of one seed share draws, so the test uses the mean of each seed over environments. Half a count is added to both sides
+    of the odds (Haldane and Anscombe), so that rates of 0 and 1 stay finite.
+
+    Args:
+        alarms: The table `alarms`.
+        pairs: The contrasts that were declared together; p-values are adjusted for their number.
+    """
+    counts = trained(rates(alarms)).set_index([*REPLICATE, "arm", "detector"])
+    odds = np.log((counts["alarms"] + 0.5) / (counts["windows"] - counts["alarms"] + 0.5))
+    averaged = odds.groupby([*REPLICATE, "arm"]).mean().unstack("arm")
+    differences = [averaged[first] - averaged[second] for first, second in pairs]
+    adjusted = holm([wilcoxon_signed_rank(each.groupby("seed").mean()) for each in differences])
+    return [
+        {"first": first, "second": second, "log_odds": mean_interval(difference), "adjusted_p_value": float(p_value)}
+        for (first, second), difference, p_value in zip(pairs, differences, adjusted, strict=True)
+    ]
+
+
+def modes(degraded: "pd.DataFrame") -> dict[str, Any]:
+    """Error of each method on nominal windows, inside and outside the severities of training, and by mode and severity.
+
+    `score_correlation` is Spearman's rank correlation of the mean out-of-range score with the error, over modes and severities of a
+    seed, as the mean over seeds.
+    """
+    where = np.select([degraded["mode"] == "nominal", degraded["severity"] <= LARGEST_TRAINED], ["nominal", "inside"], default="outside")
+    by_range = degraded.assign(where=where).groupby(["method", "where"])["nrmse"].mean()
+    by_mode = degraded.groupby(["method", "mode", "severity"])["nrmse"].mean()
+    scored = {
+        method: np.mean(
+            [rows["score"].corr(rows["nrmse"], "spearman") for _, rows in degraded[degraded["method"] == method].groupby("seed")]
+        )
+        for method in SCORED
+    }
+    return {
+        "seeds": sorted(int(seed) for seed in degraded["seed"].unique()),
+        "nrmse": {method: by_range[method].to_dict() for method in METHODS},
+        "by_mode": {
+            method: {
+                mode: [[round(float(severity), 4), float(value)] for severity, value in values.droplevel(0).items()]
+                for mode, values in by_mode[method].groupby(level="mode")
+            }
+            for method in METHODS
+        },
+        "score_correlation": {method: float(value) for method, value in scored.items()},
+    }

@@ -1,0 +1,150 @@
+"""What the files of this folder share: changed inputs, and the judgement of what a reader does with one.
+
+Every input is accepted, or refused with an `InputError` of one printable line, within 5 s and 1 GiB of memory. An ordinary run tries a
+few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest tests/fuzzing` tries as many others.
+"""
+
+import contextlib
+import json
+import os
+import resource
+import signal
+import tempfile
+import warnings
+from pathlib import Path
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+from enhsim_tf.common.errors import InputError
+
+_LONG = int(os.environ.get("ENHSIM_TF_FUZZ", 0))
+_SECONDS, _BYTES, _MAX_CHARACTERS = 5, 2**30, 600
+
+NASTY = (
+    "", " ", ".", "..", "../../x", "/etc/passwd", "a\\b", "CON", "x" * 300, "\x00", "\n", "\r\n", "\x1b[31m", "\u202e", "é", "'\";--", "{}", "[]", "null",
+    "nan", "-inf", "1e999", "-0", "1" * 400, "0x10", "1_000", "٣", "1.500,0", "9999-12-31T23:59:60Z", "0001-01-01", "2024-10-27 02:30:00", "=", ":", "%",
+    "%ff", "&", "?", "#", "1:2:3", "1e-400", "*a", "&a", "!!python/object:os.system", "- ", "\t", '"', ",,,,", ";", "P1D", "-9223372036854775808",
+)  # fmt: skip
+_NUMBERS = (0, -1, 0.5, -0.0, 1e-320, 1e308, 10**9, 2**31, 2**63, 10**30, 10**400, float("nan"), float("inf"))
+_ANYTHING = st.sampled_from([None, True, [], {}, [[]], {"": None}, [0] * 50, *_NUMBERS, *NASTY]) | st.text(max_size=20) | st.integers()
+_PIECES = (
+    st.sampled_from([text.encode() for text in NASTY])
+    | st.binary(max_size=8)
+    | st.integers(0, 2**64 - 1).map(lambda number: number.to_bytes(8, "little"))
+)
+
+
+@st.composite
+def changed(draw, seeds):
+    """Valid bytes in which up to four pieces are replaced, dropped, repeated, or taken from another valid input."""
+    data = draw(st.sampled_from(seeds))
+    for _ in range(draw(st.integers(0, 4))):
+        begin = draw(st.integers(0, len(data)))
+        end = min(len(data), begin + draw(st.sampled_from([0, 1, 2, 8, 64, len(data)])))
+        other = draw(st.sampled_from(seeds))
+        data = data[:begin] + draw(_PIECES | st.just(data[begin:end] * 2) | st.just(other[begin:end])) + data[end:]
+    return data
+
+
+@st.composite
+def changed_json(draw, seeds):
+    """Valid JSON in which up to three values, at any depth, are replaced or dropped, or keys are added."""
+    content = json.loads(draw(st.sampled_from(seeds)))
+    for _ in range(draw(st.integers(0, 3))):
+        place, key = None, None
+        inner = content
+        while isinstance(inner, dict | list) and inner and (place is None or draw(st.booleans())):
+            place = inner
+            key = draw(st.sampled_from(sorted(inner) if isinstance(inner, dict) else range(len(inner))))
+            inner = place[key]
+        if place is None:
+            content = draw(_ANYTHING)
+        elif draw(st.booleans()):
+            place[key] = draw(_ANYTHING)
+        elif isinstance(place, dict) and draw(st.booleans()):
+            place[draw(st.text(max_size=8))] = draw(_ANYTHING)
+        else:
+            del place[key]
+    return json.dumps(content).encode()
+
+
+def tried(examples):
+    """Settings of a test that tries inputs.
+
+    Args:
+        examples: Number of inputs in an ordinary run.
+    """
+    return settings(
+        derandomize=not _LONG, max_examples=_LONG or examples, deadline=None, database=None, suppress_health_check=list(HealthCheck)
+    )
+
+
+def judge(read, *arguments):
+    """Calls a reader in an empty folder; any outcome but acceptance and a good refusal raises.
+
+    Args:
+        read: Called with the arguments and the folder.
+        *arguments: The input.
+
+    Returns:
+        Whether the input was accepted.
+    """
+    before = os.getcwd()
+    with tempfile.TemporaryDirectory() as folder, _limits(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("error", UserWarning)  # as in all tests
+        os.chdir(folder)
+        try:
+            read(*arguments, Path(folder))
+        except InputError as error:
+            assert is_good(str(error)) and not _is_of_memory(error), repr(error)
+            return False
+        finally:
+            os.chdir(before)
+    return True
+
+
+def is_good(line):
+    """Whether an error message is one short printable line that says what was expected and received."""
+    return line.isprintable() and len(line) <= _MAX_CHARACTERS and line.startswith("Expected ") and "Received: " in line
+
+
+def all_of(*calls):
+    """Makes all calls. If all of them refuse, raises the first refusal at the end."""
+    refusals = []
+    for call in calls:
+        try:
+            call()
+        except InputError as error:
+            assert is_good(str(error)) and not _is_of_memory(error), repr(error)
+            refusals.append(error)
+    if len(refusals) == len(calls):
+        raise refusals[0]
+
+
+def _is_of_memory(error):
+    """Whether an error was caused by a MemoryError: input that is refused in time never allocates that much."""
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__context__
+    return error is not None
+
+
+@contextlib.contextmanager
+def _limits():
+    """Ends what takes too long, and refuses memory beyond the limit."""
+
+    def interrupt(number, frame):
+        raise KeyboardInterrupt(f"still running after {_SECONDS} s")  # which no reader catches
+
+    kept, handler = resource.getrlimit(resource.RLIMIT_AS), signal.signal(signal.SIGALRM, interrupt)
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if Path("/proc/self/statm").exists() else None
+    if size:
+        resource.setrlimit(resource.RLIMIT_AS, (size + _BYTES, kept[1]))
+    signal.setitimer(signal.ITIMER_REAL, _SECONDS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, handler)
+        resource.setrlimit(resource.RLIMIT_AS, kept)

@@ -1,0 +1,92 @@
+"""Folders of models and data sets with any content are read, or refused in one line. Checksums are changed with what they protect."""
+
+import hashlib
+import json
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enhsim_tf.datasets.folder import MANIFEST, check_folder, read_manifest, read_records
+from enhsim_tf.datasets.generate import verify
+from enhsim_tf.datasets.mix import Mix
+from enhsim_tf.datasets.plan import make_plan
+from enhsim_tf.datasets.shard import shard_file
+from enhsim_tf.enhanced_simulator.model_folder import models_of, refuse_foreign
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
+from tests.hostile.folders import PLAN, data_set, saved_model, write_data_set, write_model
+
+
+def read_model(file, data, folder):
+    model = write_model(folder / "models" / "volts", **{file: data})
+    all_of(
+        lambda: models_of(folder / "models"),
+        lambda: refuse_foreign(model),
+        lambda: make_plan(Mix(), model, 0, 100),
+        lambda: EnhancedSimulator.load(model),
+    )
+
+
+def load_model(data, folder):
+    EnhancedSimulator.load(write_model(folder / "model", arrays_npz=data))
+
+
+def test_folders_as_they_were_written_are_accepted():
+    assert judge(load_model, saved_model()["arrays.npz"]) and judge(read_data_set, {})
+
+
+@tried(60)
+@given(changed_json([saved_model()["manifest.json"]]) | changed([saved_model()["manifest.json"]]))
+def test_manifests_of_models(data):
+    judge(read_model, "manifest_json", data)
+
+
+@tried(60)
+@given(changed_json([saved_model()["settings.json"]]) | changed([saved_model()["settings.json"]]))
+def test_settings_of_models(data):
+    judge(read_model, "settings_json", data)
+
+
+@tried(60)
+@given(changed([saved_model()["arrays.npz"]]))
+def test_arrays_of_models(data):
+    judge(load_model, data)
+
+
+def read_data_set(files, folder):
+    made = write_data_set(folder / "set", **files)
+    lines = []
+    all_of(
+        lambda: read_manifest(made),
+        lambda: read_records(made),
+        lambda: check_folder(made, PLAN),
+        lambda: verify(made, lines.append),
+    )
+    assert all(line.isprintable() for line in lines)
+    if "shard" in files:
+        (made / MANIFEST).unlink()
+        check_folder(made, PLAN)
+
+
+@tried(60)
+@given(changed_json([data_set()[MANIFEST]]) | changed([data_set()[MANIFEST]]))
+def test_manifests_of_data_sets(data):
+    judge(read_data_set, {"manifest": data})
+
+
+RECORDS = [json.dumps([number, each["rows"], each["sha256"]]) for number, each in enumerate(json.loads(data_set()[MANIFEST])["shards"])]
+
+
+@tried(60)
+@given(changed(["\n".join(RECORDS).encode(), RECORDS[0].encode()]) | st.binary(max_size=300))
+def test_journals_of_data_sets(data):
+    unfinished = json.loads(data_set()[MANIFEST]) | {"shards": None}
+    judge(read_data_set, {"manifest": json.dumps(unfinished).encode(), "journal": data})
+
+
+@tried(60)
+@given(changed([data_set()[shard_file(0)]]))
+def test_shards_of_data_sets(data):
+    manifest = json.loads(data_set()[MANIFEST])
+    manifest["shards"][0]["sha256"] = hashlib.sha256(data).hexdigest()
+    judge(read_data_set, {"manifest": json.dumps(manifest).encode(), "shard": data})

@@ -1,0 +1,208 @@
+"""Tables, arrays, stores and labelled channels of any content are read, or refused in one line."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
+from enhsim_tf.telemetry.telemanom import load_labelled
+from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
+
+NUM = 60
+WAVE = np.round(np.sin(np.arange(NUM) / 5), 3)
+
+
+def use(source):
+    """Reads and cleans every channel of a source, refusing and dropping bad cells."""
+
+    def channels(cleaning):
+        for series in read_source(source, options=cleaning).values():
+            cleaned = clean(series, cleaning)
+            assert all(line.isprintable() for line in (*cleaned.report.lines(), json.dumps(cleaned.report.to_dict(), allow_nan=False)))
+            assert all(np.isfinite(part.values).all() and len(part) for part in cleaned.parts)
+
+    all_of(lambda: channels(Cleaning()), lambda: channels(Cleaning(interval_s=1.0, on_bad_times="drop", on_bad_values="drop")))
+
+
+def read_file(name, data, folder):
+    (folder / name).write_bytes(data)
+    all_of(lambda: use(folder / name), lambda: read_telemetry(folder / name), lambda: read_telemetry(folder / name, "value", "time"))
+
+
+def csv_seeds():
+    times = pd.date_range("2024-10-27", periods=NUM, freq="h")
+    frames = [
+        pd.DataFrame({"time": times, "value": WAVE}).to_csv(index=False),
+        pd.DataFrame({"time": times.tz_localize("UTC"), "value": WAVE, "word": "on"}).to_csv(index=False),
+        pd.DataFrame({"time": np.arange(NUM) * 60, "value": WAVE}).to_csv(index=False, sep=";", decimal=","),
+        "# made by hand\n# twice\nvalue\n" + "\n".join(map(str, WAVE)),
+        'time,"a ""b""",c\n2024-01-01 00:00:59,1,x\n2024-01-01 00:00:60,,y\n2024-01-01 00:01:01,nan,1e5\n' * 3,
+    ]
+    return [text.encode() for text in frames] + [frames[0].encode("utf-16"), frames[1].replace("word", "Größe").encode("latin-1")]
+
+
+def parquet_of(table, **options):
+    sink = io.BytesIO()
+    pq.write_table(table, sink, **options)
+    return sink.getvalue()
+
+
+def tables():
+    times = pd.date_range("2024-01-01", periods=NUM, freq="min")
+    frames = [
+        pd.DataFrame({"time": times, "value": WAVE}),
+        pd.DataFrame({"value": WAVE.astype(np.float32)}, index=pd.DatetimeIndex(times, tz="Europe/Berlin", name="t")),
+        pd.DataFrame({"time": times.astype(str), "value": [f"{value}" for value in WAVE], "flag": WAVE > 0}),
+        pd.DataFrame({"value": pd.Categorical([1.5, 2.5, 3.5] * 20), "day": times.date, "span": times - times[0]}),
+    ]
+    nested = pa.table({"value": pa.array([[1.0, 2.0]] * 9), "s": pa.array([{"a": 1}] * 9), "n": pa.nulls(9), "b": pa.array([b"x"] * 9)})
+    odd = pa.table({"value": pa.array([1, 2, 3], pa.decimal128(10, 2)), "time": pa.array([1, 2, 3], pa.date32())})
+    return [*map(pa.Table.from_pandas, frames), nested, odd]
+
+
+def parquet_seeds():
+    return [parquet_of(table) for table in tables()] + [parquet_of(tables()[0], compression="zstd", use_dictionary=False)]
+
+
+def npy_of(array):
+    sink = io.BytesIO()
+    np.lib.format.write_array(sink, array)
+    return sink.getvalue()
+
+
+def npy_seeds():
+    archive = io.BytesIO()
+    np.savez(archive, value=WAVE)
+    arrays = [WAVE, np.stack([WAVE, WAVE], 1), (100 * WAVE).astype(">i2"), WAVE.astype("U8"), WAVE > 0, WAVE + 0j, np.array([None, "a"])]
+    arrays += [np.arange(NUM).astype("datetime64[s]"), np.zeros(3, [("a", "f4")]), np.zeros((2, 3, 4)), np.array(1.0)]
+    return [npy_of(array) for array in arrays] + [archive.getvalue()]
+
+
+FILES = {"x.csv": csv_seeds(), "x.parquet": parquet_seeds(), "x.npy": npy_seeds()}
+FOUND = [  # inputs that once were neither accepted nor refused well
+    ("x.npy", b"\x93NUMPY\x02\x00\x42\x00\x00\x00{'descr': '<U1', 'fortran_order': False, 'shape': (3,), }         \n" + b"\xff\xd8\xff\x00" * 3),
+    ("x.npy", b"PK\x03\x04-\x00\x00\x00"),
+    ("x.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (60,), }" + b" " * 20 + b"("),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_as_they_were_written_are_accepted(name):
+    assert judge(read_file, name, FILES[name][0])
+
+
+@pytest.mark.parametrize(("name", "data"), FOUND)
+def test_what_once_failed_is_refused(name, data):
+    assert not judge(read_file, name, data)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_changed_files(name):
+    @tried(100)
+    @given(changed(FILES[name]) | st.binary(max_size=300))
+    def each(data):
+        judge(read_file, name, data)
+
+    each()
+
+
+@tried(100)
+@given(
+    st.sampled_from(["<f8", "|i1", "<U5", "|S0", "|V8", "<M8[s]", "|O", ">f4"]),
+    st.sampled_from([(60,), (30, 2), (10**12,), (0, 5), (10**6, 10**6), (), (1, 60)]),
+    st.data(),
+)
+def test_headers_of_arrays(kind, shape, data):
+    header = data.draw(changed([f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()]))
+    judge(read_file, "x.npy", b"\x93NUMPY\x02\x00" + len(header).to_bytes(4, "little") + header + bytes(480))
+
+
+@tried(40)
+@given(st.integers(0, 5), changed_json([table.schema.metadata[b"pandas"] for table in tables()[:4]]))
+def test_metadata_of_pandas(number, about):
+    judge(read_file, "x.parquet", parquet_of(tables()[number].replace_schema_metadata({"pandas": about})))
+
+
+def read_store(data, folder):
+    (folder / "store" / "volts").mkdir(parents=True)
+    (folder / "store" / "volts" / "2024-01-01.parquet").write_bytes(data)
+    use(folder / "store")
+
+
+ABOUT = {"name": "volts", "unit": "V", "start": "2024-01-01T00:00:00+00:00", "interval_s": "60.0", "offset_s": "0.0"}
+
+
+def stored(about):
+    times = pa.array(1_704_067_200 * 10**9 + np.arange(NUM) * 60 * 10**9, pa.timestamp("ns", "UTC"))
+    return parquet_of(pa.table({"time": times, "value": pa.array(WAVE, pa.float32())}).replace_schema_metadata(about))
+
+
+@tried(60)
+@given(changed([stored(ABOUT)]) | changed_json([json.dumps(ABOUT)]))
+def test_series_of_a_store(data):
+    content = json.loads(data) if data[:1] in b"{[" and data[:4] != b"PAR1" else None
+    if isinstance(content, dict):
+        try:
+            data = stored({str(key): str(value) for key, value in content.items()})
+        except (UnicodeEncodeError, ValueError):  # half a character, or a number that Python does not print
+            return
+    judge(read_store, data)
+
+
+def test_a_series_of_a_store_as_it_was_written_is_accepted():
+    assert judge(read_store, stored(ABOUT))
+    assert not judge(read_store, stored(ABOUT | {"start": "1_000"})) and not judge(read_store, stored(ABOUT | {"interval_s": "nan"}))
+
+
+def name_in_a_store(name, folder):
+    store = ParquetStore(folder / "store")
+    store.write(Telemetry(WAVE.astype(np.float32), 60.0, 0.0, None, name))
+    (channel,) = (folder / "store").iterdir()
+    assert store.names() == [name] and store.read(name).name == name
+    assert {path.parent for path in Path(folder).rglob("*.parquet")} == {channel}
+
+
+@tried(60)
+@given(st.text(st.characters(exclude_categories=[]), max_size=40))
+def test_names_in_a_store(name):
+    judge(name_in_a_store, name)
+
+
+LABELS = b'chan_id,spacecraft,anomaly_sequences,class,num_values\nA-1,SMAP,"[[10, 20], [30, 40]]","[point, contextual]",60\n'
+
+
+def read_labelled(array, labels, folder):
+    for part, content in (("train", npy_of(np.stack([WAVE, WAVE], 1))), ("test", array)):
+        (folder / part).mkdir()
+        (folder / part / "A-1.npy").write_bytes(content)
+    (folder / "labeled_anomalies.csv").write_bytes(labels)
+    for channel in load_labelled(folder):
+        assert len(channel.is_anomalous) == len(channel.test)
+
+
+@tried(100)
+@given(st.just(npy_seeds()[1]) | changed(npy_seeds()), st.just(LABELS) | changed([LABELS]))
+def test_labelled_channels(array, labels):
+    judge(read_labelled, array, labels)
+
+
+def test_labelled_channels_as_they_were_written_are_accepted():
+    assert judge(read_labelled, npy_seeds()[1], LABELS)
+
+
+def test_a_time_too_far_off_for_its_zone_is_refused(tmp_path, refused):
+    times = pd.DatetimeIndex(np.array([0, 60, 10**12]).view("datetime64[s]")).tz_localize("UTC").tz_convert("Europe/Berlin")
+    pd.DataFrame({"time": times, "value": [1.0, 2.0, 3.0]}).to_parquet(tmp_path / "x.parquet")
+    with refused("a time out of range", "row 2"):
+        read_source(tmp_path / "x.parquet")

@@ -1,0 +1,148 @@
+"""Scenario files, options, names and addresses of any content are used, or refused in one line."""
+
+import contextlib
+import io
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enhsim_tf.cli.arguments import parse
+from enhsim_tf.common.parallel.engines import parse_workers
+from enhsim_tf.datasets.labelled_windows import parse_num_samples, parse_scenario, parse_start
+from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.enhanced_simulator.model_folder import folder_of
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.influx_store import parse_location
+from enhsim_tf.telemetry.sources import read_source, read_telemetry
+from tests.fuzzing.readers import all_of, changed, judge, tried
+
+SCENARIOS = b"""\
+windows: 1000
+seed: 3
+shard: 100
+nominal: 0.5
+scenarios:
+  - mode: stuck
+    share: 0.3
+    severity: [0.2, 0.9]
+    onset: [0.0, 0.5]
+  - {mode: drift, share: 0.2, severity: 0.5}
+models:
+  - folder: vehicle-1/volts
+    name: first
+    share: 0.75
+  - folder: "vehicle-2/volts"
+    share: 0.25
+"""
+
+
+def scenario_file(data, folder):
+    (folder / "mix.yaml").write_bytes(data)
+    mix = read_mix(folder / "mix.yaml")
+    assert abs(mix.nominal + sum(part.share for part in mix.scenarios) - 1) < 1e-5
+    assert all(0 <= part.severity[0] <= part.severity[1] <= 1 for part in mix.scenarios)
+
+
+@tried(150)
+@given(changed([SCENARIOS, b"nominal: 1.0", b"models: [{folder: a}]"]) | st.binary(max_size=300))
+def test_scenario_files(data):
+    judge(scenario_file, data)
+
+
+def test_a_scenario_file_as_it_was_written_is_accepted():
+    assert judge(scenario_file, SCENARIOS)
+
+
+def name_of_a_channel(name, folder):
+    found = folder_of(folder, name)
+    found.mkdir()
+    assert found.parent == folder and [path.name for path in folder.iterdir()] == [found.name]
+    assert found.name.isascii() and not set(found.name) & set('\\/:*?"<>|.') and found.name.upper() not in ("CON", "NUL", " ")
+
+
+def address(text, folder):
+    location = parse_location(text)
+    assert parse_location(str(location)) == location
+
+
+def zone(text, folder):
+    clean(pd.Series(np.arange(60.0), index=pd.date_range("2024-10-26", periods=60, freq="h")), Cleaning(timezone=text))
+
+
+def time_format(text, folder):
+    clean(pd.Series(np.arange(20.0), index=[f"26.10.24 {hour:02d}:00:00" for hour in range(20)]), Cleaning(time_format=text))
+
+
+def column(text, folder):
+    path = folder / "x.csv"
+    pd.DataFrame({"time": range(9), "value": np.arange(9.0) ** 2, "Größe": 1.5}).to_csv(path, index=False)
+    np.save(folder / "x.npy", np.zeros((4, 3)))
+    all_of(
+        lambda: read_source(path, [text]),
+        lambda: read_source(path, None, text),
+        lambda: read_source(folder / "x.npy", [text]),
+        lambda: read_telemetry(path, "value", text),
+    )
+
+
+def source(text, folder):
+    (folder / "x.csv").write_text("value\n1\n2\n3\n")
+    text = text.replace("/", ":")  # so that it does not leave this folder
+    all_of(lambda: read_source(text), lambda: read_source(f"store#{text}"), lambda: read_telemetry(text), lambda: read_mix(text))
+
+
+def command_line(text, folder):
+    try:
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            parse(text.split("\n"))
+    except SystemExit as ended:
+        assert ended.code == 0  # help
+
+
+READERS = {
+    name_of_a_channel: ["volts", "a/b", "..", "CON", "Größe 1.", " x "],
+    address: ["influxdb://bucket/measurement/field", "influxdb://b%2Fc/m/f?tag=value&other=%C3%A9", "influxdb://user:pass@host/m/f?a=b"],
+    zone: ["Europe/Berlin", "UTC", "+02:00"],
+    time_format: ["%d.%m.%y %H:%M:%S", "ISO8601", "mixed"],
+    column: ["value", "time", "none", "0", "Größe"],
+    source: ["x.csv", "store#volts", "influxdb://b/m/f", "."],
+    command_line: [
+        "fit\nx.csv\n--out\nmodels\n--window\n64\n--noise\nbest",
+        "generate\nmodels\n--windows\n10_000\n--scenario\nstuck:0.5\n--workers\nauto\n--out\nset",
+        "score\nmodels\nx.csv\n--detector\npca-residual\n--false-alarm-rate\n0.01\n--out\ny.csv\n--seed\n3",
+        "--help",
+    ],
+    lambda text, folder: parse_scenario(text): ["stuck:0.5:0.25", "drift:1"],
+    lambda text, folder: parse_num_samples(text, 0.5): ["1d", "6h", "90min", "5000", "1.5 s"],
+    lambda text, folder: parse_start(text): ["2024-01-01", "2024-01-01T12:00:00.5+02:00", "2024-W01-1"],
+    lambda text, folder: parse_workers(text): ["auto", "2", "16"],
+}
+FOUND = [  # inputs that once were neither accepted nor refused well
+    (time_format, "%d.%m.%y:%M:%M:%S"),
+    (time_format, "%Y-%n"),
+    (name_of_a_channel, "\udcff\udcff"),
+    (source, "store#\udcff"),
+    (address, "influxdb://b\ud800/m/f"),
+    (address, "influxdb://user:pass@host/\ud800m/f?a=b"),
+]
+
+
+@pytest.mark.parametrize(("read", "text"), FOUND)
+def test_what_once_failed_is_used_or_refused(read, text):
+    judge(read, text)
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_texts(read):
+    seeds = READERS[read]
+    judge(read, seeds[0])
+
+    @tried(60)
+    @given(changed([seed.encode() for seed in seeds]).map(lambda data: data.decode("utf-8", "surrogateescape")) | st.text(max_size=60))
+    def each(text):
+        judge(read, text)
+
+    each()

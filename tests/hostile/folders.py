@@ -1,0 +1,91 @@
+"""Saved models and data sets whose files are changed together with their checksums, as an attacker would do."""
+
+import functools
+import hashlib
+import io
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.datasets.folder import JOURNAL, MANIFEST
+from enhsim_tf.datasets.mix import Mix, ScenarioShare
+from enhsim_tf.datasets.plan import FORMAT, Model, Plan
+from enhsim_tf.datasets.shard import shard_file
+
+PLAN = Plan(
+    Mix(0.5, (ScenarioShare("stuck", 0.5, (0.2, 0.9), (0.0, 0.5)),)), (Model("model", Path("nowhere"), 1.0, "0" * 64, 60, 2.0),), 3, 20, 10
+)
+
+
+@functools.cache
+def saved_model() -> dict[str, bytes]:
+    """The files of a small saved simulator."""
+    from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.enhancer.network import build_enhancer
+    from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+
+    noise = WindowBootstrap(np.random.default_rng(0).standard_normal((5, 24)).astype(np.float32))
+    coarse = SquareWaveSimulator([SquareWave(20.0, low=-1.0, high=1.0)])
+    simulator = EnhancedSimulator(coarse, build_enhancer(24, 4, 1), noise, 2.0, levels=np.ones((3, 2)), trained={"epochs": 1})
+    with tempfile.TemporaryDirectory() as folder:
+        simulator.save(Path(folder) / "model")
+        return {path.name: path.read_bytes() for path in (Path(folder) / "model").iterdir()}
+
+
+def arrays_of_model() -> dict[str, np.ndarray]:
+    """The arrays of the saved simulator."""
+    with np.load(io.BytesIO(saved_model()["arrays.npz"])) as arrays:
+        return dict(arrays)
+
+
+def npz_of(arrays: dict[str, np.ndarray]) -> bytes:
+    """The content of a `.npz` file."""
+    sink = io.BytesIO()
+    np.savez(sink, **arrays)
+    return sink.getvalue()
+
+
+def write_model(folder: Path, **changed: bytes) -> Path:
+    """Writes a saved simulator with some files changed and correct checksums.
+
+    Args:
+        folder: Where to.
+        **changed: Content by file name, with `_` instead of the dot.
+    """
+    files = saved_model() | {name.replace("_", ".", 1): content for name, content in changed.items()}
+    if "manifest_json" not in changed:
+        checksums = {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items()) if name != "manifest.json"}
+        files["manifest.json"] = json.dumps({"format": json.loads(files["manifest.json"])["format"], "sha256": checksums}).encode()
+    folder.mkdir(parents=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+@functools.cache
+def data_set() -> dict[str, bytes]:
+    """The files of a small finished data set."""
+    from tests.faults.small_data_set import PlainMaker
+
+    with tempfile.TemporaryDirectory() as folder:
+        records = [PlainMaker(PLAN, folder)(number) for number in range(2)]
+        files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+    shards = [{"file": shard_file(each.shard), "rows": each.rows, "sha256": each.sha256} for each in records]
+    return files | {MANIFEST: json.dumps({"format": FORMAT, "settings": PLAN.settings(), "shards": shards}).encode()}
+
+
+def write_data_set(folder: Path, **changed: bytes) -> Path:
+    """Writes a finished data set with some files changed.
+
+    Args:
+        folder: Where to.
+        **changed: Contents of `manifest`, `journal` and `shard`, which is the first.
+    """
+    names = {"manifest": MANIFEST, "journal": JOURNAL, "shard": shard_file(0)}
+    folder.mkdir(parents=True)
+    for name, content in (data_set() | {names[name]: content for name, content in changed.items()}).items():
+        (folder / name).write_bytes(content)
+    return folder

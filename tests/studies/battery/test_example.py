@@ -1,0 +1,77 @@
+"""The recorded pair in `examples/battery`, which needs no PyBaMM."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.enhancer.ridge import fit_ridge
+from enhsim_tf.telemetry.sources import read_source
+from studies.battery import example
+from studies.battery.orbits import CAPACITY_AH, INTERVAL_S, ORBIT_SAMPLES
+
+FOLDER = Path(__file__).parents[3] / "examples" / "battery"
+NAMES = ("telemetry", "simulator", "telemetry_fault", "simulator_fault")
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return {name: pd.read_csv(FOLDER / f"{name}.csv") for name in NAMES}
+
+
+def test_the_pair_is_small_and_every_file_is_read_as_telemetry(pair):
+    assert sum((FOLDER / f"{name}.csv").stat().st_size for name in NAMES) < 1_000_000
+    assert list(read_source(FOLDER / "telemetry.csv")) == ["volts"]
+    assert list(read_source(FOLDER / "simulator.csv")) == ["volts", "amperes", "celsius"]
+    for name, table in pair.items():
+        assert np.all(np.diff(table["time"]) == INTERVAL_S) and not table.isna().any().any(), name
+    assert pair["telemetry"]["time"].equals(pair["simulator"]["time"])
+    assert pair["telemetry_fault"]["time"].equals(pair["simulator_fault"]["time"])
+
+
+def test_the_orbits_return_the_charge_that_they_take(pair):
+    charge_ah = pair["simulator"]["amperes"].to_numpy() * INTERVAL_S / 3600
+    taken = charge_ah[charge_ah > 0].sum()
+    assert taken > 10 * CAPACITY_AH / 2 and abs(charge_ah.sum()) < CAPACITY_AH / 2  # it ends between empty and full, as it began
+
+
+def test_the_fault_raises_the_resistance_after_its_first_orbit(pair):
+    table, telemetry = pair["simulator_fault"], pair["telemetry_fault"]
+    assert list(table["mask"]) == [0] * ORBIT_SAMPLES + [1] * (len(table) - ORBIT_SAMPLES)
+    assert set(table["scenario"][table["mask"] == 1]) == {"raised resistance"} and set(table["severity"]) == {0.0, 1.0}
+    assert set(table["scenario"][table["mask"] == 0]) == {"nominal"}
+    steps = table["amperes"].diff()
+    for values in (table["volts"], telemetry["volts"]):  # by how much the voltage falls for a step of the current
+        ohms = [
+            -np.polyfit(steps[rows], values.diff()[rows], 1)[0]
+            for rows in ((np.abs(steps) > 0.3) & (table["mask"] == mask) for mask in (0, 1))
+        ]
+        assert ohms[1] - ohms[0] == pytest.approx(0.032, abs=0.01)
+
+
+def test_a_linear_map_with_the_current_halves_the_error_of_the_simulator(pair):
+    inputs = pair["simulator"][["volts", "amperes"]].to_numpy()
+    target = pair["telemetry"]["volts"].to_numpy()
+    window, cut = 100, 24 * ORBIT_SAMPLES  # short windows, so that the test is quick
+    views = np.lib.stride_tricks.sliding_window_view
+    starts, tested = np.arange(0, cut - window, 60), np.arange(cut, len(target) - window, window)
+    windows, targets = views(inputs, window, axis=0).transpose(0, 2, 1), views(target, window)
+    ridge = fit_ridge(windows[starts], targets[starts], starts)
+    errors = [np.sqrt(np.mean((made - targets[tested]) ** 2)) for made in (windows[tested][:, :, 0], ridge.predict(windows[tested]))]
+    assert errors[1] < errors[0] / 2
+
+
+def test_the_command_names_its_folder(capsys):
+    assert example.main([]) == 2 and "Expected the output folder" in capsys.readouterr().err
+
+
+def test_the_same_seed_writes_the_same_pair(tmp_path, pair):
+    pytest.importorskip("pybamm", reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'")
+    for name in ("first", "second"):
+        example.write_example(tmp_path / name, num_orbits=1, num_fault_orbits=2)
+    for name in NAMES:
+        assert (tmp_path / "first" / f"{name}.csv").read_bytes() == (tmp_path / "second" / f"{name}.csv").read_bytes()
+    first = pd.read_csv(tmp_path / "first" / "simulator.csv")
+    shipped = pair["simulator"][: ORBIT_SAMPLES // 2]
+    np.testing.assert_allclose(first[: ORBIT_SAMPLES // 2].to_numpy(), shipped.to_numpy(), atol=0.02)

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+
+from enhsim_tf.common.errors import InputError
+from studies.battery.faults import ALL, SEVERITIES, SIZES, Fault, drift_under, load_under, measure, simulator_inputs
+from studies.battery.orbits import (
+    CAPACITY_AH,
+    FIRST_CHARGE,
+    INTERVAL_S,
+    ORBIT_SAMPLES,
+    REGIMES,
+    SUN_SAMPLES,
+    battery_current,
+    draw_load,
+)
+
+
+def _charge(current):
+    return FIRST_CHARGE - np.cumsum(current) * INTERVAL_S / 3600 / CAPACITY_AH
+
+
+@pytest.mark.parametrize("regime", REGIMES.values(), ids=REGIMES)
+def test_the_controller_keeps_the_charge_between_empty_and_full(regime):
+    charge = _charge(battery_current(draw_load(40, regime, np.random.default_rng(0)), regime))
+    assert 0.05 < charge.min() and charge.max() <= 0.951
+    assert charge.max() > 0.93  # it does charge the battery in the sun
+
+
+def test_the_current_is_the_load_in_eclipse_and_the_surplus_in_the_sun():
+    regime = REGIMES["gentle"]
+    current = battery_current(np.full(ORBIT_SAMPLES, regime.bus_a), regime)
+    assert current[0] == pytest.approx(-(0.95 - FIRST_CHARGE) * CAPACITY_AH / 0.15)  # the taper: 0.05 of 5 Ah over 0.15 h
+    assert np.all(current[SUN_SAMPLES:] == regime.bus_a)
+
+
+def test_no_two_orbits_are_alike_and_the_seed_decides():
+    regime = REGIMES["hard"]
+    load = draw_load(50, regime, np.random.default_rng(3))
+    orbits = load.reshape(50, ORBIT_SAMPLES)
+    assert len(np.unique(orbits, axis=0)) == 50 and np.all((orbits > regime.bus_a).any(axis=1))
+    np.testing.assert_array_equal(load, draw_load(50, regime, np.random.default_rng(3)))
+    assert not np.array_equal(load, draw_load(50, regime, np.random.default_rng(4)))
+
+
+def test_each_fault_acts_in_one_place_and_grows_with_its_severity():
+    regime, load = REGIMES["gentle"], np.ones(3 * ORBIT_SAMPLES)
+    for fault in ALL:
+        acts = [
+            any(simulator_inputs(fault).values()),
+            drift_under(len(load), fault, ORBIT_SAMPLES).any(),
+            not np.array_equal(load_under(load, fault, regime, ORBIT_SAMPLES), load),
+        ]
+        assert sum(acts) == 1, fault
+    assert all(np.all(np.diff(sizes) > 0) and len(sizes) == len(SEVERITIES) for sizes in SIZES.values())
+    assert not any(simulator_inputs(None).values())
+
+
+def test_faults_begin_at_their_onset():
+    drift = drift_under(1_200, Fault("drifting sensor", 1.0), 600)
+    assert not drift[:601].any() and drift[600 + ORBIT_SAMPLES] == pytest.approx(0.08)  # volts an orbit at the largest severity
+    load = load_under(np.zeros(1_200), Fault("payload stuck on", 0.4), REGIMES["hard"], 600)
+    assert not load[:600].any() and np.all(load[600:] == pytest.approx(0.4 * 1.5))
+
+
+def test_the_sensor_adds_noise_and_rounds():
+    steps = measure(np.full(20_000, 3.7), 0.002, 5 / 4096, np.random.default_rng(0)).astype(np.float64) / (5 / 4096)
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-3)
+    expected = np.hypot(0.002, 5 / 4096 / np.sqrt(12))  # the variances of the noise and of the rounding add
+    assert np.std(steps) * 5 / 4096 == pytest.approx(expected, rel=0.02)
+
+
+def test_an_unknown_fault_is_refused():
+    with pytest.raises(InputError, match="Expected one of raised resistance.*Received: 'fire'"):
+        Fault("fire", 1.0)

@@ -1,0 +1,100 @@
+"""Physical oracles of both simulators. They need PyBaMM, and are skipped without it."""
+
+import os
+
+import numpy as np
+import pytest
+
+os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"  # before PyBaMM is imported
+pybamm = pytest.importorskip("pybamm", reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'")
+
+from enhsim_tf.common.errors import InputError  # noqa: E402
+from studies.battery import simulate as module  # noqa: E402
+from studies.battery.faults import Fault  # noqa: E402
+from studies.battery.orbits import ORBIT_SAMPLES, REGIMES, draw_load  # noqa: E402
+from studies.battery.simulate import simulate, simulate_all  # noqa: E402
+
+GENTLE = REGIMES["gentle"]
+SHORT = 240  # samples
+VOLTS, AMPERES, CELSIUS = range(3)
+
+
+@pytest.fixture(scope="module")
+def pulses():
+    """Voltages and temperatures of both simulators for a current with steps, nominal and under three faults from sample 120."""
+    current = np.where(np.arange(SHORT) % 60 < 30, 3.0, -1.0)
+    faults = [None, Fault("raised resistance", 1.0), Fault("lost capacity", 1.0), Fault("poor heat transfer", 1.0)]
+    return current, {model: simulate(model, current, GENTLE, faults, onset=120) for model in ("coarse", "fine")}
+
+
+def test_nothing_is_reported_to_anyone():
+    module.check_installed()
+    assert pybamm.config.check_opt_out()
+    assert pybamm.telemetry._posthog.disabled
+
+
+def test_faults_change_nothing_before_their_onset(pulses):
+    _, runs = pulses
+    for nominal, *faulty in runs.values():
+        for run in faulty:
+            np.testing.assert_allclose(run.values[:120], nominal.values[:120], atol=2e-4)
+            assert np.abs(run.values[126:] - nominal.values[126:]).max() > 0.002
+
+
+def test_added_resistance_lowers_the_voltage_by_ohms_law(pulses):
+    current, runs = pulses
+    for nominal, raised, *_ in runs.values():
+        drop = nominal.values[130:150, VOLTS] - raised.values[130:150, VOLTS]
+        np.testing.assert_allclose(drop, 0.032 * current[130:150], rtol=0.04)  # its heat, which helps the kinetics, is the rest
+
+
+def test_a_cell_without_current_keeps_its_voltage_and_the_temperature_around_it():
+    for model, celsius in (("coarse", 25.0), ("fine", 15.0)):
+        (run,) = simulate(model, np.zeros(60), GENTLE, [None], onset=10)
+        assert np.ptp(run.values[:, VOLTS]) < 1e-3
+        np.testing.assert_allclose(run.values[:, CELSIUS], celsius, atol=0.01)
+
+
+def test_charge_that_is_returned_restores_the_voltage():
+    rest, there = np.zeros(300), np.full(90, 2.5)
+    (run,) = simulate("coarse", np.concatenate([np.zeros(10), there, -there, rest]), GENTLE, [None], onset=10)
+    assert run.values[99, VOLTS] < run.values[0, VOLTS] - 0.05
+    assert run.values[-1, VOLTS] == pytest.approx(run.values[0, VOLTS], abs=0.003)
+
+
+def test_a_cell_that_cools_worse_is_warmer_and_a_smaller_one_swings_more(pulses):
+    _, runs = pulses
+    for nominal, _, smaller, warmer in runs.values():
+        assert warmer.values[-1, CELSIUS] > nominal.values[-1, CELSIUS] + 0.1
+        assert np.ptp(smaller.values[130:, VOLTS]) > np.ptp(nominal.values[130:, VOLTS])
+
+
+def test_the_same_load_gives_the_same_runs():
+    load = draw_load(1, GENTLE, np.random.default_rng(0))[:SHORT]
+    first, second = (simulate_all(load, GENTLE, [None], onset=10)[0] for _ in range(2))
+    for one, other in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+    np.testing.assert_array_equal(first[0].values[:, AMPERES], first[1].values[:, AMPERES])
+
+
+def test_a_failed_run_is_repeated_with_less_current_and_counted(monkeypatch):
+    tried = []
+
+    def failing(model, current, regime, faults, onset):
+        tried.append((model, float(current[0])))
+        ok = abs(current[0]) < 0.85
+        return [module.Run(np.zeros((len(current), 3), np.float32), 1.0) if ok or fault is None else None for fault in faults]
+
+    monkeypatch.setattr(module, "simulate", failing)
+    monkeypatch.setattr(module, "battery_current", lambda load, regime: np.ones(5))
+    nominal, faulty = simulate_all(np.zeros(5), GENTLE, [None, Fault("lost capacity", 1.0)])
+    assert [run.reductions for run in nominal] == [0, 0] and [run.reductions for run in faulty] == [2, 2]
+    assert [current for _, current in tried] == pytest.approx([1, 1, 0.9, 0.9, 0.81, 0.81])
+    monkeypatch.setattr(module, "simulate", lambda model, current, regime, faults, onset: [None] * len(faults))
+    with pytest.raises(InputError, match="Expected loads that the solver can follow"):
+        simulate_all(np.zeros(5), GENTLE, [None])
+
+
+def test_an_unknown_model_is_refused():
+    with pytest.raises(InputError, match="Expected one of coarse, fine"):
+        simulate("medium", np.zeros(ORBIT_SAMPLES), GENTLE, [None])
