@@ -6,16 +6,15 @@ this file. Figures 5 to 7, faces of another system's making in the paper, have c
 
 import dataclasses
 import shutil
-import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib.dates
 import matplotlib.figure
-import matplotlib.style
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.figure import Figure, save
 from enhsim_tf.common.plot_style import (
     AVERAGE,
     COARSE,
@@ -29,7 +28,6 @@ from enhsim_tf.common.plot_style import (
     QUIET,
     REAL,
     SINGLE,
-    STYLE,
     beside,
     label_ends,
     name_axes,
@@ -278,92 +276,100 @@ def layer_details(layer: keras.layers.Layer) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class Figure:
-    """A figure.
+class PaperFigure(Figure):
+    """A figure of the paper, which `drawn_by` draws from a pipeline; None for a drawing that is kept.
 
     Args:
-        title: The paper's caption.
-        alt: Text for readers who cannot see it.
-        draw: Draws it; None for a drawing that is kept.
         needs_training: Whether it shows a trained network.
     """
 
-    title: str
-    alt: str
-    draw: Callable[[Pipeline], matplotlib.figure.Figure] | None = None
     needs_training: bool = True
 
 
 FIGURES = {
-    "fig01_pipeline": Figure(
+    "fig01_pipeline": PaperFigure(
+        1,
         "Enhanced simulation pipeline",
         "Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their "
         "sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.",
+        None,
         needs_training=False,
     ),
-    "fig02_source_target": Figure(
+    "fig02_source_target": PaperFigure(
+        2,
         "Training source and target time series",
         "Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time.",
         training_pairs,
         needs_training=False,
     ),
-    "fig03_enhancer": Figure(
+    "fig03_enhancer": PaperFigure(
+        3,
         "Enhancing MLP neural network",
         "Table of the enhancer's layers with their output shapes and numbers of parameters.",
         lambda pipeline: layer_table(build_enhancer(pipeline.settings), "Layers of the enhancer"),
         needs_training=False,
     ),
-    "fig04_enhanced_simulation": Figure(
+    "fig04_enhanced_simulation": PaperFigure(
+        4,
         "Enhanced simulation",
         "A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two.",
         enhanced_simulation,
     ),
-    "fig05_real_or_generated": Figure(
+    "fig05_real_or_generated": PaperFigure(
+        5,
         "Real or generated: windows of telemetry (a counterpart)",
         "Eight windows of telemetry in random order; four are generated.",
         guess_telemetry,
     ),
-    "fig06_real_or_generated_noise": Figure(
-        "Real or generated: windows of noise (a counterpart)", "Eight windows of noise in random order; four are generated.", guess_noise
+    "fig06_real_or_generated_noise": PaperFigure(
+        6, "Real or generated: windows of noise (a counterpart)", "Eight windows of noise in random order; four are generated.", guess_noise
     ),
-    "fig07_real_or_generated_series": Figure(
-        "Real or generated: longer series (a counterpart)", "Four longer series in random order; two are generated.", guess_series
+    "fig07_real_or_generated_series": PaperFigure(
+        7, "Real or generated: longer series (a counterpart)", "Four longer series in random order; two are generated.", guess_series
     ),
-    "fig08_source_noise": Figure(
+    "fig08_source_noise": PaperFigure(
+        8,
         "Extracted source noise",
         "Above a window of telemetry with its moving average, below the noise that remains.",
         source_noise,
         needs_training=False,
     ),
-    "fig09_generator": Figure(
+    "fig09_generator": PaperFigure(
+        9,
         "Generator construction",
         "Table of the generator's layers with their output shapes and numbers of parameters.",
         lambda pipeline: layer_table(build_generator(pipeline.settings), "Layers of the generator"),
         needs_training=False,
     ),
-    "fig10_discriminator": Figure(
+    "fig10_discriminator": PaperFigure(
+        10,
         "Discriminator construction",
         "Table of the discriminator's layers with their output shapes and numbers of parameters.",
         lambda pipeline: layer_table(build_discriminator(pipeline.settings), "Layers of the discriminator"),
         needs_training=False,
     ),
-    "fig11_gan_training": Figure(
+    "fig11_gan_training": PaperFigure(
+        11,
         "GAN training",
         "Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the "
         "generator learns through the frozen discriminator, with the label reversed to 1.",
+        None,
         needs_training=False,
     ),
-    "fig12_accuracy_loss": Figure(
+    "fig12_accuracy_loss": PaperFigure(
+        12,
         "Accuracy and loss for real and fake classifications",
         "Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance.",
         accuracy_and_loss,
     ),
-    "fig13_combined": Figure(
+    "fig13_combined": PaperFigure(
+        13,
         "Simulator output, enhanced, with noise added",
         "The stepped simulation with the enhanced signal, the enhanced signal with generated noise, and real telemetry of the same time.",
         combined,
     ),
-    "fig14_telemetry_store": Figure(
+    "fig14_telemetry_store": PaperFigure(
+        14,
         "Example telemetry signals in the store",
         "The first samples of the stored telemetry over time.",
         stored_telemetry,
@@ -382,22 +388,9 @@ def save_figure(name: str, pipeline: Pipeline, folder: Path, caption: str, is_sm
         caption: A line at the foot: what was run.
         is_smoke: Whether to mark it as the result of a smoke run.
     """
-    about = FIGURES[name]
-    paths = [folder / f"{name}.{kind}" for kind in KINDS]
-    if about.draw is None:
-        for path in paths:
-            with replace_file(path) as temporary:
-                shutil.copyfile(DRAWINGS / path.name, temporary)
+    if FIGURES[name].drawn_by is not None:
+        save(name, pipeline, folder, caption, is_smoke, figures=FIGURES)
         return
-    with matplotlib.style.context(STYLE):
-        figure = about.draw(pipeline)
-        width, height = figure.get_size_inches()
-        foot = "\n".join(textwrap.wrap(caption, int((width - 2 * EDGE) * 20.5)))
-        figure.text(EDGE / width, 0.06 / height, foot, size=7, color=QUIET, va="bottom", linespacing=1.05)
-        if is_smoke:
-            mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}
-            figure.text(0.5, 0.5, "SMOKE BUDGET", **mark, ha="center", va="center", zorder=10)
-        for path in paths:
-            undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-            with replace_file(path) as temporary:
-                figure.savefig(temporary, metadata={"Title": about.title, "Description": about.alt} | undated)
+    for kind in KINDS:
+        with replace_file(folder / f"{name}.{kind}") as temporary:
+            shutil.copyfile(DRAWINGS / f"{name}.{kind}", temporary)

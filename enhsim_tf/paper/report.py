@@ -155,7 +155,7 @@ def _picture(folder: Path, name: str, records: Sequence[Mapping[str, Any]]) -> d
     width, height = (int.from_bytes(content["png"][at : at + 4], "big") for at in (16, 20))  # where a PNG keeps them
     about = {
         "name": name,
-        "number": int(name[3:5]),
+        "number": FIGURES[name].number,
         "title": FIGURES[name].title,
         "alt": FIGURES[name].alt,
         "width": width,
