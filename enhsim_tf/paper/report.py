@@ -29,7 +29,7 @@ _TYPES = {"png": "image/png", "svg": "image/svg+xml"}
 def read_published(path: Path = PUBLISHED) -> dict[str, Any] | None:
     """The published verdicts, which the study of readings writes; None if there are none yet.
 
-    They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`, `agreeing` and `of` (numbers of seeds of
+    They are `title`, `basis` (what they rest on, in words) and `claims`: for each id `verdict`, `agreeing` and `of` (numbers of runs of
     the reference), `decided_by` (the reading that decides an undecided claim, or None) and `ranges` (for each measurement the lowest and
     the highest value over seeds and processors).
     """
@@ -60,7 +60,7 @@ def box(records: Sequence[Mapping[str, Any]], published: Mapping[str, Any] | Non
         rows.append(
             {
                 "claim": f"{record['id']} {record['short']}",
-                "published": f"{known['verdict']}, {known['agreeing']} of {known['of']} seeds" if known else "-",
+                "published": f"{known['verdict']}, {known['agreeing']} of {known['of']} runs" if known else "-",
                 "this run": record["verdict"],
                 "because": f"{limit['words']}: {short(limit['value'])}, needed {needed(limit)}" if limit else "",
             }

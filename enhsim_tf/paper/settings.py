@@ -11,7 +11,7 @@ from typing import Any
 from enhsim_tf.common.errors import InputError
 
 BUDGETS = ("smoke", "full")
-PAPER, AUTHOR, KERAS, OURS = "paper", "author's code", "Keras' default", "our choice"
+PAPER, AUTHOR, OURS = "paper", "author's code", "our choice"
 GAN_CODE = "pgfeldman/GAN_brownbag 50f5635, brownbag/OneDGAN2.py"
 MLP_CODE = "pgfeldman/optevolver 3708ccc, examples/TF2_opt_example.py"
 
@@ -32,7 +32,7 @@ def setting(
     Args:
         value: Its value at the full budget.
         stages: The stages whose results depend on it, separated by commas.
-        source: `PAPER`, `AUTHOR`, `KERAS` or `OURS`.
+        source: `PAPER`, `AUTHOR` (a silence of which leaves Keras' default) or `OURS`.
         why: The section of the paper, the file of the author, or the reason.
         paper: What the paper says.
         author: What the author's public code does.

@@ -43,7 +43,7 @@ def test_what_the_box_shows_is_what_decides():
     published = {"claims": {"C1": {"verdict": "undecided", "agreeing": 6, "of": 10}}}
     assert report.box([record], published)[0] == {
         "claim": "C1 s",
-        "published": "undecided, 6 of 10 seeds",
+        "published": "undecided, 6 of 10 runs",
         "this run": "not reproduced",
         "because": "x: 0.25, needed at most 0.1",
     }

@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.paper.settings import AUTHOR, KERAS, OURS, PAPER, Settings, decisions, make_settings
+from enhsim_tf.paper.settings import AUTHOR, OURS, PAPER, Settings, decisions, make_settings
 
 FIELDS = dataclasses.fields(Settings)
 
@@ -37,7 +37,7 @@ def test_a_setting_that_cannot_be_used_is_refused(changed):
 @pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
 def test_every_setting_has_a_source_and_what_the_source_says(field):
     about = field.metadata
-    assert about["source"] in (PAPER, AUTHOR, KERAS, OURS)
+    assert about["source"] in (PAPER, AUTHOR, OURS)
     assert about["why"]
     assert about["paper"] if about["source"] == PAPER else True
     assert about["author"] if about["source"] == AUTHOR else True
