@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.paper import noise, square_wave
@@ -151,7 +152,12 @@ class Pipeline:
     @functools.cached_property
     def noise_unit(self) -> float:
         """The unit of the noise in the GAN: 1 for the example; for other telemetry such that its standard deviation is 0.1 there."""
-        return 10 * float(np.std(self.noise_windows("train"))) if self.own else 1.0
+        if self.own is None:
+            return 1.0
+        sd = float(np.std(self.noise_windows("train"), dtype=np.float64))
+        if not sd > 1e-5 * np.std(self.parts["train"].values, dtype=np.float64):  # 32-bit telemetry resolves no less
+            raise InputError(f"Expected noise around the moving average of {self.own.name}. Received: none. Choose another channel.")
+        return 10 * sd
 
     # -- 7 and 8: latent space; train generative adversarial model (GAN) -----------------------------------------------
 

@@ -76,7 +76,7 @@ class Settings:
         0.001,
         "enhancer",
         OURS,
-        "LEARNING RATE REASON",
+        "with 0.01, loss 7.8 and 12 in the first epoch and error .137 and .176 after 8 (seeds 1, 2); with 0.001, .02, .132 and .102",
         "",
         "0.01, for 200 units",
     )
@@ -195,17 +195,26 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
     if unknown := sorted(set(changed) - set(fields)):
         raise InputError(f"Expected one of the settings {', '.join(fields)}. Received: {unknown[0]!r}.")
     smaller = {name: field.metadata["smoke"] for name, field in fields.items() if budget == "smoke" and field.metadata["smoke"] is not None}
-    return Settings(**smaller | {name: _converted(fields[name], value) for name, value in changed.items()})
+    settings = Settings(**smaller | {name: _converted(fields[name], value) for name, value in changed.items()})
+    if settings.window < settings.filter_width or settings.iterations % settings.record_every or settings.dropout >= 1:
+        raise InputError(
+            "Expected window of at least filter_width, iterations in multiples of record_every, and dropout below 1. "
+            f"Received: window={settings.window}, iterations={settings.iterations}, dropout={settings.dropout}. Change one of them."
+        )
+    return settings
 
 
 def _converted(field: dataclasses.Field, value: Any) -> Any:
     kind, choices = type(field.default), field.metadata["choices"]
+    least = 1 if kind is int and field.name not in ("seed", "num_hidden") else 0
     try:
         converted = {"yes": True, "no": False, True: True, False: False}[value] if kind is bool else kind(value)
-        if (choices and converted not in choices) or (kind in (int, float) and not 0 <= converted < 1e12):
+        if (choices and converted not in choices) or (kind in (int, float) and not least <= converted < 1e12):
             raise ValueError
     except (KeyError, TypeError, ValueError):
-        expected = " or ".join(choices) or {bool: "yes or no", int: "a whole number from 0", float: "a number from 0"}.get(kind, "a word")
+        expected = " or ".join(choices) or {bool: "yes or no", int: f"a whole number from {least}", float: "a number from 0"}.get(
+            kind, "a word"
+        )
         raise InputError(f"Expected {field.name} to be {expected}. Received: {value!r}.") from None
     return converted
 

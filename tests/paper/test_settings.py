@@ -27,7 +27,19 @@ def test_each_reading_is_one_setting_away_from_the_reference(name, value):
 
 
 @pytest.mark.parametrize(
-    "changed", [{"no_such": 1}, {"dropout": "much"}, {"average": "padded"}, {"epochs": "2.5"}, {"epochs": -1}, {"fast": 3}]
+    "changed",
+    [
+        {"no_such": 1},
+        {"dropout": "much"},
+        {"average": "padded"},
+        {"epochs": "2.5"},
+        {"epochs": -1},
+        {"fast": 3},
+        {"window": 10},
+        {"record_every": 0},
+        {"record_every": 300},
+        {"dropout": 1},
+    ],
 )
 def test_a_setting_that_cannot_be_used_is_refused(changed):
     with pytest.raises(InputError, match="Expected .* Received: "):
