@@ -36,7 +36,7 @@ from enhsim_tf.common.plot_style import (
     title_words,
 )
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.paper.claims import enhancement, noise_resemblance
+from enhsim_tf.paper.claims import measured
 from enhsim_tf.paper.enhancer import build_enhancer
 from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise
 from enhsim_tf.paper.pipeline import Pipeline
@@ -74,7 +74,7 @@ def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Figure 4."""
     window = sample(pipeline, "test", 1, "figure 4")
     enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
-    errors = pipeline.measure("enhancement", 1, enhancement)
+    errors = measured("enhancement", pipeline)
     words = ", ".join(f"{name} {errors[f'{key}nrmse']:.3f}" for name, key in (("coarse", "coarse_"), ("enhanced", ""), ("ridge", "ridge_")))
     figure, down = new_sheet(
         DOUBLE,
@@ -124,7 +124,7 @@ def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
     """Figure 6, a counterpart."""
-    rng, found = pipeline.draw("figure 6"), pipeline.measure("noise resemblance", 1, noise_resemblance)
+    rng, found = pipeline.draw("figure 6"), measured("noise resemblance", pipeline)
     real, minutes = pipeline.noise_windows("test", 4, "figure 6, real"), sample(pipeline, "test", 1, "figure 6")["minutes"]
     hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
     return guess("Which windows of noise are generated?", minutes, real, pipeline.generate_noise(4, rng), rng, hint)

@@ -5,7 +5,7 @@ Nothing is computed before it is asked for, so the figures without networks are 
 
 import functools
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -215,18 +215,20 @@ class Pipeline:
 
     # -- what claims ask for -------------------------------------------------------------------------------------------
 
-    def measure(self, name: str, version: int, make: Callable[["Pipeline"], dict[str, float]]) -> dict[str, float]:
-        """Measurements on the trained networks, kept as a stage.
+    def measure(self, name: str, make: Callable[["Pipeline"], dict[str, float]], networks: Sequence[str], version: int) -> dict[str, float]:
+        """Measurements on trained networks, kept as a stage.
 
         Args:
             name: Name of the stage.
-            version: Its version.
             make: Measures the pipeline.
+            networks: The networks that it uses: `enhancer`, `noise GAN` or both.
+            version: Its version.
         """
         if name not in self._measured:
-            _ = self.enhancer_folder, self.gan_folder
-            depends, before = self.settings.of("windows", "noise", "claims"), ["telemetry", "enhancer", "noise GAN"]
-            folder = self.stages.run(name, lambda folder: save_arrays(folder, make(self)), depends, before, version)
+            for network in networks:
+                _ = self.enhancer_folder if network == "enhancer" else self.gan_folder
+            depends = self.settings.of("windows", "noise", "claims")
+            folder = self.stages.run(name, lambda folder: save_arrays(folder, make(self)), depends, ["telemetry", *networks], version)
             self._measured[name] = {key: float(value) for key, value in load_arrays(folder).items()}
         return self._measured[name]
 

@@ -4,7 +4,7 @@ from enhsim_tf.common.stages import Stages
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.settings import make_settings
 
-TINY = {"window": 100, "num_samples": 20_000, "hidden_units": 32, "filters": 16, "rows": 60, "fast": False}
+TINY = {"window": 100, "num_samples": 20_000, "hidden_units": 32, "filters": 16, "rows": 60, "num_trees": 20, "fast": False}
 
 
 def tiny_settings(**changed):
