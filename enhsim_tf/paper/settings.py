@@ -108,7 +108,8 @@ class Settings:
         1.0,
         "noise GAN",
         OURS,
-        "LATENT SCALE REASON",
+        "a standard normal draw: the normalisation removes the scale again. With 1, 4, 2 pi after 300 iterations (seed 1): "
+        "log scale off by .22, .08, .20, lag-1 by .03, .05, .02, effective rank 48, 38, 43, excess kurtosis .1, .8, .5",
         "",
         "span: 4 by default, 2 pi in the demo; it also holds the range of the function to be learnt",
     )
