@@ -85,8 +85,8 @@ say(
 assert difference < 1e-5
 
 # %% [markdown]
-# With telemetry of your own, the pipeline is one call. It fits the coarse simulator, trains the networks and keeps them. It chooses the
-# noise model by held-out telemetry; `noise="paper"` takes the one of this lesson:
+# With telemetry of your own, the pipeline is one call. It fits the coarse simulator, and chooses the enhancer and the noise model by
+# held-out telemetry:
 #
 # ```python
 # simulator = EnhancedSimulator.fit(telemetry, seed=0)

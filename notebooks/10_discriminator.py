@@ -163,7 +163,7 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
 
 # %% [markdown]
 # *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, because reordered samples make new
-# pieces, and on the right they lie beside the diagonal, because every piece has grown. The table gives the mean change of the probability.
+# pieces, and on the right they lie far below it, because every piece has grown. The table gives the mean change of the probability.
 
 # %%
 moved = {name: float(np.mean(np.abs(other - recorded))) for name, other in judged.items()}
@@ -221,9 +221,9 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
 
 # %% [markdown]
-# *What to see:* the bar of the discriminator ends near its floor, and the other two bars far from theirs. The windows differ, and a linear
-# classifier is enough to find it, but not in the largest responses of pieces of 20 samples. The generator is trained with this
-# discriminator alone, and nothing in that training tells it of the difference.
+# *What to see:* the bar of the discriminator ends near its floor, and the other two bars far from theirs. Generated windows differ from
+# real ones, and a linear classifier is enough to find it; the largest responses of this discriminator's filters do not show it. The
+# generator learns from the discriminator alone, which at this point has nothing to say about the difference.
 
 # %%
 for name in judges:

@@ -322,7 +322,6 @@ check_answer(
 # ```
 #
 # Nearly all of it has to be Gaussian: PCA asks how much is left in the directions that it does not know, and only the Gaussian part fills
-# them. By then the network has become an ornament. The repair is a generator with a random number for every sample, and a judge that sees
-# more than pieces of 20 samples (`noise/convolutional_gan.py` in the package; notebook 22 compares both).
+# them. By then the network has become an ornament. Notebook 10 shows what its judge misses, and notebook 25 a noise model without a judge.
 #
 # </details>

@@ -7,8 +7,9 @@ from pathlib import Path
 from enhsim_tf.common.console import Parser
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.registry import RESIDUAL, option_name
-from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES
+from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, FitOptions
 from enhsim_tf.enhanced_simulator.runs.options import NOISES, RUNGS
+from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 from enhsim_tf.telemetry.registry import SOURCES
 
 EXAMPLES = """\
@@ -82,11 +83,18 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "tell from real noise)",
     )
     fit.add_argument(
-        "--held-out", type=float, default=0.2, metavar="SHARE", help="share of the telemetry held out for the report (default: 0.2)"
+        "--held-out",
+        type=float,
+        default=FitOptions.held_out,
+        metavar="SHARE",
+        help="share of the telemetry held out for the report (default: %(default)s)",
     )
-    fit.add_argument("--num-windows", type=int, default=2_500, metavar="N", help="number of training windows (default: 2500)")
-    fit.add_argument("--epochs", type=int, default=6, metavar="N", help="training epochs of the enhancer (default: 6)")
-    fit.add_argument("--iterations", type=int, default=1_000, metavar="N", help="training iterations of the noise networks (default: 1000)")
+    fit.add_argument(
+        "--num-windows", type=int, default=FitOptions.num_windows, metavar="N", help="number of training windows (default: %(default)s)"
+    )
+    fit.add_argument(
+        "--epochs", type=int, default=FitOptions.epochs, metavar="N", help="training epochs of the enhancer (default: %(default)s)"
+    )
     fit.add_argument("--workers", metavar="auto|N", help="channels fitted in parallel, two threads each (default: auto, one per core)")
     fit.add_argument(
         "--engine",
@@ -189,7 +197,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "num_flagged, score and confidence. Flagged samples at most one window apart form one alarm. The command reports the\n"
         "expected number of false alarms per day at the threshold, with its 95 % interval.",
         epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
-        + f"\n{RESIDUAL}: judges the difference between the telemetry and the simulator that is aligned with it (docs/telemetry.md)\n{EXIT}",
+        + f"\n{RESIDUAL}: judges the difference between the telemetry and the simulator that is aligned with it (docs/own_data.md)\n{EXIT}",
         **form,
     )
     score.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
@@ -212,7 +220,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "update",
         help="update simulators with newer nominal telemetry",
         description="Goes on from fitted simulators with newer nominal telemetry, and reports what changed: level, gain, period, phase, noise,\n"
-        "and errors and alarms before and after on the held-out end of the new telemetry (docs/telemetry.md). The old simulators are kept.",
+        "and errors and alarms before and after on the held-out end of the new telemetry (docs/own_data.md). The old simulators are kept.",
         epilog=EXIT,
         **form,
     )
@@ -221,15 +229,25 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
     update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
     update.add_argument(
-        "--epochs", type=int, default=2, metavar="N", help="further epochs of the enhancer; 0 keeps its weights (default: 2)"
+        "--epochs",
+        type=int,
+        default=UpdateOptions.epochs,
+        metavar="N",
+        help="further epochs of the enhancer; 0 keeps its weights (default: %(default)s)",
     )
-    update.add_argument("--num-windows", type=int, default=1_000, metavar="N", help="training windows of these epochs (default: 1000)")
+    update.add_argument(
+        "--num-windows",
+        type=int,
+        default=UpdateOptions.num_windows,
+        metavar="N",
+        help="training windows of these epochs (default: %(default)s)",
+    )
     update.add_argument(
         "--held-out",
         type=float,
-        default=0.2,
+        default=UpdateOptions.held_out,
         metavar="SHARE",
-        help="share of the new telemetry on which the update is judged (default: 0.2)",
+        help="share of the new telemetry on which the update is judged (default: %(default)s)",
     )
     _add_seed(update)
 
@@ -272,8 +290,16 @@ def _add_seed(parser: argparse.ArgumentParser, default: int | None = 0) -> None:
     parser.add_argument("--seed", type=int, default=default, help="random seed (default: 0)")
 
 
+class _Sources(argparse.Action):
+    """Keeps one source as text and several as a list."""
+
+    def __call__(self, parser, namespace, values, option_string=None):  # noqa: ANN001, ANN204  as argparse calls it
+        """Stores the values."""
+        setattr(namespace, self.dest, values[0] if len(values) == 1 else values)
+
+
 def _add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("source", metavar="SOURCE", help=SOURCES)
+    parser.add_argument("source", metavar="SOURCE", nargs="+", action=_Sources, help=SOURCES)
     parser.add_argument(
         "--column", action="append", metavar="NAME", help="only this column; may be repeated (default: all numeric columns)"
     )
@@ -281,15 +307,44 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
         "--time", metavar="NAME", help="the time column (default: detected); give 'none' to use the sample number as the time"
     )
     parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the most frequent one)")
+    table = parser.add_argument_group("tables in other forms", "what is detected unless it is given (docs/own_data.md)")
+    table.add_argument(
+        "--label-column", action="append", metavar="NAME", help="column that labels anomalous rows, or 'none'; may be repeated"
+    )
+    table.add_argument(
+        "--series-column", action="append", metavar="NAME", help="column whose values tell several series apart; may be repeated"
+    )
+    table.add_argument(
+        "--value-column", action="append", metavar="NAME", help="column that holds the values of such series; may be repeated"
+    )
+    table.add_argument("--no-header", action="store_true", help="the file has no line of names: columns are 'column 0', 'column 1', ...")
+    table.add_argument("--decimal", choices=(".", ","), help="decimal sign; the other one separates thousands")
     _add_cleaning(parser)
 
 
 def _add_coarse(parser: argparse._ArgumentGroup) -> None:
     parser.add_argument("--coarse", metavar="SOURCE", help="recorded run of the simulator: " + SOURCES)
     parser.add_argument("--coarse-time", metavar="NAME", help="the time column of that run (default: detected)")
+    parser.add_argument(
+        "--coarse-start",
+        metavar="TIME",
+        help="time in UTC of the zero of that run, such as 2024-03-01T00:00:00, if its times count from zero",
+    )
 
 
 def _add_cleaning(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
+    parser.add_argument(
+        "--time-format",
+        metavar="FORMAT",
+        help="how times are written: a format such as %%d.%%m.%%Y, or for numbers s, ms, us, ns, min, h, D, excel, mjd, jd, datenum (default: detected)",
+    )
+    parser.add_argument(
+        "--missing-values",
+        action="append",
+        default=[],
+        metavar="VALUE,...",
+        help="values that mean 'no value', such as --missing-values=-999.9",
+    )
     parser.add_argument(
         "--timezone", metavar="ZONE", help="time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
     )

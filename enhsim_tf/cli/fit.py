@@ -17,17 +17,17 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 
     noise = options.noise.replace("-", " ")
-    counts = (options.num_windows, options.epochs, options.iterations)
+    counts = (options.num_windows, options.epochs)
     enhancer = None if options.enhancer is None else options.enhancer.replace("-", " ")
     if options.coarse is None:
-        refuse_without_coarse(options, "coarse_time", "coarse_column", "delay")
+        refuse_without_coarse(options, "coarse_time", "coarse_start", "coarse_column", "delay")
         chosen, run = FitOptions(options.window, *counts, noise, options.held_out, options.seed, enhancer or "best"), None
     else:
         from enhsim_tf.enhanced_simulator.fit_many import CoarseRun
         from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 
         chosen = RunOptions(options.window, *counts, noise, enhancer, options.delay, options.held_out, options.seed)
-        run = CoarseRun(options.coarse, options.coarse_column, options.coarse_time)
+        run = CoarseRun(options.coarse, options.coarse_column, options.coarse_time, options.coarse_start)
     from enhsim_tf.common.parallel.engines import parse_workers
 
     workers = parse_workers(options.workers)
@@ -35,7 +35,7 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.telemetry.commands import read_commands
     from enhsim_tf.telemetry.sources import read_source
 
-    cleaning = cleaning_options(options, options.window or 32)
+    cleaning = cleaning_options(options, options.window or 32, "missing")
     series = read_source(options.source, options.column, options.time, cleaning)
     is_terminal = sys.stdout.isatty()
     commands = None if run is not None else read_commands(options.source, options.column)

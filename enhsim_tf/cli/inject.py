@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths
+from enhsim_tf.cli.options import cleaning_options, counted, for_each, output_paths, refuse_same_file
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -40,9 +40,7 @@ def run_inject(options: argparse.Namespace) -> int:
     is_joint = options.timeeval and options.out.suffix in suffixes and not os.path.isdir(options.out)
     names = ["all channels"] if is_joint else list(series)
     paths = output_paths(options.out, names, suffixes)
-    for path in paths.values():
-        if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
-            raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
+    refuse_same_file(paths.values(), options.source)
 
     def make(channel: str, path: Path) -> "pd.DataFrame":
         cleaned = clean(series[channel], cleaning)

@@ -3,10 +3,11 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -54,18 +55,28 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
 
 
-def cleaning_options(options: argparse.Namespace, min_part: int) -> "Cleaning":
-    """Returns the cleaning settings given by the options.
+def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> "Cleaning":
+    """Returns the settings of reading and cleaning given by the options.
 
     Args:
-        options: Parsed options of `fit` or `score`.
+        options: Parsed options of a command that reads telemetry or runs.
         min_part: Minimum length of a part in samples.
+        labelled: Treatment of rows that are labelled anomalous.
     """
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
     bad = "drop" if options.drop_bad else "refuse"
     return Cleaning(
+        **{
+            name: getattr(options, name)
+            for name in ("label_column", "series_column", "value_column", "no_header")
+            if hasattr(options, name)
+        },
         interval_s=getattr(options, "interval", None),
+        decimal=getattr(options, "decimal", None),
+        labelled=labelled,
+        time_format=options.time_format,
+        missing_values=tuple(value for values in options.missing_values for value in values.split(",")),
         timezone=options.timezone,
         on_bad_times=bad,
         on_bad_values=bad,
@@ -92,7 +103,9 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     names, is_folder = list(channels), os.path.isdir(out)
     if out.suffix in suffixes and not is_folder:
         if len(names) > 1:
-            raise InputError(f"Expected a folder for {len(names)} channels. Received: --out {out}. Give a folder, or choose one channel.")
+            raise InputError(
+                f"Expected a folder for {len(names)} channels ({printable(', '.join(names[:8]))}). Received: --out {out}. Give a folder, or choose one channel."
+            )
         make_folder(out.parent)
         return {names[0]: out}
     if out.suffix and not is_folder:
@@ -103,6 +116,47 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
             raise InputError(f"Expected to write the file {path}. Received: a folder of that name. Give another --out.")
     make_folder(out)
     return paths
+
+
+def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str]) -> None:
+    """Checks that no output file is an input file.
+
+    Args:
+        paths: Output files.
+        source: The input, one or several files; it may be no file at all.
+
+    Raises:
+        InputError: If one is.
+    """
+    for path in paths:
+        for each in [source] if isinstance(source, str) else source:
+            if path.exists() and os.path.exists(each) and path.samefile(each):
+                raise InputError(f"Expected --out to differ from the input. Received: {path} for both. Give another --out.")
+
+
+def model_names(series: Iterable[str], models: Iterable[str]) -> dict[str, str]:
+    """Returns the name of the model of each channel that has one, and says which others the source has.
+
+    A single channel and a single model match even if their names differ.
+
+    Args:
+        series: Names of the channels.
+        models: Names of the fitted channels.
+
+    Raises:
+        InputError: If no channel has a model.
+    """
+    series, models = list(series), list(models)
+    if len(series) == len(models) == 1:
+        return {series[0]: models[0]}
+    found = {name: name for name in series if name in models}
+    others = [name for name in series if name not in models]
+    if not found:
+        known = printable(", ".join(models[:8]))
+        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(others[:8])}. Select the channels with --column.")
+    if others:
+        tell(f"columns without a fitted simulator, left out: {printable(', '.join(others[:8]))}")
+    return found
 
 
 def events_line(frame: "pd.DataFrame", path: Path) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, output_paths
+from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, output_paths, refuse_same_file
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -58,12 +58,12 @@ def generate_copies(options: argparse.Namespace) -> int:
 
     models = chosen_of(models_of(options.models), options.channel)
     paths = output_paths(options.out, models, (".parquet",))
-    refuse_same_file(paths, options.coarse)
+    refuse_same_file(paths.values(), options.coarse)
     cleaning = cleaning_options(options, 2)
 
     def write(channel: str) -> None:
         model = load_run_model(models[channel])
-        run = _run_of(options.coarse, model, options.coarse_time, cleaning)
+        run = _run_of(options.coarse, model, options, cleaning)
         num_rows = write_copies(paths[channel], model, run, copies, options.seed or 0)
         name = printable(channel)
         for line in (*run.notes, *coverage_lines(model, run)):
@@ -100,12 +100,13 @@ def score_runs(
     from enhsim_tf.telemetry.cleaning.clean import clean
 
     coarse = options.coarse or options.source  # a model of commands reads them from the telemetry itself
-    refuse_same_file(paths, coarse)
+    refuse_same_file(paths.values(), coarse)
+    of_run = cleaning.of_run()
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)
         model = load_run_model(models[channel])
-        run = _run_of(coarse, model, options.coarse_time, cleaning)
+        run = _run_of(coarse, model, options, of_run)
         frame = score_run(model, cleaned.parts, run, chosen)
         write_scores(paths[channel], frame)
         name = printable(channel)
@@ -128,14 +129,14 @@ def score_runs(
     return for_each(series, write)
 
 
-def _run_of(source: str, model: "RunModel", time: str | None, cleaning: "Cleaning") -> "Recording":
+def _run_of(source: str, model: "RunModel", options: argparse.Namespace, cleaning: "Cleaning") -> "Recording":
     """Reads the coarse run that a model needs: the commands of the file for a model of commands, otherwise a recorded run."""
     from enhsim_tf.coarse_simulator.recording_files import read_recording
     from enhsim_tf.enhanced_simulator.runs.commands import is_of_commands, recording_of
 
     if is_of_commands(model):
         return recording_of(model, source)
-    return read_recording(source, model.columns, time, cleaning, model.interval_s)
+    return read_recording(source, model.columns, options.coarse_time, cleaning, model.interval_s, options.coarse_start)
 
 
 def load_run_model(folder: Path):  # noqa: ANN201  its type imports TensorFlow
@@ -146,18 +147,3 @@ def load_run_model(folder: Path):  # noqa: ANN201  its type imports TensorFlow
     from enhsim_tf.enhanced_simulator.runs.model import RunModel
 
     return RunModel.load(folder)
-
-
-def refuse_same_file(paths: Mapping[str, Path], source: str) -> None:
-    """Checks that no output file is the coarse run itself.
-
-    Args:
-        paths: Output file of each channel.
-        source: The value of `--coarse`.
-
-    Raises:
-        InputError: If one is.
-    """
-    for path in paths.values():
-        if path.exists() and Path(source).exists() and path.samefile(source):
-            raise InputError(f"Expected --out to differ from --coarse. Received: {path} for both. Give another --out.")

@@ -1,13 +1,12 @@
 """`python -m enhsim_tf score`: scores telemetry with a detector trained on generated data."""
 
 import argparse
-import os
 from pathlib import Path
 
-from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, load, output_paths
+from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, load, model_names, output_paths, refuse_same_file
 from enhsim_tf.cli.runs import refuse_without_coarse
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.errors import printable
 
 
 def run_score(options: argparse.Namespace) -> int:
@@ -28,24 +27,16 @@ def run_score(options: argparse.Namespace) -> int:
 
     models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
-    if len(models) == 1 and len(series) == 1:  # a single channel and a single simulator match even if their names differ
-        models = dict(zip(series, models.values(), strict=True))
-    unknown = [name for name in series if name not in models]
-    if unknown:
-        known = ", ".join(list(models)[:8])
-        raise InputError(
-            f"Expected fitted channels: {printable(known)}. Received: {unknown[0]!r}. Select the channels to score with --column."
-        )
+    names = model_names(series, models)
+    series, models = {name: series[name] for name in names}, {name: models[model] for name, model in names.items()}
     paths = output_paths(options.out, series, (".parquet", ".csv"))
-    for path in [*paths.values(), *map(events_path, paths.values())]:
-        if path.exists() and os.path.exists(options.source) and path.samefile(options.source):
-            raise InputError(f"Expected --out to differ from the source. Received: {path} for both. Give another --out.")
+    refuse_same_file([*paths.values(), *map(events_path, paths.values())], options.source)
 
     if options.coarse is not None or all(map(_is_of_commands, (models[name] for name in series))):
         from enhsim_tf.cli.runs import score_runs
 
         return score_runs(options, series, models, paths, chosen, cleaning)
-    refuse_without_coarse(options, "coarse_time")
+    refuse_without_coarse(options, "coarse_time", "coarse_start")
 
     def write(channel: str) -> None:
         cleaned = clean(series[channel], cleaning)

@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from enhsim_tf.cli.options import cleaning_options, for_each, load
+from enhsim_tf.cli.options import cleaning_options, for_each, load, model_names
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -22,18 +22,13 @@ def run_update(options: argparse.Namespace) -> int:
     chosen = UpdateOptions(options.epochs, options.num_windows, options.held_out, options.seed)
     models = models_of(options.models)
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
-    cleaning = cleaning_options(options, 2)
+    cleaning = cleaning_options(options, 2, "missing")
     from enhsim_tf.telemetry.cleaning.clean import clean
     from enhsim_tf.telemetry.sources import read_source
 
     series = read_source(options.source, options.column, options.time, cleaning)
-    names = {name: name for name in series}
-    if len(models) == 1 and len(series) == 1:  # a single channel and a single simulator match even if their names differ
-        names = dict(zip(series, models, strict=True))
-    unknown = [name for name in series if names[name] not in models]
-    if unknown:
-        known = ", ".join(list(models)[:8])
-        raise InputError(f"Expected fitted channels: {printable(known)}. Received: {unknown[0]!r}. Select the channels with --column.")
+    names = model_names(series, models)
+    series = {name: series[name] for name in names}
     folders = {name: folder_of(out, names[name]) for name in series}
     for name, folder in folders.items():
         refuse_foreign(folder)

@@ -11,7 +11,8 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording, seconds_between
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.cleaning.report import iso_time
+from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 
 _EQUALLY_GOOD = 0.02  # a maximum with at least 1 - 0.02 of the largest squared correlation is as good; the nearest to 0 is taken
 _LEAST_CORRELATION = 0.1  # below this correlation at every delay, no delay is estimated
@@ -83,6 +84,12 @@ def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_
             longest = max(longest, stop - first)
             if stop - first >= least_samples:
                 pairs.append(Pair(part.part(first, stop), values[first:stop]))
+    if not longest and recording.counts and not (parts[0].start or "1970").startswith("1970"):
+        begin = iso_time(nanoseconds(parts[0], 0, 1)[0]).removesuffix("+00:00")
+        raise InputError(
+            f"Expected a coarse run that overlaps the telemetry in time. Received: dates in {parts[0].name}, times that count from zero in "
+            f"{recording.name}. Give the time of that zero: start (--coarse-start {begin} if the run begins with the telemetry)."
+        )
     if not longest:
         raise InputError(
             f"Expected a coarse run that overlaps the telemetry in time. Received: {_span(parts, 0.0)} for {parts[0].name}, "

@@ -16,24 +16,29 @@ from enhsim_tf.coarse_simulator.pairing import stretches
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
-from enhsim_tf.telemetry.cleaning.report import iso_time
+from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
+from enhsim_tf.telemetry.cleaning.regular_grid import find_interval, regular_step_fraction
+from enhsim_tf.telemetry.cleaning.report import ROWS, iso_time
 from enhsim_tf.telemetry.cleaning.times import localize_times
+from enhsim_tf.telemetry.reading.files import read_table
 from enhsim_tf.telemetry.registry import FILES
-from enhsim_tf.telemetry.series import nanoseconds
-from enhsim_tf.telemetry.sources import read_source
-from enhsim_tf.telemetry.tables import read_table
+from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+from enhsim_tf.telemetry.sources import Source, read_source
 
 _SAME_RATE = 1e-3  # relative difference of two intervals that count as the same
 _TABLES = tuple(ending for ending, reader in FILES.items() if reader.endswith(":read_table_channels"))
-_QUIET = ("columns left out", "time column", "time zone", "constant", "stuck", "quantised", "changing level", "time unit")
+_QUIET = ("constant", "stuck", "quantised", "changing level")
+_NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns")  # findings of columns that are no inputs
+_FEW_ODD = 0.002  # share of steps that are no whole number of intervals, above which a run is interpolated
 
 
 def read_recording(
-    source: str | os.PathLike,
+    source: Source,
     columns: Sequence[str] | None = None,
     time: str | None = None,
     cleaning: Cleaning | None = None,
     interval_s: float | None = None,
+    start: str | None = None,
 ) -> Recording:
     """Reads a recorded run.
 
@@ -41,9 +46,11 @@ def read_recording(
         source: A source of telemetry, see `sources.read_source`.
         columns: Names of the columns that are inputs of the enhancer. None: all columns that hold numbers.
         time: Name of a table's time column. None: it is detected.
-        cleaning: How problems are treated. None: the defaults.
+        cleaning: How problems are treated. None: the defaults. Of several values at one time, as at an event, the last is taken
+            unless `same_time` says otherwise.
         interval_s: Sampling interval that the recording is brought to. Finer recordings are averaged and coarser ones are
-            interpolated. None: its own interval.
+            interpolated, as are those with steps of any length. None: its own interval.
+        start: Time of the recording's zero in UTC, as ISO 8601 text, if its times count from zero. None: they are those of the telemetry.
 
     Returns:
         The recording. Its `carried` columns are the other columns of the table.
@@ -51,9 +58,12 @@ def read_recording(
     Raises:
         InputError: If the source cannot be read, a column is missing, or the columns have no time in common.
     """
-    cleaning, name = cleaning or Cleaning(), printable(Path(os.fspath(source)).name)
-    repaired = [] if columns is None else _compare_columns(source, columns, name)
-    raw = read_source(source, columns, time, cleaning)
+    cleaning, name = cleaning or Cleaning(), _name_of(source)
+    if cleaning.same_time is None:
+        cleaning = dataclasses.replace(cleaning, same_time="last")
+    repaired = [] if columns is None else _compare_columns(source, columns, name, cleaning)
+    given = read_source(source, columns, time, cleaning)
+    raw, stepped = _at_equal_steps(given, interval_s, cleaning)
     names = list(raw)
     cleaned = {each: clean(raw[each], cleaning) for each in names}
     own_s = cleaned[names[0]].report.interval_s
@@ -64,6 +74,8 @@ def read_recording(
         for finding in cleaned[each].report.findings
         if finding.kind not in _QUIET and finding.action != "accepted"
     ]
+    notes += [f"{name}: {finding.text}" for finding in cleaned[names[0]].report.findings if finding.kind in _NO_INPUTS]
+    notes += [f"{name}: {stepped}"] if stepped else []
     grid_s = own_s if interval_s is None else float(interval_s)
     if not has_time and grid_s != 1.0:
         raise InputError(
@@ -83,25 +95,92 @@ def read_recording(
         )
     if len(kept) > 1:
         notes.append(f"{name}: gaps, at which the run is split into {len(kept)} parts")
-    carried = _carried(Path(os.fspath(source)), names, raw[names[0]], cleaning, time)
+    carried = _carried(source, names, given[names[0]], cleaning)
     parts = []
     for first, stop in kept:
-        rows = _nearest_rows(raw[names[0]], base, grid_s, np.arange(first, stop), cleaning) if carried else None
+        rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(first, stop), cleaning) if carried else None
         parts.append(
             Run(values[first:stop], grid_s * first, {each: cells.iloc[rows].reset_index(drop=True) for each, cells in carried.items()})
         )
-    start = iso_time(base) if has_time else None
+    clock = cleaned[names[0]].report.find("clock")
+    counts = bool(clock is not None and clock.details.get("counts"))
+    shift_ns = 0 if start is None else _start_ns(start, counts, name)
     offset_s = 0.0 if has_time else base / 1e9
     parts = tuple(dataclasses.replace(part, offset_s=part.offset_s + offset_s) for part in parts)
-    return Recording(parts, tuple(names), grid_s, start, name, tuple(printable(note) for note in notes))
+    begin = iso_time(base + shift_ns) if has_time else None
+    return Recording(parts, tuple(names), grid_s, begin, name, tuple(printable(note) for note in notes), counts and start is None)
 
 
-def _compare_columns(source: str | os.PathLike, columns: Sequence[str], name: str) -> list[str]:
+def _name_of(source: Source) -> str:
+    if isinstance(source, pd.DataFrame | pd.Series):
+        return "the coarse run"
+    return printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
+
+
+def _start_ns(start: str, counts: bool, name: str) -> int:
+    if not counts:
+        raise InputError(
+            f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
+        )
+    return int(nanoseconds(Telemetry(np.zeros(1, np.float32), start=start), 0, 1)[0])
+
+
+def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:
+    """Interpolates a run whose solver chose its steps, or wrote events between its steps, and says so; other runs stay as they are."""
+    first = next(iter(raw.values()))
+    if isinstance(first.index, pd.RangeIndex) or cleaning.interval_s is not None or not isinstance(first.index, pd.DatetimeIndex):
+        return dict(raw), ""
+    times = np.unique(first.index.dropna().as_unit("ns").asi8)
+    if len(times) < 3:
+        return dict(raw), ""
+    steps = np.diff(times)
+    interval = find_interval(times)
+    if regular_step_fraction(times, interval) > 1 - _FEW_ODD:
+        return dict(raw), ""
+    if interval_s is not None:
+        interval = interval_s * 1e9
+    elif regular_step_fraction(times, interval) < 0.5:
+        interval = float(np.median(steps))
+    grid = times[0] + np.round(np.arange(np.floor((times[-1] - times[0]) / interval + 1e-6) + 1) * interval).astype(np.int64)
+    return {name: _interpolated(series, grid, cleaning) for name, series in raw.items()}, (
+        f"steps from {steps.min() / 1e9:.4g} s to {steps.max() / 1e9:.4g} s, interpolated to one every {interval / 1e9:.6g} s; "
+        f"of {len(first) - len(times):,} rows at the time of another, the {cleaning.same_time} was taken"
+    )
+
+
+def _interpolated(series: pd.Series, grid: np.ndarray, cleaning: Cleaning) -> pd.Series:
+    """Interpolates a series linearly at times in nanoseconds."""
+    decimal, places = cleaning.decimal or series.attrs.get("decimal"), series.attrs.get("places", ROWS)
+    values, _, _ = parse_numbers(series, str(series.name), cleaning.on_bad_values == "drop", decimal, cleaning.missing_values, places)
+    times = series.index.as_unit("ns").asi8
+    there = np.isfinite(values) & series.index.notna()
+    groups = pd.Series(values[there]).groupby(times[there])
+    known = groups.mean() if cleaning.same_time == "mean" else groups.first() if cleaning.same_time == "first" else groups.last()
+    if not len(known):
+        return series
+    inside = grid[(grid >= known.index[0]) & (grid <= known.index[-1])]
+    index = pd.DatetimeIndex(inside.view("datetime64[ns]"), name=series.index.name, tz=None if series.index.tz is None else "UTC")
+    found = pd.Series(np.interp(inside, known.index.to_numpy(np.float64), known.to_numpy()), index=index, name=series.name)
+    found.attrs = {key: value for key, value in series.attrs.items() if key != "places"}
+    return found
+
+
+def _table_of(source: Source, cleaning: Cleaning) -> pd.DataFrame | None:
+    """Returns the table behind a source, or None if it is none."""
+    if isinstance(source, str | os.PathLike):
+        path = Path(os.fspath(source))
+        if path.suffix.lower() not in _TABLES or not path.is_file():
+            return None
+        return read_table(path, cleaning).frame
+    return read_table(source if isinstance(source, pd.DataFrame | pd.Series) else list(map(Path, source)), cleaning).frame
+
+
+def _compare_columns(source: Source, columns: Sequence[str], name: str, cleaning: Cleaning) -> list[str]:
     """Refuses a table that lacks a wanted column, and says if the columns are in another order."""
-    path = Path(os.fspath(source))
-    if path.suffix.lower() not in _TABLES or not path.is_file():
+    table = _table_of(source, cleaning)
+    if table is None:
         return []
-    there = list(read_table(path)[0].columns)
+    there = list(table.columns)
     missing = [column for column in columns if column not in there]
     if missing:
         raise InputError(
@@ -134,12 +213,13 @@ def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float, name: str) -> tu
     return base, values
 
 
-def _carried(path: Path, names: Sequence[str], model: pd.Series, cleaning: Cleaning, time: str | None) -> dict[str, pd.Series]:
+def _carried(source: Source, names: Sequence[str], model: pd.Series, cleaning: Cleaning) -> dict[str, pd.Series]:
     """Returns the raw columns of a table that are neither inputs nor times, by name."""
-    if path.suffix.lower() not in _TABLES or not path.is_file():
+    table = _table_of(source, cleaning)
+    if table is None:
         return {}
-    others = [name for name in read_table(path)[0].columns if name not in (*names, model.index.name) and not name.startswith("column ")]
-    return {name: series.reset_index(drop=True) for name, series in read_source(path, others, time, cleaning).items()} if others else {}
+    others = [name for name in table.columns if name not in (*names, model.index.name) and not name.startswith(("column ", "Unnamed: "))]
+    return {name: table[name].reset_index(drop=True) for name in others}
 
 
 def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:

@@ -11,7 +11,6 @@ import json
 import os
 import re
 import shutil
-import time
 import urllib.parse
 import uuid
 from collections.abc import Callable, Iterator
@@ -22,10 +21,9 @@ import filelock
 
 from enhsim_tf.common.errors import InputError
 
-_LEFT = re.compile(r"\.(?P<name>.+)\.(?P<kind>[0-9a-f]{8}|old)\.enhsim_tf(?P<suffix>\.\w+)?")
+_LEFT = re.compile(r"\.(?P<name>.+)\.(?P<kind>[0-9a-f]{8}|old)\.enhsim_tf(\.\w+)?")
 _MAX_CHARACTERS = 160  # of an encoded name; the names of temporary folders and locks add 50, and most file systems allow 255
 _KEPT = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)  # names reserved by Windows
-_OLD_S = 24 * 3600  # no file takes longer to write
 
 
 def _beside(path: Path, kind: str, suffix: str = "") -> Path:
@@ -110,11 +108,12 @@ def replace_file(path: str | os.PathLike) -> Iterator[Path]:
     """
     path = Path(path)
     temporary = _temporary(path, path.suffix)  # some writers choose the format by the suffix
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with _locked(temporary):
+        try:
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -130,7 +129,7 @@ def replace_folder(path: str | os.PathLike, keep: Callable[[Path], bool] | None 
     make_folder(path.parent)
     remove_leftovers(path.parent, path.name)
     temporary, old = _temporary(path), _beside(path, "old")
-    with _locked(temporary):  # held as long as this process writes
+    with _locked(temporary):
         try:
             temporary.mkdir()
             yield temporary
@@ -166,27 +165,20 @@ def _remove(path: Path) -> None:
 def remove_leftovers(folder: str | os.PathLike, name: str | None = None) -> None:
     """Removes what killed processes left, and restores old content that they had only moved aside.
 
-    A temporary folder is left if no process holds its lock. A temporary file is left if it is older than a day.
-
     Args:
         folder: The folder in which `replace_folder` or `replace_file` was writing.
         name: Considers only what was to get this name. None: every name.
     """
     folder = Path(folder)
-    for left in folder.glob(".*.enhsim_tf*"):
+    for left in {path.with_name(path.name.removesuffix(".lock")) for path in folder.glob(".*.enhsim_tf*")}:
         named = _LEFT.fullmatch(left.name)
-        if named is None or name not in (None, named["name"]) or named["suffix"] == ".lock":
+        if named is None or name not in (None, named["name"]):
             continue
-        if named["kind"] == "old":
-            with _locked(left):
+        with contextlib.suppress(filelock.Timeout), _locked(left, blocking=False):  # a running process holds the lock
+            if named["kind"] == "old":
                 _restore(folder / named["name"])
-        elif left.is_dir():
-            with contextlib.suppress(filelock.Timeout), _locked(left, blocking=False):
+            else:
                 _remove(left)
-        else:
-            with contextlib.suppress(FileNotFoundError):
-                if left.stat().st_mtime < time.time() - _OLD_S:
-                    left.unlink()
 
 
 def write_json(path: str | os.PathLike, content: Any) -> None:

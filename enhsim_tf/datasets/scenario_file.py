@@ -114,7 +114,7 @@ def read_mix(path: str | os.PathLike) -> Mix:
         place = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
         reason = error["msg"].removeprefix("Value error, ")
         raise InputError(
-            f"Expected {place or 'keys and values'} as in docs/scenarios.md: {reason}. Received: {_shown(error['input'])} in {path.name!r}."
+            f"Expected {place or 'keys and values'} as in docs/large_data_sets.md: {reason}. Received: {_shown(error['input'])} in {path.name!r}."
         ) from None
     scenarios = tuple(ScenarioShare(**dict(each)) for each in file.scenarios)
     models = tuple(ModelShare(**dict(each)) for each in file.models)
@@ -162,4 +162,4 @@ def _load(path: Path) -> Any:
         reason = f"{' '.join(str(error.problem or error.context).split())[:120]}{where}"
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # an invalid date or number, or bytes that are not UTF-8
         reason = " ".join(str(error).split())[:120]
-    raise InputError(f"Expected plain YAML, as in docs/scenarios.md. Received: {path.name!r}, {reason}.")
+    raise InputError(f"Expected plain YAML, as in docs/large_data_sets.md. Received: {path.name!r}, {reason}.")

@@ -21,7 +21,6 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import NOMINAL, label_windows
 from enhsim_tf.datasets.labelled_windows import window_columns
 from enhsim_tf.datasets.plan import FORMAT, Plan
-from enhsim_tf.enhanced_simulator.batches import complete_labelled_batch
 from enhsim_tf.enhanced_simulator.saving import MANIFEST
 
 if TYPE_CHECKING:
@@ -135,7 +134,7 @@ def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: i
             if simulator.levels is not None:
                 levels = np.zeros((batch, 2))
                 levels[: len(chosen)] = simulator.levels[(rows.level[chosen] * len(simulator.levels)).astype(int)]
-            completed = complete_labelled_batch(simulator, coarse, nominal, levels, noise, held)
+            completed = simulator.complete_labelled(coarse, nominal, levels, noise, held)
             windows[chosen], masks[chosen] = (each[: len(chosen)] for each in completed)
     return windows, masks, rows
 

@@ -1,12 +1,12 @@
 """The enhanced simulator: fit, generate, score, save, load and report (sections 2 and 3 of the paper).
 
-This package combines the coarse simulator, the enhancer and the noise networks. It does not depend on the packages for data
-sets, commands and the reproduction. Its two public names are imported lazily, at their first use.
+This package combines the coarse simulator, the enhancer and the noise. It does not depend on the packages for data
+sets, commands and the reproduction. Its public name is imported lazily, at its first use.
 """
 
 from typing import Any
 
-__all__ = ["PAPER", "EnhancedSimulator"]
+__all__ = ["EnhancedSimulator"]
 
 
 def __getattr__(name: str) -> Any:

@@ -13,6 +13,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from enhsim_tf.enhanced_simulator.checks import check_finite
+from enhsim_tf.telemetry.quantisation import Levels
+
 TOLERANCE = 0.1  # largest difference from the nominal run that does not count as a change, in standard deviations of the noise
 _LEAST_TOLERANCE = 1e-4  # of a simulator without noise, in units of the enhancer's scale
 _FADES_IN_WINDOW = 16
@@ -91,3 +94,28 @@ def hold_values(windows: np.ndarray, mask: np.ndarray, held: Iterable[tuple[int,
         changed = np.abs(piece.astype(np.float64) - value) > tolerance
         piece[changed] = value
         mask[row, begin:end] |= changed
+
+
+def add_changed(
+    changed: np.ndarray, nominal: np.ndarray, noise: np.ndarray, mask: np.ndarray, quantisation: Levels | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Adds noise to a run with changes, and keeps the mask true where quantisation removes a change.
+
+    Args:
+        changed: Run with changes, without noise.
+        nominal: The nominal run of the same shape, without noise.
+        noise: Noise of the same shape.
+        mask: Marks the samples at which both runs differ.
+        quantisation: Levels to which the sum is rounded, or None.
+
+    Returns:
+        `(values, mask)`: float32 values, and a boolean array that marks those that differ from the nominal run with the same noise.
+
+    Raises:
+        InputError: If a value is not finite.
+    """
+    values = check_finite(changed + noise)
+    if quantisation is None:
+        return values, mask
+    values = quantisation.round(values)
+    return values, mask & (values != quantisation.round(nominal + noise))

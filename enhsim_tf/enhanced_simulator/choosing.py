@@ -5,7 +5,7 @@ all rungs are judged on the same aligned windows.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +15,12 @@ from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import random_window_starts
 
-if TYPE_CHECKING:
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-    from enhsim_tf.enhanced_simulator.training import TrainingSettings
-
+Simulator, Settings = Any, Any  # an `EnhancedSimulator` and `TrainingSettings`, whose modules import this one
 _UNCHANGED = Scaling((0.0,), (1.0,), 0.0, 1.0)  # the simulator itself converts to the units of its enhancer
 _ALIGNMENTS = 2  # rounds in which the windows are aligned with the waveform of ridge regression
 
 
-def choose_enhancer(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], settings: "TrainingSettings") -> list[dict[str, Any]]:
+def choose_enhancer(simulator: Simulator, parts: Sequence[Telemetry], settings: Settings) -> list[dict[str, Any]]:
     """Sets the enhancer of a simulator to the chosen rung.
 
     Args:
@@ -65,7 +62,7 @@ def choose_enhancer(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], 
     ]
 
 
-def _windows(simulator: "EnhancedSimulator", pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _windows(simulator: Simulator, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns coarse windows and targets in the units of the enhancer, and the starts in samples."""
     inputs, targets = ((windows - simulator.offset) / simulator.scale for windows in (pairs.coarse, pairs.target_in_unit))
     return inputs, targets, np.round(pairs.time_s / simulator.interval_s).astype(np.int64)

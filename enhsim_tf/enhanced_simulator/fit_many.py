@@ -8,6 +8,7 @@ import contextlib
 import dataclasses
 import os
 import sys
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,11 +39,13 @@ class CoarseRun:
         source: A source of telemetry, see `sources.read_source`.
         columns: Names of the columns that are inputs; None: all numeric columns.
         time: Name of the time column; None: it is detected.
+        start: Time of its zero in UTC, if its times count from zero; None: its times are those of the telemetry.
     """
 
     source: str
     columns: Sequence[str] | None = None
     time: str | None = None
+    start: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -206,6 +209,13 @@ def fit_or_say(job: Job) -> Outcome:
         raise InputError(
             f"Expected enough memory and disk space for {printable(job.channel)}. Received: {reason}. Finished channels are kept; free some space."
         ) from error
+    except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        reason = " ".join(str(error).split())[:200]
+        place = f"{Path(where.filename).name}, line {where.lineno}"
+        return Outcome(
+            job.channel, failure=f"Expected a fit. Received: {type(error).__name__}: {reason}, in {place}. Please report this defect."
+        )
 
 
 def fit_job(job: Job) -> list[str]:
@@ -237,9 +247,9 @@ def fit_job(job: Job) -> list[str]:
         from enhsim_tf.enhanced_simulator.runs.figure import run_figure
         from enhsim_tf.enhanced_simulator.runs.fitting import fit_run_model
 
-        cleaning = dataclasses.replace(job.cleaning, min_part=2)
-        run = read_recording(job.run.source, job.run.columns, job.run.time, cleaning, parts[0].interval_s if parts[0].has_time else None)
-        simulator, report = fit_run_model(parts, run, job.options, verbose, progress)
+        cleaning, interval_s = job.cleaning.of_run(min_part=2), parts[0].interval_s if parts[0].has_time else None
+        run = read_recording(job.run.source, job.run.columns, job.run.time, cleaning, interval_s, job.run.start)
+        simulator, report = fit_run_model(parts, run, job.options)
         figure = run_figure(report)
     refuse_foreign(job.folder)  # checked again, because the fit took minutes
     with replace_folder(job.folder) as temporary:

@@ -3,11 +3,11 @@
 import dataclasses
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.noise.rung_names import BEST, SAVED
+from enhsim_tf.noise.names import BEST, CANDIDATES
 
 ENHANCERS = ("coarse", "ridge", "ridge and network", "network")  # rungs of `enhancer.ladder` for windows at their own level and gain
-NOISES = (BEST, *SAVED)
-FEWEST_SAMPLES = 32  # minimum window length on request: the filters of the discriminator are 20 samples wide
+NOISES = (BEST, *CANDIDATES)
+FEWEST_SAMPLES = 32  # minimum window length on request
 LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
 LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
 _WINDOWS_IN_RECORD = 20  # without a period, the default window is this share of the record
@@ -22,7 +22,6 @@ class FitOptions:
             to 500 samples, or fewer if eight windows would not fit into the record.
         num_windows: Number of training windows, cut at random starts.
         epochs: Passes of the enhancer over the training windows, with a learning rate that falls to zero.
-        num_iterations: Adversarial iterations of the GANs of noise; the autoregressive network takes three times as many.
         noise: Model of the noise: one of `NOISES`, or `best`, the simplest that held-out telemetry does not tell from real noise
             (see `noise_choice`).
         held_out: Share of the telemetry, taken from its end, that is reserved for the report. 0 trains and reports on all
@@ -38,7 +37,6 @@ class FitOptions:
     window: int | None = None
     num_windows: int = 2_500
     epochs: int = 6
-    num_iterations: int = 1_000
     noise: str = BEST
     held_out: float = 0.2
     seed: int = 0
@@ -53,7 +51,7 @@ class FitOptions:
             raise InputError(f"Expected noise, one of: {', '.join(NOISES)}. Received: noise={self.noise!r}.")
         if self.window is not None and self.window < FEWEST_SAMPLES:
             raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
-        for name, least in (("num_windows", 1), ("epochs", 1), ("num_iterations", 0)):
+        for name, least in (("num_windows", 1), ("epochs", 1)):
             if getattr(self, name) < least:
                 raise InputError(f"Expected {name} to be at least {least}. Received: {name}={getattr(self, name)}.")
 

@@ -53,7 +53,7 @@ def fit_channel(
     choice = choose_coarse(learnt, options.window, commands)
     if choice.kind == COMMANDS:
         said = f"{choice.said} {note}".strip()
-        return _fit_commands(parts, choice, options, learnt is parts, said, commands, verbose, progress)
+        return _fit_commands(parts, choice, options, learnt is parts, said, commands)
     simulator = _fit(learnt, choice, options, verbose, progress, note)
     usable = [part for part in learnt if len(part) >= simulator.window]
     is_held_out = bool(options.held_out) and not note and num_window_starts(held_out, simulator.window) >= simulator.window
@@ -106,10 +106,8 @@ def _fit(
             options.seed,
             options.num_windows,
             options.epochs,
-            options.num_iterations,
-            window=choice.window,
-            noise=options.noise,
-            extraction="enhancer",
+            choice.window,
+            options.noise,
             held_out=0.0,
             decay=True,
             follow=True,
@@ -133,8 +131,6 @@ def _fit_commands(
     learns_all: bool,
     said: str,
     commands: np.ndarray | None,
-    verbose: int | str,
-    progress: Progress,
 ) -> tuple[RunModel, RunReport]:
     """Fits a run model whose coarse run are the traces of the commands."""
     traces: CommandTraces | None = choice.traces
@@ -144,13 +140,12 @@ def _fit_commands(
         choice.window,
         options.num_windows,
         options.epochs,
-        options.num_iterations,
         options.noise,
         None if options.enhancer == "best" else options.enhancer,
         0.0,
         0.0 if learns_all else options.held_out,
         options.seed,
     )
-    model, report = fit_run_model(parts, traces.recording(commands), run_options, verbose, progress)
+    model, report = fit_run_model(parts, traces.recording(commands), run_options)
     model.trained |= {"coarse": {"kind": "commands", "name": "the commands", "config": traces.get_config()}}
     return model, dataclasses.replace(report, coarse=said)

@@ -1,9 +1,9 @@
-"""Chooses a noise model from the ladder by held-out noise (an extension of section 2.3).
+"""Chooses among noise models by held-out noise (an extension of section 2.3).
 
-A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each rung of the
-ladder is therefore judged on held-out noise in three ways: how well a classifier separates generated from real windows of noise and
+A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each candidate
+is therefore judged on held-out noise in three ways: how well a classifier separates generated from real windows of noise and
 the signal below them, how many false alarms two cheap detectors raise on real windows after training on generated ones, and how many
-injected anomalies they find: few false alarms are no success where thresholds are so high that anomalies are missed. The simplest rung
+injected anomalies they find: few false alarms are no success where thresholds are so high that anomalies are missed. The simplest candidate
 that passes all three is chosen. Rule and tolerances were fixed before the experiment that judges them.
 """
 
@@ -18,7 +18,7 @@ from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.realism.two_sample import boosted_trees
 from enhsim_tf.realism.window_features import DECIMALS, signal_features, window_features
 
-MAX_AUC_EXCESS = 0.05  # by which the AUC of a rung may exceed that of real windows against other real windows
+MAX_AUC_EXCESS = 0.05  # by which the AUC of a candidate may exceed that of real windows against other real windows
 MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows
 MAX_RECALL_LOSS = 0.03  # by which its mean recall may be below that of detectors trained on real windows, at their own thresholds
 TOLD_APART = 0.8  # AUC above which generated noise must not be used without a warning
@@ -28,11 +28,11 @@ _NUM_ANOMALOUS = 60  # windows with anomalies, for each kind and severity
 
 
 @dataclasses.dataclass(frozen=True)
-class RungJudgement:
-    """How a rung does on held-out noise.
+class CandidateJudgement:
+    """How a candidate does on held-out noise.
 
     Args:
-        rung: Name of the rung.
+        name: Name of the noise model.
         auc: AUC of a classifier that separates generated from held-out real windows.
         real_auc: The same for real against other real windows: the floor.
         alarms: False-alarm rate on held-out real windows, mean over the cheap detectors, trained on generated windows.
@@ -41,7 +41,7 @@ class RungJudgement:
         real_recall: The same for detectors trained on real windows.
     """
 
-    rung: str
+    name: str
     auc: float
     real_auc: float
     alarms: float
@@ -62,15 +62,15 @@ class RungJudgement:
 
     @property
     def departure(self) -> float:
-        """Sum of the three excesses, by which rungs are compared if none passes."""
+        """Sum of the three excesses, by which candidates are compared if none passes."""
         return sum(max(excess, 0) for excess in self._excesses)
 
 
 class NoiseJudge:
-    """Judges the noise of rungs on held-out noise. What concerns real noise alone is computed once, for all rungs.
+    """Judges generated noise on held-out noise. What concerns real noise alone is computed once, for all candidates.
 
     Args:
-        learnt: Real noise windows from which the rungs were fitted, shape `(windows, samples)`.
+        learnt: Real noise windows from which the models were fitted, shape `(windows, samples)`.
         held_out: Real noise windows that they were not fitted to, as many.
         signals: Three arrays of clean signal windows, to which generated, learnt and held-out noise are added.
         compared: What the classifier sees of learnt and held-out noise (see `features_of`). It must not come from windows that
@@ -104,23 +104,25 @@ class NoiseJudge:
         half, rates, recalls = len(training) // 2, [], []
         for name in _CHEAP:
             detector = DETECTORS[name](self.seed).fit(training[:half])
-            threshold, _ = metrics.finite_threshold(detector.score(training[half:]), self.rate)  # an infinite one would silence all rungs
+            threshold, _ = metrics.finite_threshold(
+                detector.score(training[half:]), self.rate
+            )  # an infinite one would silence all candidates
             rates.append(metrics.false_alarm_rate(detector.score(self._trial.nominal), threshold))
             recalls += [metrics.recall(detector.score(windows), threshold) for windows in self._trial.anomalous.values()]
         return float(np.mean(rates)), float(np.mean(recalls))
 
-    def judge(self, rung: str, generated: np.ndarray, compared: np.ndarray) -> RungJudgement:
-        """Judges the noise of a rung.
+    def judge(self, name: str, generated: np.ndarray, compared: np.ndarray) -> CandidateJudgement:
+        """Judges the noise of a candidate.
 
         Args:
-            rung: Name of the rung.
+            name: Name of the noise model.
             generated: Generated noise windows, as many as real ones; half train the detectors, and half set their thresholds.
             compared: What the classifier sees of generated noise.
         """
         _check_number(len(generated))
         auc = boosted_trees(compared, self._held_out_features, self.seed).auc
         alarms, recall = self._detected(self._signals[0][: len(generated)] + generated)
-        return RungJudgement(rung, auc, self.real_auc, alarms, self.real_alarms, recall, self.real_recall)
+        return CandidateJudgement(name, auc, self.real_auc, alarms, self.real_alarms, recall, self.real_recall)
 
 
 def unit_of(noise: np.ndarray) -> float:
@@ -151,7 +153,7 @@ def _check_number(number: int) -> None:
         )
 
 
-def choose(judgements: Sequence[RungJudgement]) -> str:
-    """Returns the first rung that passes, or the one with the smallest departure if none does."""
-    passing = [each.rung for each in judgements if each.passes]
-    return passing[0] if passing else min(judgements, key=lambda each: each.departure).rung
+def choose(judgements: Sequence[CandidateJudgement]) -> str:
+    """Returns the name of the first candidate that passes, or of that with the smallest departure if none does."""
+    passing = [each.name for each in judgements if each.passes]
+    return passing[0] if passing else min(judgements, key=lambda each: each.departure).name

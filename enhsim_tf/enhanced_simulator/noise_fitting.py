@@ -1,33 +1,28 @@
-"""Fits the noise model of a simulator: the rung of the ladder that was asked for, or the one that held-out telemetry chooses.
+"""Fits the noise model of a simulator: the candidate that was asked for, or the one that held-out telemetry chooses.
 
-Rule and tolerances are those of `noise_choice`. The rungs learn the noise of the first part of the time and are judged on that of the
+Rule and tolerances are those of `noise_choice`. The candidates learn the noise of the first part of the time and are judged on that of the
 last part, by generated telemetry as the simulator would give it, with its levels if the channel is quantised. The classifier sees
 disjoint windows only, cut into pieces if there are few of them: it recognises single windows that overlap, whatever their noise is like.
-A chosen rung without a network is fitted again to all of the time.
+The chosen candidate is fitted again to all of the time.
 """
 
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator import noise_choice
-from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import BY_OPTION, FOLLOWERS, GANS, NETWORKS, SAVED, STREAMS
+from enhsim_tf.noise.candidates import NoiseModel, fit_candidate
+from enhsim_tf.noise.names import CANDIDATES
 from enhsim_tf.realism.two_sample import boosted_trees
 from enhsim_tf.realism.window_features import signal_edges
 from enhsim_tf.telemetry.quantisation import Levels
-from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import disjoint_rows, first_samples
+from enhsim_tf.telemetry.windows import disjoint_rows
 
-if TYPE_CHECKING:
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-
-JUDGED_SHARE = 0.25  # of the time, at its end, on which rungs are judged
+JUDGED_SHARE = 0.25  # of the time, at its end, on which candidates are judged
 MOST_JUDGED = 1_000  # windows
 _LEAST_JUDGED = 20
 _ENOUGH_PIECES, _LEAST_PIECE = 200, 16  # disjoint pieces that the classifier should see, and their least length in samples
@@ -54,103 +49,50 @@ class NoiseWindows:
         chosen = disjoint_rows(self.starts, self.noise.shape[1])
         return NoiseWindows(self.noise[chosen], self.clean[chosen], self.starts[chosen])
 
+    def fit(self, name: str) -> NoiseModel:
+        """Fits the candidate of a name to these windows."""
+        return fit_candidate(name, self.noise, self.clean, self.starts)
+
     def __len__(self) -> int:
         return len(self.noise)
 
 
-def noise_windows(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], starts: np.ndarray) -> NoiseWindows:
-    """Returns the noise of telemetry, and the enhanced signal below it.
-
-    Args:
-        simulator: The simulator, whose enhancer is trained.
-        parts: Telemetry, or the parts between its gaps.
-        starts: Start of each window, counted over all parts as in `telemetry.windows`.
-    """
-    pairs = simulator.pairs(parts, starts)
-    clean = simulator.follow(pairs)
-    return NoiseWindows(pairs.target - clean, clean, first_samples(parts, starts, simulator.window))
-
-
-@dataclasses.dataclass(frozen=True)
-class NoiseTraining:
-    """How noise models are fitted.
-
-    Args:
-        num_iterations: Adversarial iterations of the GANs. The autoregressive network takes three times as many.
-        seed: Seed of the training.
-        to_unit: Converts enhanced windows to the unit in which noise that follows the signal receives them.
-        quantisation: Levels of the channel, or None.
-        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
-        unit: Unit of the paper's GAN, in the unit of the telemetry. None: it follows from the noise.
-        verbose: Progress bars of the GANs: 0 none, 1 always, "auto" on a terminal.
-        progress: Reports the progress of the trainings as lines of text.
-    """
-
-    num_iterations: int
-    seed: int
-    to_unit: Callable[[np.ndarray], np.ndarray]
-    quantisation: Levels | None = None
-    with_signal: bool = True
-    unit: float | None = None
-    verbose: int | str = 0
-    progress: Progress = SILENT
-
-
-def fit_noise(option: str, windows: NoiseWindows, training: NoiseTraining, notes: list[str]) -> Any:
-    """Fits the rung of one option.
-
-    Args:
-        option: A key of `rung_names.BY_OPTION`.
-        windows: Windows to learn from.
-        training: How they are learnt.
-        notes: Receives a sentence for each training that diverged.
-
-    Returns:
-        The noise model.
-
-    Raises:
-        InputError: If the rung cannot be fitted to this noise.
-    """
-    is_adversarial = option in GANS
-    number = training.num_iterations * (1 if is_adversarial else 3)
-    name = "noise GAN, iteration" if is_adversarial else "noise network, iteration"
-    count = training.progress.loop(name, number) if option in NETWORKS else None
-    watch = ladder.Watch(None if training.verbose == "auto" else bool(training.verbose), count, notes.append)
-    signal = training.to_unit(windows.clean) if option in FOLLOWERS else None
-    task = ladder.FitTask(windows.noise, signal, number, training.seed, windows.starts, watch)
-    return ladder.fit_paper_gan(task, training.unit) if option == "paper" else ladder.RUNGS[BY_OPTION[option]](task)
-
-
 def choose_noise(
-    learnt: NoiseWindows, judged: NoiseWindows, everything: NoiseWindows, training: NoiseTraining, notes: list[str]
-) -> tuple[Any, list[dict[str, Any]]]:
-    """Fits every rung, judges it on held-out telemetry, and returns the chosen one.
+    learnt: NoiseWindows,
+    judged: NoiseWindows,
+    everything: NoiseWindows,
+    seed: int,
+    notes: list[str],
+    quantisation: Levels | None = None,
+    with_signal: bool = True,
+) -> tuple[NoiseModel, list[dict[str, Any]]]:
+    """Fits every candidate, judges it on held-out telemetry, and returns the chosen one, fitted to all of the time.
 
     Args:
         learnt: Windows of the first part of the time, in order.
         judged: Windows of the last part of the time, in order.
-        everything: Windows of the whole time, for a chosen rung without a network.
-        training: How they are learnt.
-        notes: Receives a sentence for each rung that could not be fitted or diverged.
+        everything: Windows of the whole time.
+        seed: Seed of the draws and of the judges.
+        notes: Receives a sentence for each candidate that could not be fitted.
+        quantisation: Levels of the channel, or None.
+        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
 
     Returns:
-        The noise model; and for each rung its `name`, the numbers of `noise_choice.RungJudgement`, `passes` and `is_chosen`. The
-        list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
+        The noise model; and for each candidate the fields of `noise_choice.CandidateJudgement`, `passes` and `is_chosen`. The list is
+        empty if there is too little telemetry to judge; whole residual windows are drawn then.
     """
     if min(len(judged), len(learnt)) < _LEAST_JUDGED or len(compare(learnt, learnt, judged)[0]) < _LEAST_JUDGED:
         notes.append("there is too little telemetry to judge noise models; whole residual windows are drawn")
-        return fit_noise("residual windows", everything, training, notes), []
-    models, judgements, judge = {}, [], HeldOutJudge(learnt, judged, training)
-    for option in SAVED:
+        return everything.fit("residual windows"), []
+    judgements, judge = [], HeldOutJudge(learnt, judged, seed, quantisation, with_signal)
+    for number, name in enumerate(CANDIDATES):
         try:
-            model = fit_noise(option, learnt, training, notes)
-            judgements.append(judge.judge(option, model))
-            models[option] = model
+            judgements.append(judge.judge(name, learnt.fit(name), np.random.default_rng([seed, _DRAW, number])))
         except InputError as error:
-            notes.append(f"noise model {option} left out: {error}")
+            notes.append(f"noise model {name} left out: {error}")
     chosen = noise_choice.choose(judgements)
-    model = models[chosen] if chosen in NETWORKS else fit_noise(chosen, everything, training, notes)
-    return model, rows_of(judgements, chosen)
+    rows = [dataclasses.asdict(each) | {"passes": bool(each.passes), "is_chosen": each.name == chosen} for each in judgements]
+    return everything.fit(chosen), rows
 
 
 class HeldOutJudge:
@@ -159,36 +101,37 @@ class HeldOutJudge:
     Args:
         learnt: Windows from which they are fitted.
         judged: Windows that they have not seen.
-        training: How they are fitted.
+        seed: Seed of the classifier and the detectors.
+        quantisation: Levels of the channel, or None.
+        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
     """
 
-    def __init__(self, learnt: NoiseWindows, judged: NoiseWindows, training: NoiseTraining):
+    def __init__(self, learnt: NoiseWindows, judged: NoiseWindows, seed: int, quantisation: Levels | None = None, with_signal: bool = True):
         number = min(len(judged), len(learnt), MOST_JUDGED)
         rows, last = (np.linspace(0, len(each) - 1, number).astype(int) for each in (learnt, judged))
-        self._learnt, self._held_out, self._training, self._clean = learnt, judged, training, learnt.clean[rows]
+        self._learnt, self._held_out, self._quantisation, self._clean = learnt, judged, quantisation, learnt.clean[rows]
         self._few = classified(self._clean, learnt, judged)
-        signals = [each if training.with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[last])]
+        signals = [each if with_signal else np.zeros_like(each) for each in (self._clean, self._clean, judged.clean[last])]
         _, *compared = compare(NoiseWindows(learnt.noise[rows], self._clean), learnt, judged)
-        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[last], signals, compared, seed=training.seed)
+        self._judge = noise_choice.NoiseJudge(learnt.noise[rows], judged.noise[last], signals, compared, seed=seed)
 
-    def judge(self, option: str, model: Any) -> noise_choice.RungJudgement:
+    def judge(self, name: str, model: NoiseModel, rng: np.random.Generator) -> noise_choice.CandidateJudgement:
         """Judges a fitted noise model.
 
         Args:
-            option: Name of its rung.
+            name: Its name.
             model: The noise model.
+            rng: Random generator of its noise.
         """
-        training = self._training
-        rng = np.random.default_rng([training.seed, _DRAW, STREAMS[option]])
 
         def noise_on(clean: np.ndarray) -> np.ndarray:
             # sums of 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
-            generated = clean + ladder.generate(model, len(clean), rng, training.to_unit(clean))
-            return (generated if training.quantisation is None else training.quantisation.round(generated)) - clean
+            generated = clean + model.generate(len(clean), rng, clean)
+            return (generated if self._quantisation is None else self._quantisation.round(generated)) - clean
 
         noise = noise_on(self._clean)
         seen = compare(NoiseWindows(noise_on(self._few), self._few), self._learnt, self._held_out)[0]
-        return self._judge.judge(option, noise, seen)
+        return self._judge.judge(name, noise, seen)
 
 
 def classified(clean: np.ndarray, learnt: NoiseWindows, judged: NoiseWindows) -> np.ndarray:
@@ -272,11 +215,11 @@ def auc_of(
 
 
 def sentence_of(rows: Sequence[Mapping[str, Any]], used: str) -> str:
-    """Describes the judgements of all rungs in one sentence.
+    """Describes the judgements of all candidates in one sentence.
 
     Args:
         rows: As returned by `choose_noise`.
-        used: The option that the model was fitted with.
+        used: Name of the noise model that was asked for.
     """
     if not rows:
         return f"Noise model: {used}."
@@ -302,12 +245,3 @@ def warning_of(auc: float | None, real_auc: float | None) -> str:
     return (
         f"WARNING: a classifier tells its noise from the telemetry's (AUC {auc:.2f}; {real_auc:.2f} between two parts of the telemetry's). "
     )
-
-
-def rows_of(judgements: Sequence[noise_choice.RungJudgement], chosen: str) -> list[dict[str, Any]]:
-    """Returns judgements in plain JSON types."""
-    return [
-        {"name": each.rung, **{name: value for name, value in dataclasses.asdict(each).items() if name != "rung"}}
-        | {"passes": bool(each.passes), "is_chosen": each.rung == chosen}
-        for each in judgements
-    ]

@@ -45,7 +45,7 @@ class ChannelReport:
         ladder: For each enhancer that was judged on held-out time, its `name`, `error`, `standard_error`, `is_within` (one
             standard error of the best) and `is_chosen`. Empty if the paper's network was used without a choice.
         noise_model: Name of the noise model that was asked for, or `best`.
-        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for, or if there was too little to judge on.
+        noise_candidates: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for, or if there was too little to judge on.
         noise_auc: AUC of a classifier that separates `generated` noise from that of the evaluation telemetry, and of one that
             separates `real` noise of the training telemetry from it. Empty if there is too little telemetry.
         coarse: Which coarse simulator was chosen and why; the first line of the report.
@@ -68,8 +68,8 @@ class ChannelReport:
     time_unit: str = "s"
     levels: Mapping[str, float] = dataclasses.field(default_factory=dict)
     ladder: Sequence[Mapping[str, Any]] = ()
-    noise_model: str = "convolutional"
-    noise_ladder: Sequence[Mapping[str, Any]] = ()
+    noise_model: str = "best"
+    noise_candidates: Sequence[Mapping[str, Any]] = ()
     noise_auc: Mapping[str, float] = dataclasses.field(default_factory=dict)
     coarse: str = ""
 
@@ -80,9 +80,12 @@ class ChannelReport:
         return plain | {
             "period_s": self.period_s if np.isfinite(self.period_s) else None,
             "nrmse": nrmse,
-            "noise": [dict(row) for row in self.noise],
+            "noise": [
+                {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
+                for row in self.noise
+            ],
             "ladder": [dict(each) for each in self.ladder],
-            "noise_ladder": [dict(each) for each in self.noise_ladder],
+            "noise_candidates": [dict(each) for each in self.noise_candidates],
             "noise_auc": dict(self.noise_auc),
             "verdict": self.verdict,
         }
@@ -148,7 +151,7 @@ class ChannelReport:
         )
 
     def _of_the_noise_models(self) -> str:
-        said = sentence_of(self.noise_ladder, self.noise_model)
+        said = sentence_of(self.noise_candidates, self.noise_model)
         if not self.noise_auc:
             return said
         auc = f"AUC of a classifier against the noise of {self._where()}: generated {self.noise_auc['generated']:.2f}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, auc_of, noise_windows
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, auc_of
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
 from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
@@ -96,8 +96,8 @@ def report_on(
         learnt[0].time_unit,
         {} if levels is None else {"count": levels.count, "step": levels.step},
         simulator.trained.get("ladder", ()),
-        simulator.trained.get("noise", "convolutional"),
-        simulator.trained.get("noise_ladder", ()),
+        simulator.trained["noise"],
+        simulator.trained.get("noise_candidates", ()),
         _noise_auc(simulator, learnt, held_out, seed),
         simulator.trained.get("coarse", {}).get("said", ""),
     )
@@ -105,7 +105,7 @@ def report_on(
 
 def _noise_auc(simulator: "EnhancedSimulator", learnt: Sequence[Telemetry], held_out: Sequence[Telemetry], seed: int) -> dict[str, float]:
     """Returns the AUC of a classifier of generated, and of learnt, against held-out noise; empty if there are too few windows."""
-    real = [noise_windows(simulator, parts, evenly_spaced_starts(parts, simulator.window, MOST_JUDGED)) for parts in (learnt, held_out)]
+    real = [simulator.noise_windows(parts, evenly_spaced_starts(parts, simulator.window, MOST_JUDGED)) for parts in (learnt, held_out)]
     rng = np.random.default_rng([seed, 3])
     return auc_of(lambda windows: simulator.add_noise(windows, rng), real[0].clean, *real, seed)
 
@@ -134,7 +134,7 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
     for part in whole:
         starts += list(before + scattered_starts(len(part), window, rng))
         before += len(part) - window + 1
-    residual = noise_windows(simulator, whole, np.array(starts)).noise
+    residual = simulator.noise_windows(whole, np.array(starts)).noise
     pieces = max(1, -(-_NUM_NOISE_WINDOWS // len(residual)))
     short = window // pieces
     if short < _LEAST_NOISE_WINDOW:
@@ -145,6 +145,6 @@ def _compare_noise(simulator: "EnhancedSimulator", parts: Sequence[Telemetry], s
         return short, []  # where most windows are constant, measures of noise are not defined
     floor = real_floor.RealFloor(residual[:half], residual[half : 2 * half], num_resplits=40, block=max(1, half // 10), seed=seed)
     clean = simulator.generate_clean(-(-half // pieces), seed=seed)
-    generated = simulator.draw_noise(clean, seed)[:, : short * pieces].reshape(-1, short)[:half]
+    generated = simulator.draw_noise(clean, np.random.default_rng(seed))[:, : short * pieces].reshape(-1, short)[:half]
     rows = [dataclasses.asdict(row) for row in floor.evaluate(generated).rows]
     return short, [{key: None if value != value else value for key, value in row.items()} for row in rows]  # NaN is not valid JSON

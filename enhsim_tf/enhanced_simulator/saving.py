@@ -15,7 +15,6 @@ import numpy as np
 from enhsim_tf.common.atomic_files import replace_folder, sha256, write_json
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
-from enhsim_tf.noise.states import NoiseState, state_of
 
 MANIFEST, SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
@@ -58,21 +57,6 @@ def write_saved(
             )
         np.savez(temporary / _ARRAYS, **{f"{part}/{name}": each for part, named in arrays.items() for name, each in named.items()})
         write_json(temporary / MANIFEST, {"format": form, "sha256": {name: sha256(temporary / name) for name in (_ARRAYS, SETTINGS)}})
-
-
-def saved_noise(model: Any) -> NoiseState:
-    """Returns what is saved of a noise model.
-
-    Args:
-        model: The noise model.
-
-    Raises:
-        InputError: If it consists of networks.
-    """
-    state = state_of(model)
-    if state.networks:
-        raise InputError("Expected a noise model of arrays. Received: a GAN, whose networks are not saved. Fit another noise model.")
-    return state
 
 
 def is_foreign(folder: Path) -> bool:

@@ -5,7 +5,6 @@ import functools
 import itertools
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,33 +15,27 @@ from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, h
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhanced_simulator.batches import add_changed, complete_batch, complete_labelled_batch
-from enhsim_tf.enhanced_simulator.changes import blend_changes, fade_length, hold_values, spans, tolerance_of
+from enhsim_tf.enhanced_simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of
 from enhsim_tf.enhanced_simulator.checks import check_counts, check_parts, config_of
-from enhsim_tf.enhanced_simulator.noise_fitting import noise_windows
+from enhsim_tf.enhanced_simulator.noise_fitting import NoiseWindows
 from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput
-from enhsim_tf.enhanced_simulator.saving import read_saved, saved_noise, write_saved
+from enhsim_tf.enhanced_simulator.saving import read_saved, write_saved
 from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
 from enhsim_tf.enhancer.rung_networks import network_from, weights_of
 from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs
 from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.noise.gan import num_overlapping
-from enhsim_tf.noise.states import model_from
+from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.noise.states import model_from, state_of
 from enhsim_tf.telemetry.parquet_store import write_windows
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows, random_window_starts
+from enhsim_tf.telemetry.windows import cut_windows, first_samples, random_window_starts
 
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the enhanced waveform
 _CHUNK = 4_096  # number of windows generated at a time
 _NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
 _START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
-
-# arguments of `EnhancedSimulator.fit` that reproduce the paper
-PAPER: Mapping[str, Any] = MappingProxyType(
-    {"num_windows": 1_500, "epochs": 40, "noise": "paper", "extraction": "moving average", "decay": False}
-)
 
 
 class EnhancedSimulator(NoisyOutput):
@@ -51,7 +44,7 @@ class EnhancedSimulator(NoisyOutput):
     Args:
         coarse: The coarse simulator.
         enhancer: Network that maps coarse windows to enhanced windows, both of shape `(windows, samples)`.
-        noise: The noise model, of any rung of `noise.ladder`.
+        noise: The noise model, see `noise.candidates`.
         interval_s: Sampling interval in seconds.
         offset: Value, in the telemetry's unit, that corresponds to 0 in the enhancer's normalised units.
         scale: Size, in the telemetry's unit, of 1 in the enhancer's normalised units.
@@ -72,7 +65,7 @@ class EnhancedSimulator(NoisyOutput):
         self,
         coarse: SquareWaveSimulator,
         enhancer: keras.Model,
-        noise: Any,
+        noise: NoiseModel,
         interval_s: float = 1.0,
         offset: float = 0.0,
         scale: float = 1.0,
@@ -94,12 +87,8 @@ class EnhancedSimulator(NoisyOutput):
     @functools.cached_property
     def noise_sd(self) -> float:
         """Standard deviation of the generated noise, in the telemetry's unit."""
-        clean = self.generate_clean(_NUM_NOISE) if getattr(self.noise, "follows_signal", False) else np.empty((_NUM_NOISE, 0))
-        return float(np.std(self.draw_noise(clean, 0), dtype=np.float64))
-
-    def in_unit(self, clean: np.ndarray) -> np.ndarray:
-        """Converts enhanced values to the units of the enhancer."""
-        return (clean - self.offset) / self.scale
+        noise = self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0))
+        return float(np.std(noise, dtype=np.float64))
 
     @classmethod
     def fit(
@@ -109,12 +98,8 @@ class EnhancedSimulator(NoisyOutput):
         seed: int = TrainingSettings.seed,
         num_windows: int = TrainingSettings.num_windows,
         epochs: int = TrainingSettings.epochs,
-        num_iterations: int = TrainingSettings.num_iterations,
-        moving_average: int = TrainingSettings.moving_average,
-        normalise: bool = TrainingSettings.normalise,
         window: int = TrainingSettings.window,
         noise: str = TrainingSettings.noise,
-        extraction: str = TrainingSettings.extraction,
         held_out: float = TrainingSettings.held_out,
         decay: bool = TrainingSettings.decay,
         follow: bool = TrainingSettings.follow,
@@ -124,34 +109,19 @@ class EnhancedSimulator(NoisyOutput):
     ) -> "EnhancedSimulator":
         """Trains the enhancer on nominal telemetry, and fits its noise.
 
-        The defaults differ from the paper's settings, which are `fit(telemetry, **PAPER)`. The paper's generator repeats
-        one pattern, and the paper's moving average removes slow noise together with the signal, so detectors trained on
-        its output flag real telemetry as anomalous. By default, the noise model is chosen by held-out telemetry; how
-        rarely detectors then flag real telemetry is in docs/noise.md.
-
         Args:
             telemetry: Nominal telemetry, or the parts between its gaps on a common clock. Its length must be at least eight
-                windows, or two windows with `extraction="moving average"`.
+                windows.
             coarse: The coarse simulator. None fits square waves to the longest part of the telemetry.
             seed: Random seed of the training.
             num_windows: Number of training windows, cut at random starts.
             epochs: Passes of the enhancer over the training windows.
-            num_iterations: Adversarial iterations of a GAN of noise; the autoregressive network takes three times as many. 0 leaves
-                networks untrained.
-            moving_average: Width in samples of the moving average that separates the noise from the signal.
-            normalise: Whether the paper's networks are trained on normalised values: the enhancer in units of the coarse
-                simulator's levels, the GAN at the paper's noise amplitude. False passes the values unchanged, as in the
-                paper. Other noise models always normalise.
             window: Length of a window in samples.
-            noise: Model of the noise: `best`, the simplest that held-out telemetry does not tell from real noise; or a key of
-                `noise.rung_names.BY_OPTION`, for example the networks of the `paper`, or `convolutional`, whose generator has
-                full-rank output. `best` needs extraction by the enhancer.
-            extraction: How noise is separated from the signal. `moving average` subtracts a moving average from the
-                telemetry, as in the paper; `enhancer` subtracts the enhanced signal and so keeps slow noise.
-            held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for noise extraction
-                only and not for training the enhancer. It applies to extraction by the enhancer. 0 uses all telemetry
-                for both, which is safe with many windows, few epochs and periodic coarse windows: the enhancer then
-                cannot memorise the noise of single windows.
+            noise: `best`, the simplest noise model that held-out telemetry does not tell from real noise; or one of
+                `noise.names.CANDIDATES`. Noise is the telemetry minus the enhanced signal.
+            held_out: Share of the telemetry, from 0 to below 1 and taken from its end, that is used for the noise only and not for
+                training the enhancer. 0 uses all telemetry for both, which is safe with many windows, few epochs and periodic
+                coarse windows: the enhancer then cannot memorise the noise of single windows.
             decay: Whether the enhancer's learning rate falls to zero along a cosine. With a constant rate, as in the paper,
                 the weights keep the noise of the last batches.
             follow: Whether the coarse simulator is aligned in time, offset and gain with each window before the enhancer
@@ -162,7 +132,7 @@ class EnhancedSimulator(NoisyOutput):
             enhancer: `network`, the paper's; `best`, the simplest rung of `enhancer.ladder` that is not measurably worse than
                 the best one on held-out time; or the name of a rung.
             verbose: Progress bars: 0 none, 1 always, "auto" on a terminal.
-            progress: Reports the progress of both trainings as lines of text.
+            progress: Reports the progress of the training as lines of text.
 
         Returns:
             The trained simulator.
@@ -174,12 +144,8 @@ class EnhancedSimulator(NoisyOutput):
             seed=seed,
             num_windows=num_windows,
             epochs=epochs,
-            num_iterations=num_iterations,
-            moving_average=moving_average,
-            normalise=normalise,
             window=window,
             noise=noise,
-            extraction=extraction,
             held_out=held_out,
             decay=decay,
             follow=follow,
@@ -201,7 +167,18 @@ class EnhancedSimulator(NoisyOutput):
         """
         parts = check_parts(telemetry)
         check_counts(num_windows=(num_windows, 0))
-        return noise_windows(self, parts, random_window_starts(parts, self.window, num_windows, rng)).noise
+        return self.noise_windows(parts, random_window_starts(parts, self.window, num_windows, rng)).noise
+
+    def noise_windows(self, parts: Sequence[Telemetry], starts: np.ndarray) -> NoiseWindows:
+        """Returns the noise of telemetry, and the enhanced signal below it.
+
+        Args:
+            parts: Telemetry, or the parts between its gaps.
+            starts: Start of each window, counted over all parts as in `telemetry.windows`.
+        """
+        pairs = self.pairs(parts, starts)
+        clean = self.follow(pairs)
+        return NoiseWindows(pairs.target - clean, clean, first_samples(parts, starts, self.window))
 
     def pairs(self, telemetry: Telemetry | Sequence[Telemetry], starts: np.ndarray) -> Pairs:
         """Cuts windows of telemetry together with the coarse windows of the same times.
@@ -358,9 +335,7 @@ class EnhancedSimulator(NoisyOutput):
             coarse = nominal if scenario is None else self.coarse.simulate(times, scenario, rng)
             held = held_samples(scenario, self.window)
             rows = [(row, *held) for row in range(len(coarse))] if held else []
-            yield complete_labelled_batch(
-                self, coarse, nominal, None if levels is None else levels[first : first + _CHUNK], noise_rng, rows
-            )
+            yield self.complete_labelled(coarse, nominal, None if levels is None else levels[first : first + _CHUNK], noise_rng, rows)
 
     def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
         check_counts(num_windows=(num_windows, 0))
@@ -385,8 +360,7 @@ class EnhancedSimulator(NoisyOutput):
         """Generates one continuous series of any length, without visible joins between windows.
 
         Enhanced windows that overlap by half are cross-faded with weights that add up to one. The noise is generated
-        separately, as one series. Noise of the paper's networks repeats a pattern every half window, with
-        an autocorrelation of about 0.5 at that lag; noise of the other models does not.
+        separately, as one series.
 
         Args:
             num_samples: Length of the series in samples.
@@ -429,7 +403,7 @@ class EnhancedSimulator(NoisyOutput):
             raise InputError("Expected a scenario or a schedule. Received: both. Put the scenario into the schedule.")
         schedule = check_schedule(schedule, num_samples)
         window, hop = self.window, self.window // 2
-        num_windows = num_overlapping(num_samples, window)
+        num_windows = 1 + max(0, -(-(num_samples - window) // hop))  # that overlap by half and cover the series
         rng = np.random.default_rng(seed)
         times = start_s + self.interval_s * np.arange(window + (num_windows - 1) * hop)
         levels = None if self.levels is None else self._follow_levels(num_windows, seed)
@@ -469,7 +443,7 @@ class EnhancedSimulator(NoisyOutput):
         """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
         window, hop = self.window, self.window // 2
         starts = np.arange(0, len(coarse) - window + 1, hop)
-        enhanced = complete_batch(self, cut_windows(coarse, starts, window), levels, None)
+        enhanced = self.complete(cut_windows(coarse, starts, window), levels)
         fade = np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2  # the weights of two windows that overlap by half add up to 1
         signal, total = np.zeros((2, len(coarse)))
         for begin, clean in zip(starts, enhanced, strict=True):
@@ -493,7 +467,7 @@ class EnhancedSimulator(NoisyOutput):
             InputError: If the folder contains something other than a saved simulator, if a number of the simulator is not finite,
                 or if its noise is a GAN, which is not saved; the folder is left unchanged.
         """
-        noise = saved_noise(self.noise)
+        noise = state_of(self.noise)
         settings = {
             "coarse": config_of(self.coarse),
             "noise": dict(noise.settings),
@@ -527,7 +501,7 @@ class EnhancedSimulator(NoisyOutput):
         coarse, enhancer = waves_or_level(settings["coarse"]), network_from(arrays["enhancer"])
         if enhancer.input_shape != enhancer.output_shape or enhancer.input_shape[1] != settings["window"]:
             raise ValueError("an enhancer of another window length than the settings say")
-        noise = model_from(settings["noise"], {}, arrays.get("noise", {}))
+        noise = model_from(settings["noise"], arrays["noise"])
         units = settings["interval_s"], settings["offset"], settings["scale"], settings["levels"]
         quantisation = None if settings["quantisation"] is None else Levels(**settings["quantisation"])
         return cls(coarse, enhancer, noise, *units, settings["trained"], quantisation)

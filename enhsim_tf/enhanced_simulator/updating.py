@@ -16,7 +16,6 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
 from enhsim_tf.enhanced_simulator.checks import check_parts, is_finite
-from enhsim_tf.enhanced_simulator.noise_fitting import noise_windows
 from enhsim_tf.enhanced_simulator.residual_detector import AlignedResidual
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
@@ -24,8 +23,7 @@ from enhsim_tf.enhanced_simulator.update_report import RATE, State, UpdateReport
 from enhsim_tf.enhancer.training_pairs import split_end, window_errors
 from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.keras_tools.training import fit_windows
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
+from enhsim_tf.noise.states import state_of
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, num_window_starts, random_window_starts
 
@@ -36,7 +34,6 @@ _NUM_LEVELS, _NUM_JUDGED, _NUM_NOISE = 500, 200, 1_000  # maximum numbers of win
 _MOST_CHANGE = 0.2  # a period that differs by more is another wave, and the old one is kept
 _NEGLIGIBLE = 1e-3  # relative change of the period that is below what a record can show
 _THRESHOLD_WINDOWS = 200  # generated windows that set the threshold of alarms
-_MOST_ORDER = 40  # of a Gaussian autoregression
 
 
 def update_simulator(
@@ -77,7 +74,7 @@ def update_simulator(
         _tune_enhancer(new, first, rest, options, notes)
     seen = new.pairs(learnt, evenly_spaced_starts(learnt, window, _NUM_LEVELS)).drop_flat()
     new.levels = np.stack([seen.shift, seen.gain], axis=1)
-    _update_noise(new, learnt, options.seed, notes)
+    _update_noise(new, learnt, options.seed)
     num_judged = min(_NUM_JUDGED, num_window_starts(held_out, window))
     report = UpdateReport(
         parts[0].name,
@@ -148,25 +145,10 @@ def _tune_enhancer(
         notes.append("further training does not reduce the error of the enhancer, so its weights are kept")
 
 
-def _update_noise(simulator: EnhancedSimulator, parts: Sequence[Telemetry], seed: int, notes: list[str]) -> None:
-    """Fits the noise model to new residuals. Networks keep their weights, and their output is scaled."""
-    windows = noise_windows(simulator, parts, random_window_starts(parts, simulator.window, _NUM_NOISE, np.random.default_rng([seed, 1])))
-    residuals = windows.noise
-    real_sd, generated_sd = float(np.std(residuals, dtype=np.float64)), simulator.noise_sd
-    noise = simulator.noise
-    if isinstance(noise, GaussianNoise):
-        simulator.noise = GaussianNoise.fit(residuals)
-    elif isinstance(noise, WindowBootstrap):
-        simulator.noise = WindowBootstrap.fit(residuals, windows.starts)
-    elif isinstance(noise, MatchedWindowBootstrap):
-        simulator.noise = MatchedWindowBootstrap.fit(residuals, simulator.in_unit(windows.clean), windows.starts)
-    elif isinstance(noise, GaussianAutoregression):
-        simulator.noise = GaussianAutoregression.fit(residuals, min(_MOST_ORDER, simulator.window - 1))
-    elif isinstance(getattr(noise, "scale", None), float) and generated_sd > 0 and real_sd > 0:
-        simulator.noise = copy.copy(noise)
-        simulator.noise.scale = noise.scale * real_sd / generated_sd
-    else:
-        notes.append("the size of the noise cannot be changed in this noise model, so it is kept")
+def _update_noise(simulator: EnhancedSimulator, parts: Sequence[Telemetry], seed: int) -> None:
+    """Fits the noise model to new residuals."""
+    starts = random_window_starts(parts, simulator.window, _NUM_NOISE, np.random.default_rng([seed, 1]))
+    simulator.noise = simulator.noise_windows(parts, starts).fit(state_of(simulator.noise).settings["kind"])
     vars(simulator).pop("noise_sd", None)
 
 

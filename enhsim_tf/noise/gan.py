@@ -194,13 +194,16 @@ class NoiseGAN:
             record[f"loss_{kind}"] = float(self.loss(self._tags(tag), predicted))
         return record
 
-    def generate(self, num_windows: int, seed: int | np.random.Generator, batch_size: int = 1_024) -> np.ndarray:
+    def generate(
+        self, num_windows: int, seed: int | np.random.Generator, signal: np.ndarray | None = None, batch_size: int = 1_024
+    ) -> np.ndarray:
         """Generates windows of noise (step 9 of the paper's pipeline).
 
         Args:
             num_windows: Number of windows.
             seed: Seed for the latent vectors, or a random number generator, whose state advances. The same seed gives the same
                 noise.
+            signal: The signal that the noise is added to; it has no effect.
             batch_size: Number of windows in each call of the network.
 
         Returns:
@@ -210,7 +213,7 @@ class NoiseGAN:
         noise = predict_windows(self.generator, latent, batch_size)[:, :, 0]
         return noise * np.float32(self.scale)
 
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+    def generate_series(self, num_samples: int, seed: int | np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Generates one series of noise of any length, without seams.
 
         A convolutional generator generates the series directly. Any other generator generates windows that overlap by half.
@@ -223,6 +226,7 @@ class NoiseGAN:
         Args:
             num_samples: Length of the series.
             seed: Seed for the latent vectors, or a random number generator, whose state advances.
+            signal: The signal that the noise is added to; it has no effect.
 
         Returns:
             float32 array of shape `(num_samples,)`.

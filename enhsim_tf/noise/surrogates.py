@@ -5,9 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.noise.block_means import block_slices, margin
-
-_NEARLY_LEAST = 5e-4  # relative excess of the held-out error up to which a larger order is as good
 
 
 class GaussianNoise:
@@ -26,22 +23,22 @@ class GaussianNoise:
         """Fits to noise windows of shape `(windows, samples)`."""
         return cls(np.std(windows, dtype=np.float64), windows.shape[1])
 
-    def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise."""
-        return self._draw((num_windows, self.window), seed)
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples)`. The signal has no effect."""
+        return self._draw((number, self.window), rng)
 
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws one series of any length, float32 of shape `(num_samples,)`."""
-        return self._draw((1, num_samples), seed)[0]
+        return self._draw((1, num_samples), rng)[0]
 
-    def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
-        return (self.standard_deviation * np.random.default_rng(seed).standard_normal(shape)).astype(np.float32)
+    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
+        return (self.standard_deviation * rng.standard_normal(shape)).astype(np.float32)
 
 
 class GaussianAutoregression:
     """Gaussian autoregressive noise with the spectrum of the real noise.
 
-    The order is chosen by the Akaike information criterion (AIC), or by held-out windows. The model reproduces the second-order
+    The order is chosen by the Akaike information criterion (AIC). The model reproduces the second-order
     properties of the noise, that is its spectrum and autocorrelation, and no others.
 
     Args:
@@ -58,105 +55,58 @@ class GaussianAutoregression:
         self._start = _lower_orders(self.coefficients, self.innovation_sd)
 
     @classmethod
-    def fit(cls, windows: np.ndarray, max_order: int = 40, held_out: np.ndarray | None = None) -> "GaussianAutoregression":
+    def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
         """Fits the model to noise windows by Burg's method (1975), with the prediction errors pooled over the windows.
 
         Burg's method minimises the squared forward and backward prediction errors. It always gives a stationary process.
 
-        AIC counts all samples as different ones, and chooses orders that are too high where windows of a short record overlap. Held-out
-        windows choose the largest order whose squared error there is within 0.05 % of the least one: what a high order adds hardly helps
-        to predict the next sample, but it makes the slow variation of noise with a long memory. If the best order does not surely predict better
-        than none (`block_means`), the noise is white: many coefficients that are nearly zero would change its spectrum.
-
         Args:
             windows: Noise windows of shape `(windows, samples)`.
             max_order: The largest order that may be chosen.
-            held_out: Noise windows of the same length that share no sample with the others, in the order of time, or None for AIC.
 
         Raises:
             InputError: If the windows are not longer than `max_order`, or if they are constant.
         """
         if windows.shape[1] <= max_order:
             raise InputError(f"Expected windows of more samples than max_order={max_order}. Received: {windows.shape[1]} samples.")
-        mean = np.mean(windows, dtype=np.float64)
-        forward = backward = np.asarray(windows, np.float64) - mean
-        ahead = behind = forward[:0] if held_out is None else np.asarray(held_out, np.float64) - mean
+        forward = backward = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
         variance, coefficients = np.mean(forward**2), np.zeros(0)
         if not variance > 0:
             raise InputError("Expected noise that varies. Received: windows of one value.")
         orders, criteria = [(coefficients, variance)], [windows.size * np.log(variance)]
-        blocks = block_slices(ahead[:, max_order:].size)
-
-        def squares() -> list[float]:  # in each block of held-out time; of the same samples for all orders
-            squared = np.ravel(ahead[:, max_order + 1 - len(orders) :]) ** 2
-            return [float(np.sum(squared[block])) for block in blocks]
-
-        errors = [squares()]
         for order in range(1, max_order + 1):
-            forward, backward, ahead, behind = forward[:, 1:], backward[:, :-1], ahead[:, 1:], behind[:, :-1]
+            forward, backward = forward[:, 1:], backward[:, :-1]
             power = np.sum(forward**2) + np.sum(backward**2)
             if not power > 0:  # the noise is predicted without an error
                 break
             reflection = 2 * np.sum(forward * backward) / power
             forward, backward = forward - reflection * backward, backward - reflection * forward
-            ahead, behind = ahead - reflection * behind, behind - reflection * ahead
             coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
             variance *= 1 - reflection**2
             orders.append((coefficients, variance))
             criteria.append(windows.size * np.log(variance) + 2 * order)
-            errors.append(squares())
-        if held_out is None:
-            chosen = int(np.argmin(criteria))
-        else:
-            by_block, total = np.array(errors), np.sum(errors, axis=1)
-            without, best = np.maximum(by_block[[0, np.argmin(total)]], np.finfo(float).tiny)
-            gains = np.log(without / best)  # of the errors, not their difference: a louder block counts no more
-            is_predicted = np.mean(gains) > margin(gains)
-            chosen = int(np.flatnonzero(total <= (1 + _NEARLY_LEAST) * np.min(total))[-1]) if is_predicted else 0
-        coefficients, variance = orders[chosen]
+        coefficients, variance = orders[int(np.argmin(criteria))]
         return cls(coefficients, np.sqrt(variance), windows.shape[1])
 
-    def at(self, place: int) -> tuple[np.ndarray, float]:
-        """Returns the best linear prediction of a sample from all samples before it.
-
-        Args:
-            place: Number of samples before it.
-
-        Returns:
-            The coefficients, from lag 1 upwards, and the standard deviation of the error.
-        """
-        return self._start[place] if place < len(self._start) else (self.coefficients, self.innovation_sd)
-
-    def predict(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the best linear prediction of each sample of a window from all samples before it, float64 of the same shape."""
-        from scipy.signal import lfilter
-
-        values = np.asarray(windows, np.float64)
-        predicted = lfilter(np.concatenate([[0.0], self.coefficients]), [1.0], values, axis=1)
-        for place in range(min(len(self._start), values.shape[1])):
-            coefficients, _ = self._start[place]
-            predicted[:, place] = values[:, :place] @ coefficients[::-1]
-        return predicted
-
-    def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise.
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples)`. The signal has no effect.
 
         Each window is stationary from its first sample on.
         """
-        return self._draw((num_windows, self.window), seed)
+        return self._draw((number, self.window), rng)
 
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws one series of any length, float32 of shape `(num_samples,)`."""
-        return self._draw((1, num_samples), seed)[0]
+        return self._draw((1, num_samples), rng)[0]
 
-    def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
+    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
         from scipy.signal import lfilter
 
-        draws = np.random.default_rng(seed).standard_normal(shape)
+        draws = rng.standard_normal(shape)
         innovations, whitening = self.innovation_sd * draws, np.concatenate([[1.0], -self.coefficients])
         start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
         for place in range(start.shape[1]):  # each of the first samples is predicted from all earlier ones
-            past, sd = self.at(place)
+            past, sd = self._start[place]
             start[:, place] = start[:, :place][:, ::-1] @ past + sd * draws[:, place]
         if start.size:  # the innovations for which the filter returns these first samples
             innovations[:, : start.shape[1]] = lfilter(whitening, [1.0], start, axis=1)
@@ -203,16 +153,16 @@ class BlockBootstrap:
         """Stores noise windows of shape `(windows, samples)`, from which blocks of `block` samples are drawn."""
         return cls(windows, block)
 
-    def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(num_windows, samples)`. The same seed gives the same noise."""
-        return self._draw((num_windows, self.windows.shape[1]), seed)
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples)`. The signal has no effect."""
+        return self._draw((number, self.windows.shape[1]), rng)
 
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws one series of any length, float32 of shape `(num_samples,)`. Consecutive blocks are independent."""
-        return self._draw((1, num_samples), seed)[0]
+        return self._draw((1, num_samples), rng)[0]
 
-    def _draw(self, shape: tuple[int, int], seed: int | np.random.Generator) -> np.ndarray:
-        rng, (num_rows, samples) = np.random.default_rng(seed), shape
+    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
+        num_rows, samples = shape
         chain = (num_rows, -(-samples // self.block) + 1)
         sources = rng.integers(0, len(self.windows), chain)
         begins = rng.integers(0, self.windows.shape[1] - self.block + 1, chain)

@@ -1,4 +1,4 @@
-"""Resampled residuals: noise models without networks, which draw whole windows of real noise (baselines of section 2.3)."""
+"""Resampled residuals: noise models that draw whole windows of real noise (baselines of section 2.3)."""
 
 import math
 from collections.abc import Callable
@@ -26,8 +26,7 @@ class WindowBootstrap:
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples)`.
-        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap, or it is not known, as in models that were
-            saved before.
+        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
 
     Raises:
         InputError: If there is no window, a value is not finite, or `starts` are not a whole number for each window.
@@ -41,19 +40,13 @@ class WindowBootstrap:
         """Stores noise windows of shape `(windows, samples)`, and where they start."""
         return cls(windows, starts)
 
-    @property
-    def scale(self) -> float:
-        """Standard deviation of the noise."""
-        return float(np.std(self.windows, dtype=np.float64))
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows, float32 of shape `(number, samples)`. The signal has no effect."""
+        draws, everything = _SparingDraws(self, rng), np.arange(len(self.windows))
+        return self.windows[[draws.draw(everything) for _ in range(number)]]
 
-    def generate(self, num_windows: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws windows, float32 of shape `(num_windows, samples)`. The same seed gives the same windows."""
-        draws, everything = _SparingDraws(self, np.random.default_rng(seed)), np.arange(len(self.windows))
-        return self.windows[[draws.draw(everything) for _ in range(num_windows)]]
-
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator) -> np.ndarray:
-        """Draws a series of any length without seams, float32 of shape `(num_samples,)`. The same seed gives the same series."""
-        rng = np.random.default_rng(seed)
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws a series of any length without seams, float32 of shape `(num_samples,)`. The signal has no effect."""
         mean = float(np.mean(self.windows, dtype=np.float64))
         return _cross_faded(self.windows.shape[1], num_samples, rng, lambda starts: (self.generate(len(starts), rng), mean))
 
@@ -80,8 +73,6 @@ class MatchedWindowBootstrap:
         InputError: If there is no window, a value is not finite, the numbers of windows differ, or `starts` are not whole numbers.
     """
 
-    follows_signal = True
-
     def __init__(self, windows: np.ndarray, signals: np.ndarray, starts: np.ndarray | None = None):
         (self.windows, self.starts), self.signals = _checked(windows, starts), np.asarray(signals, np.float32)
         expected = (len(self.windows), min(_NUM_SEGMENTS, self.windows.shape[1]))
@@ -89,41 +80,39 @@ class MatchedWindowBootstrap:
             raise InputError(f"Expected the finite signal of each window, shape {expected}. Received: shape {self.signals.shape}.")
 
     @classmethod
-    def fit(cls, windows: np.ndarray, signal_windows: np.ndarray, starts: np.ndarray | None = None) -> "MatchedWindowBootstrap":
+    def fit(cls, windows: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> "MatchedWindowBootstrap":
         """Stores noise windows, the signal below them, both of shape `(windows, samples)`, and where they start."""
-        return cls(windows, _segment_means(signal_windows, np.shape(windows)), starts)
+        return cls(windows, _segment_means(signal, np.shape(windows)), starts)
 
-    @property
-    def scale(self) -> float:
-        """Standard deviation of the noise."""
-        return float(np.std(self.windows, dtype=np.float64))
-
-    def generate(self, num_windows: int, seed: int | np.random.Generator, signal_windows: np.ndarray) -> np.ndarray:
-        """Draws windows. The same seed gives the same windows.
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows.
 
         Args:
-            num_windows: Number of windows.
-            seed: Seed, or a random number generator, whose state advances.
-            signal_windows: The signal that the noise is added to, shape `(num_windows, samples)`, in the unit of the fit.
+            number: Number of windows.
+            rng: Random number generator.
+            signal: The signal that the noise is added to, shape `(number, samples)`, in the unit of the fit.
 
         Returns:
-            float32 array of shape `(num_windows, samples)`.
+            float32 array of shape `(number, samples)`.
+
+        Raises:
+            InputError: If there is no finite signal of this shape.
         """
-        drawn, _ = self._draw(signal_windows, num_windows, np.random.default_rng(seed), with_mean=False)
+        drawn, _ = self._draw(signal, number, rng, with_mean=False)
         return drawn
 
-    def generate_series(self, num_samples: int, seed: int | np.random.Generator, signal: np.ndarray) -> np.ndarray:
-        """Draws a series of any length without seams. The same seed gives the same series.
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws a series of any length without seams.
 
         Args:
             num_samples: Length of the series.
-            seed: Seed, or a random number generator, whose state advances.
+            rng: Random number generator.
             signal: The signal that the noise is added to, shape `(num_samples,)`, in the unit of the fit.
 
         Returns:
             float32 array of shape `(num_samples,)`.
         """
-        rng, window, signal = np.random.default_rng(seed), self.windows.shape[1], np.asarray(signal, np.float32)
+        window, signal = self.windows.shape[1], np.asarray(signal, np.float32)
         if signal.shape != (num_samples,):
             raise InputError(f"Expected the enhanced signal of shape {(num_samples,)}, which this noise follows. Received: {signal.shape}.")
 
@@ -134,13 +123,13 @@ class MatchedWindowBootstrap:
         return _cross_faded(window, num_samples, rng, draw)
 
     def _draw(
-        self, signal_windows: np.ndarray, number: int, rng: np.random.Generator, with_mean: bool
+        self, signal: np.ndarray | None, number: int, rng: np.random.Generator, with_mean: bool
     ) -> tuple[np.ndarray, np.ndarray | float]:
         """Draws windows, and computes the mean of the windows that each was drawn from."""
         from sklearn.metrics.pairwise import euclidean_distances
 
         window, draws = self.windows.shape[1], _SparingDraws(self, rng)
-        wanted = _segment_means(signal_windows, (number, window)).astype(np.float64)
+        wanted = _segment_means(signal, (number, window)).astype(np.float64)
         centre = self.signals.mean(axis=0, dtype=np.float64)
         known, wanted = self.signals - centre, wanted - centre  # smaller numbers, smaller rounding errors
         nearest = math.ceil(math.sqrt(len(known)))
@@ -199,16 +188,14 @@ def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray
     return windows, starts.astype(np.int64)
 
 
-def _segment_means(signal_windows: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def _segment_means(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     """Returns the means of signals over segments of nearly equal length, shape `(windows, segments)`."""
-    if signal_windows is None or np.shape(signal_windows) != shape:
-        raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal_windows)}.")
-    if not np.isfinite(signal_windows).all():
+    if signal is None or np.shape(signal) != shape:
+        raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal)}.")
+    if not np.isfinite(signal).all():
         raise InputError("Expected a finite enhanced signal, which this noise follows. Received: values that are not finite.")
     edges = np.linspace(0, shape[1], min(_NUM_SEGMENTS, shape[1]) + 1).astype(int)
-    return np.add.reduceat(np.asarray(signal_windows, np.float64), edges[:-1], axis=1).astype(np.float32) / np.diff(edges).astype(
-        np.float32
-    )
+    return np.add.reduceat(np.asarray(signal, np.float64), edges[:-1], axis=1).astype(np.float32) / np.diff(edges).astype(np.float32)
 
 
 def _cross_faded(

@@ -11,7 +11,7 @@ from enhsim_tf.common.size_limits import MAX_COLUMNS, load_npy
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding
 from enhsim_tf.telemetry.commands import has_commands
-from enhsim_tf.telemetry.tables import NO_TIME
+from enhsim_tf.telemetry.reading.clock import NO_TIME
 
 
 def load_array(path: str | os.PathLike) -> np.ndarray:

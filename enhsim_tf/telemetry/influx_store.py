@@ -11,12 +11,12 @@ import json
 import re
 import urllib.parse
 from collections.abc import Iterator, Mapping
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.influx_client import FIRST_NS, LAST_NS, InfluxServer, escape, quote
+from enhsim_tf.telemetry.influx_client import FIRST_NS, LAST_NS, InfluxServer, quote
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 
 SCHEME = "influxdb://"
@@ -24,7 +24,7 @@ _ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions ha
 _CHANNEL, _VERSION = "channel", "version"  # tags of the series written by this class
 _IS_VERSION = re.compile(r"[0-9a-f]{16}")
 _DESCRIBED = [field.name for field in dataclasses.fields(Telemetry) if field.name != "values"]
-_SHOWN = 8  # number of names listed in a message
+_SHOWN = 3  # number of series listed in a message
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,35 +61,21 @@ def parse_location(text: str) -> InfluxLocation:
     Raises:
         InputError: If the text does not have this form.
     """
-
-    def refuse(why: str) -> NoReturn:
+    path, _, query = str(text).removeprefix(SCHEME).partition("?")
+    try:
+        if not str(text).startswith(SCHEME):
+            raise ValueError
+        str(text).encode()  # half a character is no text
+        bucket, measurement, field = (urllib.parse.unquote(part, errors="strict") for part in path.split("/"))
+        pairs = [pair.split("=") for pair in query.split("&")] if query else []
+        tags = {urllib.parse.unquote(key, errors="strict"): urllib.parse.unquote(value, errors="strict") for key, value in pairs}
+        if len(tags) < len(pairs) or not all((bucket, measurement, field, *tags, *tags.values())):
+            raise ValueError
+    except ValueError:
         raise InputError(
-            f"Expected {SCHEME}bucket/measurement/field?tag=value. Received: {text!r}, {why}. Percent-encode /, ?, &, = and % in names."
-        )
-
-    def decode(part: str) -> str:
-        try:
-            return urllib.parse.unquote(part, errors="strict")
-        except UnicodeError:
-            refuse("which is not UTF-8")
-
-    if not isinstance(text, str) or not text.startswith(SCHEME):
-        refuse(f"which does not begin with {SCHEME}")
-    if any("\ud800" <= letter <= "\udfff" for letter in text):
-        refuse("which is not UTF-8")
-    path, _, query = text.removeprefix(SCHEME).partition("?")
-    parts = [decode(part) for part in path.split("/")]
-    for number, what in enumerate(("bucket", "measurement", "field")):
-        if len(parts) <= number or not parts[number]:
-            refuse(f"which names no {what}")
-    if len(parts) > 3:
-        refuse("which has more than three parts")
-    tags = [tuple(decode(part) for part in pair.split("=")) for pair in query.split("&")] if query else []
-    if not all(len(pair) == 2 and all(pair) for pair in tags):
-        refuse("whose tags are not all of the form tag=value")
-    if len(dict(tags)) < len(tags):
-        refuse("which names a tag twice")
-    return InfluxLocation(*parts, tuple(sorted(tags)))
+            f"Expected {SCHEME}bucket/measurement/field?tag=value, each tag once. Received: {text!r}. Percent-encode /, ?, &, = and % in names."
+        ) from None
+    return InfluxLocation(bucket, measurement, field, tuple(sorted(tags.items())))
 
 
 class InfluxStore:
@@ -119,8 +105,6 @@ class InfluxStore:
     def __repr__(self) -> str:
         return f"InfluxStore({str(self.location)!r})"
 
-    # -- the interface of all stores -----------------------------------------------------------------------------------
-
     def write(self, telemetry: Telemetry) -> None:
         """Stores a series atomically under its name. An existing series of that name is replaced.
 
@@ -135,7 +119,7 @@ class InfluxStore:
         self._check_names(telemetry.name)
         version, about = self._describe(telemetry, values)
         tags = dict(self.location.tags) | {_CHANNEL: _as_tag(telemetry.name), _VERSION: version}
-        begin = f"{escape(self.location.measurement, ', ')}{_tag_set(tags)} {escape(self.location.field)}="
+        begin = f"{_escape(self.location.measurement, ', ')}{_tag_set(tags)} {_escape(self.location.field)}="
         for first in range(0, len(values), self.batch_size):
             # float32 to float64 is exact, and so is the shortest decimal form of the float64
             batch = zip(*(array[first : first + self.batch_size].tolist() for array in (values, times)), strict=True)
@@ -181,8 +165,6 @@ class InfluxStore:
         """The sorted names of the stored series."""
         return sorted(self._abouts())
 
-    # -- further methods of this store ---------------------------------------------------------------------------------
-
     def check(self) -> None:
         """Checks the connection to the server with an empty query.
 
@@ -219,8 +201,6 @@ class InfluxStore:
             self._check_one_series()
             chosen = self._filter()
         yield from self.server.stream(chosen, start, stop)
-
-    # -- names, descriptions and queries -------------------------------------------------------------------------------
 
     def _check_names(self, name: str) -> None:
         """Raises an `InputError` for names that line protocol cannot express, and for tags that the store uses itself."""
@@ -270,29 +250,11 @@ class InfluxStore:
 
     def _check_one_series(self) -> None:
         rows = self.server.ask(f"{self.server.points()} {self._filter()} |> first()", _SHOWN)
-        apart = [tuple(sorted(_tags_of(row).items())) for row in rows]
-        if len(apart) > 1:
-            differ = [pairs for pairs in apart if set(pairs) - set.intersection(*map(set, apart))] or apart
-            shown = " or ".join(str(dataclasses.replace(self.location, tags=pairs)) for pairs in differ[:3])
-            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {shown}.")
-        if not apart:
-            raise InputError(self._what_is_missing())
-
-    def _what_is_missing(self) -> str:
-        place = self.location
-        wanted = [("_measurement", place.measurement), ("_field", place.field), *place.tags]
-        for number, (key, value) in enumerate(wanted):
-            such = " and ".join(f"r[{quote(tag)}] == {quote(name)}" for tag, name in wanted[:number]) or "true"
-            query = (
-                f'import "influxdata/influxdb/schema" schema.tagValues(bucket: {quote(place.bucket)}, tag: {quote(key)}, '
-                f"predicate: (r) => {such}, start: time(v: {FIRST_NS}), stop: time(v: {LAST_NS}))"
-            )
-            known = sorted(str(row["_value"]) for row in self.server.ask(query) if row["_value"] not in (None, _ABOUT))
-            if value not in known:
-                what = {"_measurement": f"a measurement of bucket {place.bucket!r}", "_field": f"a field of {place.measurement!r}"}
-                shown = ", ".join(known[:_SHOWN]) + (" and more" if len(known) > _SHOWN else "") if known else "there is none"
-                return f"Expected {what.get(key, f'a value of tag {key!r}')}: {shown}. Received: {value!r}. Name one that is there."
-        return f"Expected points at {place}. Received: none with all of these tags. Leave one out or correct it."
+        found = [str(dataclasses.replace(self.location, tags=tuple(sorted(_tags_of(row).items())))) for row in rows]
+        if len(found) > 1:
+            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {' or '.join(found)}.")
+        if not found:
+            raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
 
 
 def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
@@ -344,5 +306,10 @@ def _as_tag(name: str) -> str:
     return "".join(sign if sign.isprintable() and sign not in "%\\" else urllib.parse.quote(sign) for sign in name)
 
 
+def _escape(name: str, characters: str = ",= ") -> str:
+    """Escapes a name for line protocol with backslashes before `characters`."""
+    return re.sub(f"[{characters}]", lambda found: f"\\{found[0]}", name)
+
+
 def _tag_set(tags: dict[str, str]) -> str:
-    return "".join(f",{escape(key)}={escape(value)}" for key, value in sorted(tags.items()))
+    return "".join(f",{_escape(key)}={_escape(value)}" for key, value in sorted(tags.items()))

@@ -5,13 +5,11 @@ of the address. A reader is called as `reader(source, columns, time, options)`, 
 returns the raw channels by name. This module imports nothing slow, so that the command line can list the sources.
 """
 
-FILES = {
-    ".csv": "enhsim_tf.telemetry.tables:read_table_channels",
-    ".tsv": "enhsim_tf.telemetry.tables:read_table_channels",
-    ".txt": "enhsim_tf.telemetry.tables:read_table_channels",
-    ".parquet": "enhsim_tf.telemetry.tables:read_table_channels",
-    ".npy": "enhsim_tf.telemetry.arrays:read_array_channels",
-}
+_TABLES = (".csv", ".tsv", ".txt", ".parquet", ".xlsx", ".xlsm")
+PACKED = (".gz", ".zip")
+"""Endings of packed files, each with one table inside."""
+FILES = dict.fromkeys((*_TABLES, *PACKED), "enhsim_tf.telemetry.reading.channels:read_table_channels")
+FILES[".npy"] = "enhsim_tf.telemetry.arrays:read_array_channels"
 """Maps the ending of a file's name to the path `module:function` of its reader. The stages of the reproduction read these as imports."""
 
 ADDRESSES = {"influxdb://bucket/measurement/field?tag=value": "enhsim_tf.telemetry.stores:read_influx_channels"}
@@ -20,6 +18,5 @@ ADDRESSES = {"influxdb://bucket/measurement/field?tag=value": "enhsim_tf.telemet
 FOLDER = "enhsim_tf.telemetry.stores:read_folder_channels"
 """The reader of a folder, which is called with the one channel in `columns` for `folder#channel`."""
 
-_endings = list(FILES)
-SOURCES = f"a {', '.join(_endings[:-1])} or {_endings[-1]} file, the folder of a store, folder#channel, or {' or '.join(ADDRESSES)}"
+SOURCES = f"a {', '.join(FILES)} file, several files of tables, a folder of them, the folder of a store, folder#channel, or {' or '.join(ADDRESSES)}"
 """All sources as text, for help and messages."""

@@ -16,24 +16,28 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.pandas_series import from_series
+from enhsim_tf.telemetry.reading.channels import read_table_channels
+from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.registry import ADDRESSES, FILES, FOLDER, SOURCES
 from enhsim_tf.telemetry.series import Telemetry, check_values
-from enhsim_tf.telemetry.tables import NO_TIME
+
+Source = str | os.PathLike | Sequence[str | os.PathLike] | pd.DataFrame | pd.Series
 
 
 def read_source(
-    source: str | os.PathLike, columns: Sequence[str] | None = None, time: str | None = None, options: Cleaning | None = None
+    source: Source, columns: Sequence[str] | None = None, time: str | None = None, options: Cleaning | None = None
 ) -> dict[str, pd.Series]:
     """Reads raw channels from a source.
 
     Args:
-        source: A `.csv`, `.parquet` or `.npy` file, the folder of a `ParquetStore`, `folder#channel`, or
-            `influxdb://bucket/measurement/field?tag=value`.
+        source: A table (`.csv`, `.tsv`, `.txt`, `.parquet`, `.xlsx`, also inside `.gz` or `.zip`), several tables with the same columns, a
+            folder of tables, a `.npy` file, the folder of a `ParquetStore`, `folder#channel`,
+            `influxdb://bucket/measurement/field?tag=value`, or a pandas DataFrame or Series.
         columns: Names of the channels: columns of a table, column numbers of an array, or series of a store. None: all
             channels that hold numbers.
         time: Name of a table's time column. None: the column is detected, if there is one. `NO_TIME` ("none"): the samples
             are counted.
-        options: Options for parsing times: `time_unit`, `time_format` and `on_bad_times`. Other options are ignored here.
+        options: How times, labels, series and numbers are read; see `Cleaning`.
 
     Returns:
         Raw channels by name, in the order of the source. A channel with times has a `DatetimeIndex`, with NaT where a time is
@@ -42,12 +46,21 @@ def read_source(
     Raises:
         InputError: If the source cannot be read, or a column does not exist.
     """
-    source, options = os.fspath(source), options or Cleaning()
+    options = options or Cleaning()
     if isinstance(columns, str):
         columns = [columns]
     columns = None if columns is None else [str(column) for column in columns]
     if columns is not None and (not columns or len(set(columns)) < len(columns)):
         raise InputError(f"Expected columns of different names. Received: columns={columns}. Name each once.")
+    if isinstance(source, pd.DataFrame | pd.Series):
+        return read_table_channels(source, columns, time, options)
+    if not isinstance(source, str | os.PathLike):
+        paths = [Path(os.fspath(each)) for each in source]
+        wrong = next((path for path in paths if FILES.get(path.suffix.lower()) != FILES[".csv"] or not _exists(path)), None)
+        if wrong is not None or not paths:
+            raise InputError(f"Expected tables that exist, as several sources are files of one table. Received: {wrong}. Give one source.")
+        return read_table_channels(paths if len(paths) > 1 else paths[0], columns, time, options)
+    source = os.fspath(source)
     for form, reader in ADDRESSES.items():
         if source.startswith(form[: form.index("//") + 2]):
             return _function(reader)(source, columns, time, options)
@@ -97,7 +110,7 @@ def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str
     path = Path(path)
     if not _exists(path) or path.is_dir():
         raise InputError(f"Expected a telemetry file. Received: {path}, which does not exist or is not a file. Check the path.")
-    channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, Cleaning(time_unit="s"))
+    channels = read_source(path, None if column is None else [column], NO_TIME if time is None else time, Cleaning(time_format="s"))
     if len(channels) > 1:
         known = ", ".join(list(channels)[:8])
         raise InputError(f"Expected one column. Received: {len(channels)} in {path.name} ({known}). Name one with --column.")

@@ -9,6 +9,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.parquet_store import ParquetStore
+from enhsim_tf.telemetry.reading.channels import read_table_channels
+from enhsim_tf.telemetry.reading.files import files_of
 from enhsim_tf.telemetry.registry import SOURCES
 
 
@@ -34,12 +36,14 @@ def read_influx_channels(source: str, columns: list[str] | None, time: str | Non
 
 
 def read_folder_channels(folder: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
-    """Reads the series of a `ParquetStore`; see `sources.read_source`, which calls it. `options` has no effect, as above."""
+    """Reads the series of a `ParquetStore`, or the tables in a folder; see `sources.read_source`, which calls it."""
     if (folder / "labeled_anomalies.csv").is_file():
         raise InputError(
             f"Expected a store's folder. Received: {folder}, which holds labelled channels. "
             "Load it with load_labelled, or name one array, such as train/T-1.npy with column 0."
         )
+    if files_of(folder):  # a store has only folders inside
+        return read_table_channels(folder, columns, time, options)
     if time is not None:
         raise InputError(f"Expected time with a table only. Received: time={time!r} with the store {folder}. Leave it out.")
     store = ParquetStore(folder)

@@ -1,4 +1,4 @@
-"""Detectors that are trained on simulated or real telemetry and judged on the fine simulator with noise."""
+"""The enhanced simulator as a source of training data for detectors and as a reference, judged on the fine simulator with noise."""
 
 import functools
 from collections.abc import Mapping
@@ -10,50 +10,30 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.ladder import fit_rung
-from enhsim_tf.noise.surrogates import GaussianAutoregression
-from studies.battery.errors import about, fault_windows
+from studies.battery.errors import about
 from studies.battery.faults import ALL, Fault
 from studies.battery.orbits import ORBIT_SAMPLES
 from studies.battery.record import Recorded
-from studies.battery.windows import WINDOW, PairWindows, coarse_windows, pair_windows
+from studies.battery.windows import WINDOW, PairWindows, coarse_windows, judged_windows, pair_windows
 
-COARSE, CLEAN, ENHANCED = "coarse", "fine without noise", "enhanced"
-RESAMPLED, AUTOREGRESSION, CONVOLUTIONAL = "enhanced + residuals drawn again", "enhanced + AR", "enhanced + convolutional GAN"
+COARSE, ENHANCED, WITH_RESIDUALS = "coarse", "enhanced", "enhanced + residual windows"
 REAL_15, REAL_60, REAL_120 = "real, 15 orbits", "real, 60 orbits", "real, 120 orbits"
-ARMS = (COARSE, CLEAN, ENHANCED, RESAMPLED, AUTOREGRESSION, CONVOLUTIONAL, REAL_15, REAL_60, REAL_120)
-"""What detectors learn from. The simulator was fitted to the 60 orbits of `real, 60 orbits`; it generates as many orbits as
-`real, 120 orbits` has. Half of the orbits of an arm are for training and half for the threshold; of the real ones that the
-simulator was fitted to, two thirds and one third."""
-RESIDUALS = {"residual of the enhanced run": True, "residual of the coarse run": False}
-"""The simulator as a detector: the difference between the telemetry and the run of the planned orbits, enhanced or not."""
+SOURCES = (COARSE, ENHANCED, WITH_RESIDUALS, REAL_15, REAL_60, REAL_120)
+"""Training data of detectors. The simulator was fitted to the 60 orbits of `real, 60 orbits`; it generates as many orbits as
+`real, 120 orbits` has. Half of the orbits are for training and half for the threshold; of the real ones that the simulator was
+fitted to, two thirds and one third."""
+ENHANCED_RUN, COARSE_RUN = "reference: enhanced run", "reference: coarse run"
+"""The simulator as a reference: the difference between the telemetry and the run of the planned orbits, enhanced or not."""
 NETWORKS = ("dense autoencoder", "convolutional autoencoder")
+"""Detectors that take long to train. They learn `OF_NETWORKS` only."""
+OF_NETWORKS = (WITH_RESIDUALS, REAL_60, REAL_120)
 RATE = 0.01
 """False-alarm rate for which every threshold is set."""
 NUM = 1_000  # windows for training, and as many for the threshold
-_ORDER = 60  # largest order of the autoregression
-_PART_ORBITS = 15  # of the smallest real arm
+_PART_ORBITS = 15  # of the smallest real training data
 _NUM_FOLDS = 3
 
-Arms = dict[str, tuple[np.ndarray, np.ndarray]]
-
-
-def cross_fitted_residuals(pairs: PairWindows, rung: str, seed: int) -> np.ndarray:
-    """Returns telemetry minus enhanced windows, each window enhanced by a rung that has not learnt from its time.
-
-    Windows that lie across the edge of a block of time are left out.
-
-    Args:
-        pairs: Nominal windows.
-        rung: A rung of `enhancer.ladder`.
-        seed: Seed of the networks.
-    """
-    edges = block_edges(int(pairs.starts.min()), int(pairs.starts.max()) + WINDOW, WINDOW)
-    found = []
-    for fold in range(_NUM_FOLDS):
-        learnt, rest = split_fold(pairs.starts, WINDOW, edges, fold)
-        fitted = fit_rung(rung, pairs.coarse[learnt], pairs.telemetry[learnt], pairs.starts[learnt], seed)
-        found.append(pairs.telemetry[rest] - fitted.predict(pairs.coarse[rest]))
-    return np.concatenate(found)
+Rows = list[dict[str, Any]]
 
 
 class Judge:
@@ -62,93 +42,92 @@ class Judge:
     Args:
         recorded: The runs.
         pairs: The windows that the simulator is fitted to.
-        rung: The enhancer, a rung of `enhancer.ladder`.
+        candidate: The enhancer, one of `errors.CANDIDATES`.
         seed: Seed of everything drawn.
     """
 
-    def __init__(self, recorded: Recorded, pairs: PairWindows, rung: str, seed: int):
-        self.recorded, self.pairs, self.seed = recorded, pairs, seed
-        self.enhancer = fit_rung(rung, pairs.coarse, pairs.telemetry, pairs.starts, seed)
+    def __init__(self, recorded: Recorded, pairs: PairWindows, candidate: str, seed: int):
+        self.recorded, self.pairs, self.candidate, self.seed = recorded, pairs, candidate, seed
+        self.enhance = self._fit(slice(None)).predict
         self.num_fit, self.num_coarse = (len(recorded.get(part, "coarse")) // ORBIT_SAMPLES - 1 for part in ("fit", "coarse"))
         self.num_stretches = max(1, len(recorded.get("test", "coarse")) // len(recorded.get("fault", "coarse")))
 
+    def _fit(self, rows: Any) -> Any:
+        return fit_rung(self.candidate, self.pairs.coarse[rows], self.pairs.telemetry[rows], self.pairs.starts[rows], self.seed)
+
     @functools.cached_property
     def residuals(self) -> np.ndarray:
-        """Residual windows of the orbits that the simulator is fitted to, see `cross_fitted_residuals`."""
-        return cross_fitted_residuals(self.pairs, self.enhancer.name, self.seed)
+        """Telemetry minus enhanced windows, each window enhanced by a fit that has not learnt from its time, shape `(windows, WINDOW)`.
+
+        Windows that lie across the edge of a block of time are left out.
+        """
+        starts, found = self.pairs.starts, []
+        edges = block_edges(int(starts.min()), int(starts.max()) + WINDOW, WINDOW)
+        for fold in range(_NUM_FOLDS):
+            learnt, rest = split_fold(starts, WINDOW, edges, fold)
+            found.append(self.pairs.telemetry[rest] - self._fit(learnt).predict(self.pairs.coarse[rest]))
+        return np.concatenate(found)
 
     @functools.cached_property
     def test(self) -> dict[Fault | None, PairWindows]:
         """Windows of the fine simulator on which detectors are judged: nominal (None) and under each fault."""
-        return {fault: fault_windows(self.recorded, fault, self.seed) for fault in (None, *ALL)}
+        return {fault: judged_windows(self.recorded, fault, self.seed) for fault in (None, *ALL)}
+
+    def differences(self, is_enhanced: bool = True) -> dict[Fault | None, np.ndarray]:
+        """Telemetry of the windows of `test` minus the run of the planned orbits, enhanced or not, shape `(windows, WINDOW)`."""
+        found = {}
+        for fault in self.test:
+            pairs = judged_windows(self.recorded, fault, self.seed, is_planned=True)
+            found[fault] = pairs.telemetry - (self.enhance(pairs.coarse) if is_enhanced else pairs.coarse[:, :, 0])
+        return found
 
     def noise(self, number: int, stream: int) -> np.ndarray:
         """Draws whole residual windows again, shape `(number, WINDOW)`."""
         return self.residuals[np.random.default_rng([self.seed, stream]).integers(0, len(self.residuals), number)]
 
-    def arms(self) -> Arms:
-        """Training windows and threshold windows of each arm, except for the GAN's."""
-        coarse, _ = coarse_windows(self.recorded, "coarse", 2 * NUM)
-        enhanced = self.enhancer.predict(coarse)
-        autoregression = GaussianAutoregression.fit(self.residuals, _ORDER)
-        fit, more = (pair_windows(self.recorded, part, NUM, self.seed) for part in ("fit", "more"))
-        part_samples = (_PART_ORBITS + 1) * ORBIT_SAMPLES
-        halves = {
-            COARSE: coarse[:, :, 0],
-            ENHANCED: enhanced,
-            RESAMPLED: enhanced + self.noise(len(enhanced), 1),
-            AUTOREGRESSION: enhanced + autoregression.generate(len(enhanced), np.random.default_rng([self.seed, 2])),
-        }
-        arms = {name: apart(windows, 1 / 2, self.num_coarse) for name, windows in halves.items()}
-        arms[CLEAN] = fit.fine, more.fine
+    def sources(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Training windows and threshold windows of each of `SOURCES`."""
+        coarse = coarse_windows(self.recorded, "coarse", 2 * NUM)
+        enhanced = self.enhance(coarse)
+        generated = {COARSE: coarse[:, :, 0], ENHANCED: enhanced, WITH_RESIDUALS: enhanced + self.noise(len(enhanced), 1)}
+        fit, more = (pair_windows(self.recorded, part, NUM, self.seed).telemetry for part in ("fit", "more"))
         dense = pair_windows(self.recorded, "fit", 2 * NUM, self.seed)
-        arms[REAL_15] = apart(dense.telemetry[dense.starts + WINDOW <= part_samples], 2 / 3, _PART_ORBITS)
-        arms[REAL_60] = apart(dense.telemetry, 2 / 3, self.num_fit)
-        arms[REAL_120] = fit.telemetry, more.telemetry
-        return {name: arms[name] for name in ARMS if name in arms}
+        is_early = dense.starts + WINDOW <= (_PART_ORBITS + 1) * ORBIT_SAMPLES
+        return {name: apart(windows, 1 / 2, self.num_coarse) for name, windows in generated.items()} | {
+            REAL_15: apart(dense.telemetry[is_early], 2 / 3, _PART_ORBITS),
+            REAL_60: apart(dense.telemetry, 2 / 3, self.num_fit),
+            REAL_120: (fit, more),
+        }
 
-    def convolutional_arm(self, num_iterations: int, verbose: bool = False) -> Arms:
-        """The arm of enhanced windows with noise of the convolutional GAN, which learns the residuals."""
-        from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+    def source_rows(self, with_networks: bool) -> Rows:
+        """Trains detectors on each of `SOURCES` and judges them; see `alarm_rows`."""
+        rows = []
+        for training, (learnt, held_out) in self.sources().items():
+            for name, make in DETECTORS.items():
+                if name in NETWORKS and not (with_networks and training in OF_NETWORKS):
+                    continue
+                score = make(self.seed).fit(learnt).score
+                scores = {fault: score(pairs.telemetry) for fault, pairs in self.test.items()}
+                rows += alarm_rows(training, name, score(held_out), scores, self.num_stretches)
+        return rows
 
-        gan = convolutional_noise_gan(self.residuals, num_iterations, self.seed)
-        gan.fit(self.residuals, num_iterations, verbose=verbose)
-        coarse, _ = coarse_windows(self.recorded, "coarse", 2 * NUM)
-        return {CONVOLUTIONAL: apart(self.enhancer.predict(coarse) + gan.generate(2 * NUM, self.seed), 1 / 2, self.num_coarse)}
-
-    def rows(self, arms: Mapping[str, tuple[np.ndarray, np.ndarray]], names: tuple[str, ...]) -> list[dict[str, Any]]:
-        """Trains detectors on each arm and judges them; see `judge`."""
-        found = []
-        for arm, (training, held_out) in arms.items():
-            for name in names:
-                detector = DETECTORS[name](self.seed).fit(training)
-                scores = {fault: detector.score(pairs.telemetry) for fault, pairs in self.test.items()}
-                found += judge(arm, name, detector.score(held_out), scores, self.num_stretches)
-        return found
-
-    def residual_rows(self) -> list[dict[str, Any]]:
+    def reference_rows(self) -> Rows:
         """Judges the root-mean-square residual of each window. Its threshold comes from the orbits that the simulator is fitted to."""
-        found = []
-        for arm, is_enhanced in RESIDUALS.items():
-            fitted = self.residuals if is_enhanced else self.pairs.telemetry - self.pairs.coarse[:, :, 0]
-            scores = {}
-            for fault in self.test:
-                pairs = fault_windows(self.recorded, fault, self.seed, is_planned=True)
-                run = self.enhancer.predict(pairs.coarse) if is_enhanced else pairs.coarse[:, :, 0]
-                scores[fault] = _rms(pairs.telemetry - run)
-            found += judge(arm, "residual", _rms(fitted), scores, self.num_stretches)
-        return found
+        fitted = {ENHANCED_RUN: self.residuals, COARSE_RUN: self.pairs.telemetry - self.pairs.coarse[:, :, 0]}
+        rows = []
+        for reference, nominal in fitted.items():
+            scores = {fault: _rms(each) for fault, each in self.differences(reference == ENHANCED_RUN).items()}
+            rows += alarm_rows(reference, "residual", _rms(nominal), scores, self.num_stretches)
+        return rows
 
 
-def judge(
-    arm: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray], num_stretches: int
-) -> list[dict[str, Any]]:
-    """Judges a detector at the conformal threshold of `RATE` on held-out windows of its arm.
+def alarm_rows(training: str, detector: str, held_out: np.ndarray, scores: Mapping[Fault | None, np.ndarray], num_stretches: int) -> Rows:
+    """Judges a detector at the conformal threshold of `RATE` on held-out nominal windows.
 
     Args:
-        arm: What it learnt from.
+        training: What it learnt from.
         detector: Its name.
-        held_out: Scores of nominal windows of the arm.
+        held_out: Scores of nominal windows of its training data.
         scores: Scores of the fine simulator's nominal windows (None) and of its windows under each fault, in the order of time.
         num_stretches: Number of stretches of the nominal run that are each as long as the run of a fault.
 
@@ -167,7 +146,7 @@ def judge(
         rows.append(
             about(fault)
             | {
-                "arm": arm,
+                "training": training,
                 "detector": detector,
                 "alarms": float(np.mean(each > limit)),
                 "alarms_at_real_rate": float(np.mean(rest > real_limit)),

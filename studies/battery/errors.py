@@ -6,18 +6,18 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.detection.metrics import threshold
-from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, Ladder, fit_ladder, fit_rung
+from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, fit_ladder, fit_rung
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
 from enhsim_tf.enhancer.scaling import Scaling
 from studies.battery.faults import ALL, Fault
 from studies.battery.record import Recorded
-from studies.battery.windows import PairWindows, coarse_windows, pair_windows
+from studies.battery.windows import NUM_FAULT, NUM_TEST, PairWindows, coarse_windows, judged_windows
 
 Predict = Callable[[np.ndarray], np.ndarray]
 
-LADDER = (COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_NETWORK)
-"""The rungs that are chosen among, with every coarse column as input, the simplest first."""
+CANDIDATES = (COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_NETWORK)
+"""The enhancers that are chosen among, with every coarse column as input, the simplest first."""
 ENHANCERS = {
     "coarse itself": (COARSE, 3),
     "level and gain": (LEVEL_AND_GAIN, 1),
@@ -28,12 +28,11 @@ ENHANCERS = {
     "ridge, all columns": (RIDGE, 3),
     "ridge and network": (RIDGE_AND_NETWORK, 3),
 }
-"""For each enhancer the rung and how many of the coarse columns voltage, current and temperature it receives."""
+"""For each enhancer its kind and how many of the coarse columns voltage, current and temperature it receives."""
 FLOOR = "fine itself"
 """The fine simulator without the sensor: the error that no enhancer can be below, except by chance."""
-WITHOUT_NETWORKS = tuple(name for name, (rung, _) in ENHANCERS.items() if rung not in (NETWORK, RIDGE_AND_NETWORK))
-NUM_WINDOWS, NUM_TEST, NUM_FAULT = 1_500, 400, 40
-"""Windows for fitting, of the test orbits, and of each fault at each severity."""
+NUM_WINDOWS = 1_500
+"""Windows for fitting."""
 _RATE = 0.01  # of nominal windows that the trust score may call out of range
 
 
@@ -55,55 +54,52 @@ def fit_enhancers(pairs: PairWindows, names: tuple[str, ...], seed: int, paper_e
 
     found = {}
     for name in names:
-        rung, columns = ENHANCERS[name]
+        kind, columns = ENHANCERS[name]
         inputs = pairs.coarse[:, :, :columns]
-        if rung == "nearest":
+        if kind == "nearest":
             number = choose_num_neighbours(inputs, pairs.telemetry, pairs.starts)
             found[name] = lambda windows, number=number: nearest_windows(pairs.coarse, pairs.telemetry, windows, number)
-        elif rung == COARSE:
+        elif kind == COARSE:
             found[name] = lambda windows: windows[:, :, 0]
         else:
-            epochs = {"epochs": paper_epochs} if rung == NETWORK else {}
-            found[name] = with_columns(fit_rung(rung, inputs, pairs.telemetry, pairs.starts, seed, **epochs).predict, columns)
+            epochs = {"epochs": paper_epochs} if kind == NETWORK else {}
+            found[name] = with_columns(fit_rung(kind, inputs, pairs.telemetry, pairs.starts, seed, **epochs).predict, columns)
     return found
 
 
-def choose(pairs: PairWindows, seed: int) -> Ladder:
-    """Chooses an enhancer on held-out blocks of the orbits that it is fitted to; see `enhancer.ladder`."""
-    return fit_ladder(pairs.coarse, pairs.telemetry, pairs.starts, LADDER, seed, refit="chosen")
+def choice_rows(pairs: PairWindows, seed: int) -> list[dict[str, Any]]:
+    """Chooses one of `CANDIDATES` on held-out blocks of the orbits that it is fitted to, with a row for each candidate."""
+    ladder = fit_ladder(pairs.coarse, pairs.telemetry, pairs.starts, CANDIDATES, seed, refit="chosen")
+    return [
+        {"candidate": each.name, "error": each.error, "standard_error": each.standard_error, "is_chosen": each.name == ladder.chosen}
+        for each in ladder.judged
+    ]
 
 
-def error_rows(recorded: Recorded, enhancers: Mapping[str, Predict], seed: int, target: str = "volts") -> list[dict[str, Any]]:
+def error_rows(recorded: Recorded, enhancers: Mapping[str, Predict], seed: int) -> list[dict[str, Any]]:
     """Measures the error of enhancers on the test orbits and on every fault.
 
-    All errors are root-mean-square errors divided by the standard deviation of the fine simulator's quantity over the test
+    All errors are root-mean-square errors divided by the standard deviation of the fine simulator's voltage over the test
     windows (NRMSE), so that errors on faults are in the same unit.
 
     Args:
         recorded: The runs.
         enhancers: Functions from coarse windows to enhanced windows, by name.
         seed: Seed of the sensor's noise.
-        target: The quantity.
 
     Returns:
-        Rows with `enhancer`, `fault`, `severity` (0 for nominal), `target`, `nrmse` against the telemetry and `nrmse_true`
-        against the fine simulator without noise.
+        Rows with `enhancer`, `fault`, `severity` (0 for nominal), `nrmse` against the telemetry and `nrmse_true` against the fine
+        simulator without noise.
     """
     rows, unit = [], 0.0
     for fault in (None, *ALL):
-        pairs = fault_windows(recorded, fault, seed, target)
+        pairs = judged_windows(recorded, fault, seed)
         unit = unit or float(np.std(pairs.fine, dtype=np.float64))
         for name, predict in (*enhancers.items(), (FLOOR, None)):
             enhanced = pairs.fine if predict is None else predict(pairs.coarse)
             errors = {key: _rms(enhanced - wanted) / unit for key, wanted in (("nrmse", pairs.telemetry), ("nrmse_true", pairs.fine))}
-            rows.append(about(fault) | {"enhancer": name, "target": target} | errors)
+            rows.append(about(fault) | {"enhancer": name} | errors)
     return rows
-
-
-def fault_windows(recorded: Recorded, fault: Fault | None, seed: int, target: str = "volts", is_planned: bool = False) -> PairWindows:
-    """Windows of the test orbits, or of a fault, on which enhancers and detectors are judged."""
-    part, number = ("test", NUM_TEST) if fault is None else ("fault", NUM_FAULT)
-    return pair_windows(recorded, part, number, seed, fault, target, is_planned)
 
 
 def about(fault: Fault | None) -> dict[str, Any]:
@@ -122,12 +118,11 @@ def trust_rows(recorded: Recorded, pairs: PairWindows) -> list[dict[str, Any]]:
     """
     scaling = Scaling.fit(pairs.coarse, pairs.telemetry)
     score = OutOfRange().fit(scaling.scale_inputs(pairs.coarse))
-    nominal, _ = coarse_windows(recorded, "coarse", NUM_WINDOWS)
-    limit = threshold(score.score(scaling.scale_inputs(nominal)), _RATE)
+    limit = threshold(score.score(scaling.scale_inputs(coarse_windows(recorded, "coarse", NUM_WINDOWS))), _RATE)
     rows = []
     for fault in (None, *ALL):
         part, number = ("test", NUM_TEST) if fault is None else ("fault", NUM_FAULT)
-        windows, _ = coarse_windows(recorded, part, number, fault)
+        windows = coarse_windows(recorded, part, number, fault)
         rows.append(about(fault) | {"out_of_range": float(np.mean(score.score(scaling.scale_inputs(windows)) > limit))})
     return rows
 

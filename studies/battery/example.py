@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file
-from enhsim_tf.common.console import run_command, tell
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.console import Parser, run_command, tell
 from studies.battery.faults import SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
 from studies.battery.simulate import COLUMNS, simulate_all
@@ -66,11 +65,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Runs the command. An error of the user is reported as one line, with exit code 2."""
 
     def write() -> int:
-        given = sys.argv[1:] if arguments is None else arguments
-        if len(given) != 1 or given[0].startswith("-"):
-            raise InputError(f"Expected the output folder, such as examples/battery. Received: {' '.join(given) or 'nothing'}. Name one.")
-        write_example(Path(given[0]))
-        tell(f"telemetry and simulator with and without a fault in {given[0]}/")
+        parser = Parser(prog="python -m studies.battery.example", description="Writes the recorded pair of battery simulators.")
+        parser.add_argument("folder", type=Path, help="the output folder, such as examples/battery")
+        folder = parser.parse_args(arguments).folder
+        write_example(folder)
+        tell(f"telemetry and simulator with and without a fault in {folder}/")
         return 0
 
     return run_command(write, "interrupted; complete files are kept")

@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
 from studies.battery.orbits import ORBIT_SAMPLES, Regime
 
 SEVERITIES = (0.2, 0.4, 0.6, 0.8, 1.0)
@@ -30,20 +29,10 @@ class Fault:
     Args:
         kind: A key of `SIZES`.
         severity: One of `SEVERITIES`.
-
-    Raises:
-        InputError: If there is no such fault or severity.
     """
 
     kind: str
     severity: float
-
-    def __post_init__(self):
-        if self.kind not in SIZES or self.severity not in SEVERITIES:
-            raise InputError(
-                f"Expected one of {', '.join(SIZES)} with a severity of {', '.join(map(str, SEVERITIES))}. "
-                f"Received: {self.kind!r} with {self.severity}. Choose one of these."
-            )
 
     @property
     def size(self) -> float:

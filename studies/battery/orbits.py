@@ -28,7 +28,6 @@ class Regime:
     """How hard the battery is used.
 
     Args:
-        name: Name in tables.
         ambient_k: Temperature around the vehicle's battery, in kelvin.
         bus_a: Constant load of the bus, in amperes.
         solar_a: Current of the solar array in the sun, in amperes.
@@ -36,7 +35,6 @@ class Regime:
         stuck_a: Load of a payload that is stuck on at the largest severity, in amperes.
     """
 
-    name: str
     ambient_k: float
     bus_a: float
     solar_a: float
@@ -45,8 +43,8 @@ class Regime:
 
 
 REGIMES = {
-    "gentle": Regime("gentle", 288.15, bus_a=1.25, solar_a=3.5, pass_a=(0.5, 2.25), stuck_a=1.0),
-    "hard": Regime("hard", 268.15, bus_a=2.5, solar_a=7.0, pass_a=(2.0, 6.0), stuck_a=1.5),
+    "gentle": Regime(ambient_k=288.15, bus_a=1.25, solar_a=3.5, pass_a=(0.5, 2.25), stuck_a=1.0),
+    "hard": Regime(ambient_k=268.15, bus_a=2.5, solar_a=7.0, pass_a=(2.0, 6.0), stuck_a=1.5),
 }
 """A gentle regime, where the map from the coarse to the fine simulator is nearly linear, and a hard one: cold, with high currents."""
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,27 +12,18 @@ from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.stages import load_arrays, save_arrays
 from studies.battery.faults import ALL, Fault
-from studies.battery.orbits import ORBIT_SAMPLES, Regime, draw_load
-from studies.battery.simulate import MODELS, Run, simulate_all
+from studies.battery.orbits import Regime, draw_load
+from studies.battery.simulate import MODELS, simulate_all
 
-
-@dataclasses.dataclass(frozen=True)
-class Counts:
-    """Numbers of recorded orbits. Each run has one more, its first, in which the battery reaches its usual temperature.
-
-    Args:
-        fit: Nominal orbits of both simulators, to which the enhanced simulator is fitted.
-        more: Further nominal orbits of both, for detectors that are trained on more real telemetry.
-        test: Nominal orbits of both, on which everything is judged.
-        coarse: Nominal orbits of the coarse simulator alone, from which training data are generated.
-        fault: Orbits of both simulators under each fault at each severity.
-    """
-
-    fit: int
-    more: int
-    test: int
-    coarse: int
-    fault: int
+PARTS = {
+    "fit": ((None,), MODELS),
+    "more": ((None,), MODELS),
+    "test": ((None,), MODELS),
+    "fault": ((None, *ALL), MODELS),
+    "coarse": ((None,), ("coarse",)),
+}
+"""For each part its faults and its simulators. The enhanced simulator is fitted to `fit`. Detectors learn more real telemetry from
+`more`, everything is judged on `test` and `fault`, and training data are generated from `coarse`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +32,7 @@ class Recorded:
 
     Args:
         runs: float32 arrays of shape `(samples, 3)` with the columns `simulate.COLUMNS`, by `part/fault/model`.
-        about: `seconds` and `orbits` of each simulator, and the number of `reductions` of each run whose current was reduced.
+        about: `num_runs`, and `reduced`: how often the current was reduced, for each run in which it was.
     """
 
     runs: dict[str, np.ndarray]
@@ -50,7 +42,7 @@ class Recorded:
         """Returns a run, shape `(samples, 3)`.
 
         Args:
-            part: A field of `Counts`.
+            part: A key of `PARTS`.
             model: `coarse` or `fine`.
             fault: The fault; None for nominal.
         """
@@ -62,23 +54,14 @@ def key_of(fault: Fault | None) -> str:
     return "nominal" if fault is None else f"{fault.kind} {fault.severity:g}"
 
 
-_PARTS = {
-    "fit": ((None,), MODELS),
-    "more": ((None,), MODELS),
-    "test": ((None,), MODELS),
-    "fault": ((None, *ALL), MODELS),
-    "coarse": ((None,), ("coarse",)),
-}
-
-
-def record(folder: Path, counts: Counts, regime: Regime, seed: int, progress: Progress = SILENT) -> None:
+def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, progress: Progress = SILENT) -> None:
     """Simulates all runs of a replicate and writes them.
 
     Each part has loads of its own, drawn with the seed. All faults of a part share one load, and begin after its first orbit.
 
     Args:
         folder: An existing folder, to which `runs.npz` and `about.json` are written.
-        counts: Numbers of orbits.
+        counts: Number of orbits of each of `PARTS`. Each run has one more, its first, in which the battery reaches its usual temperature.
         regime: How hard the battery is used.
         seed: Seed of the loads.
         progress: Reports the progress.
@@ -87,24 +70,18 @@ def record(folder: Path, counts: Counts, regime: Regime, seed: int, progress: Pr
         InputError: If PyBaMM is not installed, or a solver fails at any current.
     """
     arrays: dict[str, np.ndarray] = {}
-    kept: dict[str, list[Run]] = {model: [] for model in MODELS}
     reduced: dict[str, int] = {}
-    told = progress.loop("part", len(_PARTS))
-    for number, (part, (faults, models)) in enumerate(_PARTS.items()):
-        load = draw_load(getattr(counts, part) + 1, regime, np.random.default_rng([seed, number]))
+    told = progress.loop("part", len(PARTS))
+    for number, (part, (faults, models)) in enumerate(PARTS.items()):
+        load = draw_load(counts[part] + 1, regime, np.random.default_rng([seed, number]))
         for fault, runs in zip(faults, simulate_all(load, regime, faults, models), strict=True):
             for model, run in zip(models, runs, strict=True):
                 arrays[f"{part}/{key_of(fault)}/{model}"] = run.values
-                kept[model].append(run)
             if runs[0].reductions:
                 reduced[f"{part}/{key_of(fault)}"] = runs[0].reductions
         told(number + 1)
     save_arrays(folder, arrays, "runs")
-    timed = {
-        model: {"seconds": sum(run.seconds for run in runs), "orbits": sum(len(run.values) for run in runs) / ORBIT_SAMPLES}
-        for model, runs in kept.items()
-    }
-    write_json(folder / "about.json", {"timed": timed, "reduced": reduced, "num_runs": len(arrays)})
+    write_json(folder / "about.json", {"reduced": reduced, "num_runs": len(arrays)})
 
 
 def read(folder: Path) -> Recorded:

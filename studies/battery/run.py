@@ -1,7 +1,7 @@
-"""`python -m studies.battery`: runs all replicates and writes tables, findings, figures and the page."""
+"""The cells of the study, one for each regime and seed, and the tables that they fill."""
 
 import importlib.metadata
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from studies.common.settings import Settings
 if TYPE_CHECKING:
     import pandas as pd
 
-FOLDER = "battery"  # below the folder of the figures
+TABLES = ("errors", "choice", "trust", "speed", "runs", "alarms")
 
 
 def run(settings: Settings, cache: Path, out: Path, fresh: bool, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -35,84 +35,85 @@ def run(settings: Settings, cache: Path, out: Path, fresh: bool, tell: Callable[
     Raises:
         InputError: If PyBaMM is not installed.
     """
-    from studies.battery.figures import FIGURES
-    from studies.battery.findings import KEPT, summarise
+    from studies.battery.figure import FIGURES
+    from studies.battery.summary import KEPT, summarise
 
     check_installed()
-    make_folder(out)
     first, number = settings.battery.first_seed, settings.battery.num_seeds
 
     def tables_of(regime: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
-        return replicate(settings, stages, regime, seed)
+        return tables_of_cell(settings, stages, regime, seed)
 
     replicates = seed_by_seed(tables_of, REGIMES, range(first, first + number))
     tables = collect("replicate", replicates, cache, fresh, tell)
     about = {"budget": settings.budget, "versions": {"pybamm": importlib.metadata.version("pybamm")}}
-    return write_results(tables, KEPT, summarise, FIGURES, out, about)
+    return write_results(tables, KEPT, summarise, FIGURES, make_folder(out), about)
 
 
-def replicate(settings: Settings, stages: Stages, regime: str, seed: int) -> "dict[str, pd.DataFrame]":
-    """The tables of one seed in one regime.
+def tables_of_cell(settings: Settings, stages: Stages, regime: str, seed: int) -> "dict[str, pd.DataFrame]":
+    """Simulates the runs of one seed in one regime, and judges enhancers and detectors on them.
 
     Args:
-        settings: All settings.
+        settings: All settings; `battery` is used.
         stages: Runs stages and caches their results.
         regime: A key of `orbits.REGIMES`.
         seed: The seed.
+
+    Returns:
+        The tables of `TABLES` by name.
     """
     import pandas as pd
 
-    runs = recorded(settings, stages, regime, seed)
-    chosen, found = settings.battery, []
-    first, after = None, [name_of(regime, seed)]
-    for step, depends in {
-        "errors": (chosen.paper_epochs,),
-        "detectors": (),
-        "labelled": (chosen.fault_orbits,),
-        "networks": (chosen.num_iterations,),
-    }.items():
-        if step == "networks" and seed >= chosen.first_seed + chosen.num_network_seeds:
-            continue
-
-        def make(target: Path, step: str = step, before: Path | None = first) -> None:
-            from studies.battery import study
-
-            study.STEPS[step](target, record.read(runs), regime, seed, settings, before)
-
-        name = f"battery {step} {regime} {seed}"
-        found.append(stages.run(name, make, (regime, seed, *depends), after))
-        if first is None:  # the others read what this one has chosen
-            first, after = found[0], [*after, name]
-    paths: Iterable[Path] = (path for each in found for path in sorted(each.glob("*.parquet")))
-    tables: dict[str, list[pd.DataFrame]] = {}
-    for path in paths:
-        tables.setdefault(path.stem, []).append(pd.read_parquet(path))
-    return {name: pd.concat(each, ignore_index=True).assign(regime=regime, seed=seed) for name, each in tables.items()}
-
-
-def recorded(settings: Settings, stages: Stages, regime: str, seed: int) -> Path:
-    """The folder with the recorded runs of a replicate, simulated or from the cache.
-
-    Args:
-        settings: All settings; `battery` is looked at.
-        stages: Runs stages and caches their results.
-        regime: A key of `orbits.REGIMES`.
-        seed: Seed of the replicate.
-
-    Raises:
-        InputError: If PyBaMM is not installed.
-    """
-    check_installed()
     chosen = settings.battery
-    counts = record.Counts(chosen.fit_orbits, chosen.more_orbits, chosen.test_orbits, chosen.coarse_orbits, chosen.fault_orbits)
+    counts = {part: getattr(chosen, f"{part}_orbits") for part in record.PARTS}
+    with_networks = seed < chosen.first_seed + chosen.num_network_seeds
 
-    def make(folder: Path) -> None:
+    def simulate(folder: Path) -> None:
         record.record(folder, counts, REGIMES[regime], seed, stages.progress)
 
-    depends = (counts, regime, seed, importlib.metadata.version("pybamm"))
-    return stages.run(name_of(regime, seed), make, depends)
+    simulated = f"battery {regime} {seed}"
+    runs = stages.run(simulated, simulate, (counts, regime, seed, importlib.metadata.version("pybamm")))
+
+    def judge(folder: Path) -> None:
+        for name, rows in judge_cell(record.read(runs), regime, seed, settings, with_networks).items():
+            pd.DataFrame(rows).assign(regime=regime, seed=seed).to_parquet(folder / f"{name}.parquet")
+
+    depends = (regime, seed, chosen.paper_epochs, chosen.fault_orbits, with_networks)
+    judged = stages.run(f"battery judged {regime} {seed}", judge, depends, [simulated])
+    return {name: pd.read_parquet(judged / f"{name}.parquet") for name in TABLES}
 
 
-def name_of(regime: str, seed: int) -> str:
-    """Name of the stage that simulates a replicate."""
-    return f"battery {regime} {seed}"
+def judge_cell(
+    recorded: record.Recorded, regime: str, seed: int, settings: Settings, with_networks: bool
+) -> dict[str, list[dict[str, Any]]]:
+    """The rows of all tables for recorded runs.
+
+    Args:
+        recorded: The runs.
+        regime: A key of `orbits.REGIMES`.
+        seed: The seed.
+        settings: All settings; `battery` is used.
+        with_networks: Whether autoencoders are among the detectors.
+    """
+    from studies.battery import errors
+    from studies.battery.classifiers import classifier_rows, simulate_faults
+    from studies.battery.detectors import Judge
+    from studies.battery.speed import speed_rows
+    from studies.battery.windows import pair_windows
+
+    pairs = pair_windows(recorded, "fit", errors.NUM_WINDOWS, seed)
+    enhancers = errors.fit_enhancers(pairs, tuple(errors.ENHANCERS), seed, settings.battery.paper_epochs)
+    choice = errors.choice_rows(pairs, seed)
+    judge = Judge(recorded, pairs, next(row["candidate"] for row in choice if row["is_chosen"]), seed)
+    faults = simulate_faults(settings.battery.fault_orbits, REGIMES[regime], seed)
+    reduced = recorded.about["reduced"]
+    return {
+        "errors": errors.error_rows(recorded, enhancers, seed),
+        "choice": choice,
+        "trust": errors.trust_rows(recorded, pairs),
+        "speed": speed_rows(recorded, enhancers, REGIMES[regime], seed),
+        "runs": [
+            {"num_runs": recorded.about["num_runs"], "num_reduced": len(reduced), "most_reductions": max(reduced.values(), default=0)}
+        ],
+        "alarms": judge.source_rows(with_networks) + judge.reference_rows() + classifier_rows(judge, faults),
+    }

@@ -31,7 +31,7 @@ def speed_rows(
     """
     current = battery_current(draw_load(_SPEED_ORBITS, regime, np.random.default_rng([seed, 100])), regime)
     rows = [{"what": f"{model} simulator", "seconds": _solving_time(model, current, regime) / _SPEED_ORBITS} for model in MODELS]
-    windows, _ = coarse_windows(recorded, "test", _SPEED_WINDOWS)
+    windows = coarse_windows(recorded, "test", _SPEED_WINDOWS)
     for name, predict in enhancers.items():
         predict(windows)
         began = time.process_time()

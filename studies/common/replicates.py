@@ -1,4 +1,4 @@
-"""The frame that experiments share: replicates in turn, tables of all of them, and the files that are written from the tables."""
+"""The frame that studies share: replicates in turn, tables of all of them, and the files that are written from the tables."""
 
 import functools
 import sys
@@ -67,7 +67,7 @@ def write_results(
     folder: Path,
     about: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Writes the tables of an experiment, and the findings and figures that are computed from the written tables.
+    """Writes the tables of a study, and the findings and figures that are computed from the written tables.
 
     Args:
         tables: The tables by name.
@@ -75,7 +75,7 @@ def write_results(
         summarise: Computes the findings.
         figures: The figures by name.
         folder: An existing folder.
-        about: What the findings also hold; versions of packages are joined with those of all experiments.
+        about: What the findings also hold; versions of packages are joined with those of all studies.
 
     Returns:
         The findings.

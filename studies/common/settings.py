@@ -31,7 +31,7 @@ class StudyTelemetrySettings(TelemetrySettings):
 
 @dataclasses.dataclass(frozen=True)
 class RobustnessSettings:
-    """The experiment on robustness: `python -m studies.robustness`."""
+    """The study of robustness: `python -m studies.robustness`."""
 
     num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: a signed-rank test of 10 pairs can reach p = 0.002", smoke=2)
     first_seed: int = setting(
@@ -73,29 +73,28 @@ class SecondSettings:
 
 @dataclasses.dataclass(frozen=True)
 class ModesSettings:
-    """The detailed test of degraded modes, a part of the experiment on robustness."""
+    """The detailed test of degraded modes, a part of the study of robustness."""
 
     num_windows: int = setting(300, "windows", f"{OUR_CHOICE}: test windows in each mode at each severity", smoke=40)
     windows_per_configuration: int = setting(50, "windows", f"{OUR_CHOICE}: 300 configurations are sampled", smoke=5)
 
 
 @dataclasses.dataclass(frozen=True)
-class LadderSettings:
-    """The experiment on noise that no generator was designed for: `python -m studies.noise_models`."""
+class NoiseModelsSettings:
+    """The study of noise models: `python -m studies.noise_models`."""
 
     num_seeds: int = setting(2, "seeds", f"{OUR_CHOICE}: fourteen families take hours for each seed; --seeds asks for more", smoke=1)
-    first_seed: int = setting(
-        3_008, "seed", f"{OUR_CHOICE}: models and rule were fixed before it; former ones were judged on seeds from 3000 on"
-    )
+    first_seed: int = setting(3_008, "seed", f"{OUR_CHOICE}: models and rule were fixed before it")
     num_windows: int = setting(5_000, "windows", f"{OUR_CHOICE}: windows of true noise that the models learn", smoke=120)
-    num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
-    gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
+    num_steps: int = setting(
+        600, "steps", f"{OUR_CHOICE}: of the mixture density network; its error on held-out noise falls no further", smoke=2
+    )
     num_anomalous: int = setting(30, "windows", f"{OUR_CHOICE}: anomalous windows of each kind and severity", smoke=3)
 
 
 @dataclasses.dataclass(frozen=True)
-class CurveSettings:
-    """The experiment on how few real windows suffice: `python -m studies.few_windows`."""
+class FewWindowsSettings:
+    """The study of few windows: `python -m studies.few_windows`."""
 
     num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the experiment on robustness", smoke=1)
     first_seed: int = setting(4_000, "seed", f"{OUR_CHOICE}: no design was chosen on these seeds")
@@ -108,29 +107,17 @@ class CurveSettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class CurveNetworkSettings:
-    """Networks of the experiment on how few real windows suffice. They take minutes each, so they have fewer seeds than its other arms."""
+class ClassifierSettings:
+    """Classifiers of the study of few windows. They take minutes each, so they have fewer seeds than its other training data."""
 
-    num_seeds: int = setting(2, "seeds", f"{OUR_CHOICE}: the first seeds; of the autoregressive network", smoke=1)
-    num_real: tuple[int, ...] = setting(
-        (5, 10, 20, 50, 100),
-        "windows",
-        f"{OUR_CHOICE}: from which the autoregressive network learns; more suffice alone on most noise",
-        smoke=(20,),
-    )
-    num_iterations: int = setting(3_000, "iterations", f"{OUR_CHOICE}: of the autoregressive network", smoke=4)
-    num_slow_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds; of the GANs and the classifiers")
-    num_real_gans: tuple[int, ...] = setting((20,), "windows", f"{OUR_CHOICE}: from which the GANs learn")
-    gan_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
-    num_real_classifiers: tuple[int, ...] = setting(
-        (20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,)
-    )
-    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: of the classifiers, 64 windows of each kind", smoke=20)
+    num_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds")
+    num_real: tuple[int, ...] = setting((20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,))
+    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: 64 windows of each kind", smoke=20)
 
 
 @dataclasses.dataclass(frozen=True)
 class FactorialSettings:
-    """The factorial experiment: `python -m studies.factorial`. Its other settings are those of robustness."""
+    """The factorial study: `python -m studies.factorial`. Its other settings are those of robustness."""
 
     num_seeds: int = setting(5, "seeds", f"{OUR_CHOICE}: the first seeds of the experiment on robustness; 32 cells for each", smoke=1)
 
@@ -179,9 +166,9 @@ class Settings(of_paper.Settings):
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()
     factorial: FactorialSettings = FactorialSettings()
-    ladder: LadderSettings = LadderSettings()
-    curve: CurveSettings = CurveSettings()
-    curve_networks: CurveNetworkSettings = CurveNetworkSettings()
+    noise_models: NoiseModelsSettings = NoiseModelsSettings()
+    few_windows: FewWindowsSettings = FewWindowsSettings()
+    classifiers: ClassifierSettings = ClassifierSettings()
     labelled: LabelledSettings = LabelledSettings()
     battery: BatterySettings = BatterySettings()
 

@@ -1,4 +1,4 @@
-"""Tables of an experiment in compact files, small enough to be committed."""
+"""Tables of a study in compact files, small enough to be committed."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class KeptTables:
-    """The tables that an experiment stores, one Parquet file each.
+    """The tables that a study stores, one Parquet file each.
 
     Args:
         names: Names of the tables.

@@ -30,7 +30,7 @@ def contributions(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        "Whole windows instead of the paper's GAN lower false alarms most",
+        "Contribution of each factor to false alarms and recall",
         "Change that switching a factor makes, as the mean over all orders of switching the four factors (Shapley value), with 95 % "
         "intervals over kinds of noise and seeds. Left: share of the gap in false alarms between the coarse simulator and real telemetry. "
         "Right: recall at 1 % false alarms on real windows.",

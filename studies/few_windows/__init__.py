@@ -1,1 +1,1 @@
-"""The experiment on how few real windows suffice, and from how few a simulator pays."""
+"""Study: from how few real windows a simulator pays, and from how many real windows suffice."""

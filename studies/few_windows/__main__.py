@@ -7,23 +7,22 @@ from typing import Any
 
 from enhsim_tf.common.console import tell
 from studies.common.command import Command
-from studies.common.environments import FAMILIES, NOISES, environment_option, environments
-from studies.noise_models.names import chosen_rungs, rungs_option
+from studies.common.environments import NOISES, environment_option, environments
 
 
 def run(options: argparse.Namespace, settings: Any, out: Path) -> None:
     """Runs the study."""
     from studies.few_windows.run import run
 
-    run(settings, options.cache, out, environments(options, NOISES), chosen_rungs(options.rungs, ()), options.fresh, tell)
+    run(settings, options.cache, out, environments(options, NOISES), options.fresh, tell)
 
 
 command = Command(
     "few_windows",
     "Varies the number of real windows from which detectors and simulators learn.",
-    "curve",
+    "few_windows",
     run,
-    [environment_option(FAMILIES), rungs_option()],
+    [environment_option(NOISES)],
 )
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""One cell of the learning curve: an environment, a seed and a number of real windows, with all arms."""
+"""One cell of the study: an environment, a seed and a number of real windows, with all training data."""
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,19 +14,18 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.noise.rung_names import GAN_RUNGS
 from enhsim_tf.reproduce.paper.data import draw, waves_of
 from enhsim_tf.reproduce.paper.signals import sines
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, time_blocks
 from studies.common.settings import Settings
-from studies.few_windows.arms import (
+from studies.few_windows.record import (
     ADVERSARIAL,
     BOTH,
-    CHEAP_RUNGS,
     CLASSIFIER,
     CLASSIFIER_ON_REAL,
     CORAL,
+    NOISE_MODELS,
     NUM_BLOCKS,
     ONE_LINE,
     REAL,
@@ -59,9 +58,9 @@ class World:
 
     def __init__(self, settings: Settings):
         self.settings, self.window = settings, settings.telemetry.window
-        curve, chosen = settings.curve, settings.telemetry
-        self.length = max(curve.num_real) * self.window
-        number = self.length + (2 * curve.num_judged + 1) * self.window
+        counts, chosen = settings.few_windows, settings.telemetry
+        self.length = max(counts.num_real) * self.window
+        number = self.length + (2 * counts.num_judged + 1) * self.window
         ((periods, amplitudes),) = waves_of(settings).values()
         clean = sines(chosen.interval_s * np.arange(number), periods, amplitudes)
         noise = settings.telemetry.draw_noise(clean, draw(settings, "learning curve"))
@@ -72,22 +71,21 @@ class World:
 
     def record(self, num_real: int) -> Record:
         """The last `num_real` windows before a gap of one window, after which the judged windows begin."""
-        curve, interval_s = self.settings.curve, self.settings.telemetry.interval_s
+        interval_s = self.settings.telemetry.interval_s
         first = self.length - num_real * self.window
         telemetry = Telemetry(self.values[first : self.length], interval_s, name="record", offset_s=first * interval_s)
-        seed, networks = self.settings.seed, self.settings.curve_networks
-        return Record(telemetry, self.coarse, self.window, curve.num_windows, seed, networks.num_iterations, networks.gan_iterations)
+        return Record(telemetry, self.coarse, self.window, self.settings.few_windows.num_windows, self.settings.seed)
 
     @functools.cached_property
     def judged(self) -> dict[str, np.ndarray]:
         """Disjoint real windows: `nominal`, `reference` for the matched rate, and `anomalous` with one injected anomaly each."""
-        curve = self.settings.curve
-        starts = self.length + self.window * (1 + np.arange(2 * curve.num_judged))
+        counts = self.settings.few_windows
+        starts = self.length + self.window * (1 + np.arange(2 * counts.num_judged))
         windows = cut_windows(self.values, starts, self.window)
-        nominal, reference = windows[: curve.num_judged], windows[curve.num_judged :]
+        nominal, reference = windows[: counts.num_judged], windows[counts.num_judged :]
         parts = []
         for number, kind in enumerate(INJECTIONS):
-            chosen = nominal[np.linspace(0, len(nominal) - 1, curve.num_anomalous).astype(int)]
+            chosen = nominal[np.linspace(0, len(nominal) - 1, counts.num_anomalous).astype(int)]
             for offset, duration in enumerate(DURATIONS):
                 rng = np.random.default_rng([self.settings.seed, _ANOMALIES, number, offset])
                 pieces = chosen[offset :: len(DURATIONS)]
@@ -96,7 +94,7 @@ class World:
 
 
 class Cell:
-    """All arms at one number of real windows.
+    """All training data at one number of real windows.
 
     Args:
         world: The telemetry.
@@ -106,54 +104,41 @@ class Cell:
     def __init__(self, world: World, num_real: int):
         self.world, self.num_real, self.record = world, num_real, world.record(num_real)
         self.rate = world.settings.detectors.false_alarm_rate
-        self.number, self.seed = world.settings.curve.num_windows, world.settings.seed
+        self.number, self.seed = world.settings.few_windows.num_windows, world.settings.seed
 
-    def rows(self, rungs: Sequence[str], stages: Stages) -> "pd.DataFrame":
-        """The rows of all arms that are computed for this seed and number of windows.
+    def rows(self, stages: Stages) -> "pd.DataFrame":
+        """The rows of all training data that are computed for this seed and number of windows.
 
-        Arms without networks are one stage, the classifiers another, and so is each noise network. Networks take most of the time, so
-        the settings give them fewer seeds and numbers of windows.
+        The classifiers are a stage of their own: they take most of the time, so the settings give them fewer seeds and numbers of windows.
 
         Args:
-            rungs: Rungs of the noise ladder; those without networks are always computed.
             stages: Runs stages and caches their results.
         """
         import pandas as pd
 
         chosen, frames = self.world.settings, []
-        curve, networks = chosen.curve, chosen.curve_networks
-        number = chosen.seed - curve.first_seed
+        counts, classifiers = chosen.few_windows, chosen.classifiers
         groups: dict[str, Callable[[], list[dict]]] = {"windows": self._without_networks}
-        if number < networks.num_slow_seeds and self.num_real in networks.num_real_classifiers:
+        if chosen.seed - counts.first_seed < classifiers.num_seeds and self.num_real in classifiers.num_real:
             groups["classifiers"] = self._classifiers
-        for rung in (rung for rung in rungs if rung not in CHEAP_RUNGS):
-            is_gan = rung in GAN_RUNGS
-            seeds, tried = (networks.num_slow_seeds, networks.num_real_gans) if is_gan else (networks.num_seeds, networks.num_real)
-            if number < seeds and self.num_real in tried:
-                groups[rung] = functools.partial(self._simulated, (rung,))
         # which seeds and numbers are computed does not affect a cell
-        same = (
-            dataclasses.replace(curve, num_seeds=0, first_seed=0),
-            dataclasses.replace(networks, num_seeds=0, num_real=(), num_slow_seeds=0, num_real_gans=(), num_real_classifiers=()),
-        )
+        same = dataclasses.replace(counts, num_seeds=0, first_seed=0), classifiers.num_steps
         for name, compute in groups.items():
             depends = (name, self.num_real, chosen.telemetry, same, chosen.seed, self.rate)
 
             def make(folder: Path, compute: Callable[[], list[dict]] = compute) -> None:
                 pd.DataFrame(compute()).to_parquet(folder / "rows.parquet")
 
-            stage = f"learning curve {self.num_real} {name}".replace(" ", "_")
-            folder = stages.run(stage, make, depends)
+            folder = stages.run(f"few windows {self.num_real} {name}", make, depends)
             frames.append(pd.read_parquet(folder / "rows.parquet"))
         return pd.concat(frames, ignore_index=True).assign(num_real=self.num_real, seed=self.seed, environment=chosen.telemetry.noise)
 
-    def _simulated(self, rungs: Sequence[str]) -> list[dict]:
+    def _simulated(self) -> list[dict]:
         found = []
-        for rung in rungs:
-            training = self.record.generate(rung, self.number, _FRESH)
-            held_out = self.record.generate(rung, self.number, _THRESHOLD)
+        for model in NOISE_MODELS:
+            training, held_out = (self.record.generate(model, self.number, purpose) for purpose in (_FRESH, _THRESHOLD))
             for name, detector in self._fitted(training):
-                found.append(self._judge(SIMULATOR + rung, name, detector, detector.score(held_out)))
+                found.append(self._judge(SIMULATOR + model, name, detector, detector.score(held_out)))
         return found
 
     def _fitted(self, windows: np.ndarray) -> Iterator[tuple[str, Detector]]:
@@ -163,7 +148,7 @@ class Cell:
     def _without_networks(self) -> list[dict]:
         real, starts, window = self.record.windows, self.record.starts, self.world.window
         generated = self.record.generate(WHOLE_WINDOWS, self.number, _FRESH)
-        found = self._simulated(CHEAP_RUNGS)
+        found = self._simulated()
         for arm, extra in ((REAL, generated[:0]), (BOTH, generated)):
             scores: dict[str, list[np.ndarray]] = {name: [] for name in QUICK}
             for training, held_out in time_blocks(starts, NUM_BLOCKS, window):
@@ -180,7 +165,7 @@ class Cell:
     def _coral(self, real: np.ndarray) -> list[dict]:
         # The map whitens the windows that it is fitted to better than others, so training and threshold use other windows than these.
         numbers = (_CORAL_SOURCE * self.number, self.number, self.number)
-        source, plain, further = (self.record.generate("Gaussian", number, _CORAL + 100 * place) for place, number in enumerate(numbers))
+        source, plain, further = (self.record.generate("gaussian", number, _CORAL + 100 * place) for place, number in enumerate(numbers))
         alignment = CoralAlignment.fit(source, real)
         held_out = alignment.apply(further)
         return [self._judge(CORAL, name, each, each.score(held_out)) for name, each in self._fitted(alignment.apply(plain))]
@@ -188,7 +173,7 @@ class Cell:
     def _classifiers(self) -> list[dict]:
         from studies.few_windows.domain_adversarial import AnomalyClassifier
 
-        real, steps, found = self.record.windows, self.world.settings.curve_networks.num_steps, []
+        real, steps, found = self.record.windows, self.world.settings.classifiers.num_steps, []
         generated = self.record.generate(WHOLE_WINDOWS, self.number, _FRESH)
 
         def trained(nominal: np.ndarray, adaptation: float = 0.0) -> Detector:

@@ -1,7 +1,7 @@
-"""One cell of the experiment on noise: a family of the gallery and a seed, with every rung of the noise ladder.
+"""One cell of the study: a family of noise and a seed, with every noise model.
 
 The noise models learn the true noise, so that errors of the enhancer have no effect. Detectors are trained on the true waves with
-generated noise and judged on nominal windows with real noise, as in the experiment on robustness.
+generated noise and judged on nominal windows with real noise, as in the study of robustness.
 """
 
 import dataclasses
@@ -15,23 +15,28 @@ import numpy as np
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseTraining, NoiseWindows
-from enhsim_tf.noise import ladder
-from enhsim_tf.noise.rung_names import BY_OPTION, GAN_RUNGS, STREAMS
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseWindows
+from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.noise.names import CANDIDATES
 from studies.common.settings import Settings
-from studies.noise_models.names import PRESENT, REAL
+from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
     import pandas as pd
 
+REAL, LEARNT = "real", "mixture density network"
+MODELS = (*CANDIDATES, LEARNT)
+"""The noise models that are tried, the simplest first."""
 TABLES = ("detectors", "realism", "choice")
 _NUM_DRAWS = 3  # of as many generated windows as there are real ones: measures of realism are means over them
-OPTIONS = {rung: option for option, rung in BY_OPTION.items()}
+# numbers of random draws, and the names of draws below, are those of the published tables
+_STREAMS = {"none": 0, "gaussian": 1, "autoregression": 2, "residual windows": 3, "matched residual windows": 7, LEARNT: 8}
+_DRAW, _DRAW_OF_JUDGE = 71, 73
 
 
 class Cell:
-    """A family of the gallery and a seed.
+    """A family of noise and a seed.
 
     Args:
         settings: All settings; `telemetry.noise` is the family.
@@ -43,93 +48,88 @@ class Cell:
         self.one = Replicate(settings, stages)
         self.data = self.one.experiment.data
 
-    @functools.cached_property
-    def learnt(self) -> dict[str, np.ndarray]:
-        """Windows of the training part, from which the models learn: `target`, `truth` and their difference, the noise."""
-        return self._with_noise("train", self.settings.ladder.num_windows, "ladder, learnt")
-
-    def _with_noise(self, part: str, number: int, purpose: str) -> dict[str, np.ndarray]:
-        windows = self.data.windows(part, number, purpose)
-        return {**windows, "noise": windows["target"] - windows["truth"]}
-
-    def tables(self, rungs: Sequence[str]) -> "dict[str, pd.DataFrame]":
-        """The tables of the rungs and of real windows; each rung is a stage of its own, so that an interrupted run goes on."""
+    def tables(self, models: Sequence[str] = (REAL, *MODELS)) -> "dict[str, pd.DataFrame]":
+        """The tables of models, or of real windows; each model is a stage of its own, so that an interrupted run goes on."""
         import pandas as pd
 
-        _ = self.one.experiment.data
         chosen = self.settings
-        depends = (
-            chosen.telemetry,
-            chosen.split,
-            chosen.robustness.num_windows,
-            chosen.robustness.num_anomalous,
-            chosen.ladder,
-            chosen.seed,
-        )
+        counts = (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.noise_models)
+        depends = (chosen.telemetry, chosen.split, *counts, chosen.seed)
         parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
-        for rung in (REAL, *rungs):
-
-            def make(folder: Path, rung: str = rung) -> None:
-                self._make(rung, folder)
-
-            name = "noise rung " + rung.replace(" ", "_")
-            folder = self.stages.run(name, make, (rung, *depends), ("telemetry",))
+        for model in models:
+            name = "noise model " + model.replace(" ", "_")
+            folder = self.stages.run(name, functools.partial(self._make, model), (model, *depends), ("telemetry",))
             for table, found in parts.items():
                 found.append(pd.read_parquet(folder / f"{table}.parquet"))
         return {name: pd.concat([each for each in found if len(each)], ignore_index=True) for name, found in parts.items()}
 
-    def _make(self, rung: str, folder: Path) -> None:
+    def _make(self, model: str, folder: Path) -> None:
         import pandas as pd
 
-        chosen, seed = self.settings, self.settings.seed
-        number = chosen.robustness.num_windows
         floor, held_out = self.one.floor()
-        if rung == REAL:
+        if model == REAL:
+            number = self.settings.robustness.num_windows
             arms = [self.data.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
-            compared = [held_out]
-            choice = []
+            compared, choice = [held_out], []
         else:
-            number_of_iterations = chosen.ladder.gan_iterations if rung in GAN_RUNGS else chosen.ladder.num_iterations
-            task = ladder.FitTask(self.learnt["noise"], self.learnt["truth"], number_of_iterations, seed, self.learnt["start"])
-            model = ladder.RUNGS[rung](task)
-            draws = np.random.default_rng([seed, STREAMS[OPTIONS[rung]], 71])
-            waves = [self.data.windows("train", number, f"ladder, {part}")["truth"] for part in ("training", "threshold")]
-            arms = [clean + ladder.generate(model, len(clean), draws, clean) for clean in waves]
-            more = self.data.windows("calibration", len(held_out), "ladder, realism")["truth"]
-            # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
-            compared = [more + ladder.generate(model, len(held_out), draws, more) - more for _ in range(_NUM_DRAWS)]
-            judgement = dataclasses.replace(self._judge.judge(OPTIONS[rung], model), rung=rung)
-            choice = [{"rule": PRESENT} | dataclasses.asdict(judgement)]
-        judged = evaluation.evaluate_arm(*arms, self.trial, DETECTORS, seed)
-        rates = evaluation.false_alarm_rates(judged["alarms"])
-        detectors = [
-            {
-                "detector": name,
-                "alarms": sum(row["alarms"] for row in judged["alarms"] if row["detector"] == name),
-                "windows": sum(row["windows"] for row in judged["alarms"] if row["detector"] == name),
-                "recall": float(np.mean([row["recall"] for row in judged["recall"] if row["detector"] == name])),
-                "recall_at_real_rate": float(np.mean([row["recall_at_real_rate"] for row in judged["recall"] if row["detector"] == name])),
-            }
-            for name in rates
-        ]
-        measured = [
-            {"measure": row.measure, "value": row.value, "ratio": row.ratio} for each in compared for row in floor.evaluate(each).rows
-        ]
-        by_measure = pd.DataFrame(measured).groupby("measure", sort=False)
-        realism = by_measure.agg(lambda each: each.mean(skipna=False)).reset_index()  # what cannot be computed once has no mean
-        for name, rows in {"detectors": detectors, "realism": realism, "choice": choice}.items():
-            table = pd.DataFrame(rows).assign(family=self.settings.telemetry.noise, seed=seed, rung=rung)
+            arms, compared, choice = self._generated(model, len(held_out))
+        for name, rows in {"detectors": self._detected(arms), "realism": _measured(floor, compared), "choice": choice}.items():
+            table = pd.DataFrame(rows).assign(family=self.settings.telemetry.noise, seed=self.settings.seed, model=model)
             table.to_parquet(folder / f"{name}.parquet")
-        self.stages.tell(f"  {rung:24} false alarms {np.mean(list(rates.values())):.2%}")
+
+    def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray], list[dict]]:
+        """Windows that train detectors and set their thresholds, draws of noise for the measures of realism, and the judgement of `fit`."""
+        model, seed = self._fit(name), self.settings.seed
+        rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
+        purposes = ("ladder, training", "ladder, threshold")
+        waves = [self.data.windows("train", self.settings.robustness.num_windows, purpose)["truth"] for purpose in purposes]
+        arms = [clean + model.generate(len(clean), rng, clean) for clean in waves]
+        more = self.data.windows("calibration", number, "ladder, realism")["truth"]
+        # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
+        compared = [more + model.generate(number, rng, more) - more for _ in range(_NUM_DRAWS)]
+        judgement = self._judge.judge(name, model, np.random.default_rng([seed, _DRAW_OF_JUDGE, _STREAMS[name]]))
+        return arms, compared, [{key: value for key, value in dataclasses.asdict(judgement).items() if key != "name"}]
+
+    def _fit(self, name: str) -> NoiseModel:
+        if name != LEARNT:
+            return self._learnt.fit(name)
+        learner = MixtureDensityNoise(self.settings.seed, self.settings.noise_models.num_steps)
+        return learner.fit(self._learnt.noise, self._learnt.clean, self._learnt.starts)
+
+    def _detected(self, arms: list[np.ndarray]) -> list[dict]:
+        """False alarms and recall of every detector, trained on the first windows, with the threshold of the second ones."""
+        trial = dataclasses.replace(self.one.trial(self.settings.noise_models.num_anomalous), trace=None, labels=None)
+        judged = evaluation.evaluate_arm(*arms, trial, DETECTORS, self.settings.seed)
+        rows = []
+        for name in DETECTORS:
+            alarms, recall = ([row for row in judged[key] if row["detector"] == name] for key in ("alarms", "recall"))
+            counts = {key: sum(row[key] for row in alarms) for key in ("alarms", "windows")}
+            rows.append({"detector": name, **counts} | {key: _mean(recall, key) for key in ("recall", "recall_at_real_rate")})
+        return rows
+
+    @functools.cached_property
+    def _learnt(self) -> NoiseWindows:
+        """Windows of the training part, from which the models learn."""
+        return self._with_noise("train", self.settings.noise_models.num_windows, "ladder, learnt")
+
+    def _with_noise(self, part: str, number: int, purpose: str) -> NoiseWindows:
+        windows = self.data.windows(part, number, purpose)
+        return NoiseWindows(windows["target"] - windows["truth"], windows["truth"], windows["start"])
 
     @functools.cached_property
     def _judge(self) -> HeldOutJudge:
         """Judges noise models as `fit` does, by windows of the same telemetry that they have not seen."""
-        held_out = self._with_noise("calibration", min(MOST_JUDGED, self.settings.ladder.num_windows), "ladder, judged")
-        learnt, judged = (NoiseWindows(each["noise"], each["truth"], each["start"]) for each in (self.learnt, held_out))
-        return HeldOutJudge(learnt, judged, NoiseTraining(0, self.settings.seed, to_unit=lambda clean: clean))
+        number = min(MOST_JUDGED, self.settings.noise_models.num_windows)
+        return HeldOutJudge(self._learnt, self._with_noise("calibration", number, "ladder, judged"), self.settings.seed)
 
-    @functools.cached_property
-    def trial(self) -> evaluation.Trial:
-        """Real nominal windows, and the same with anomalies; without a continuous trace."""
-        return dataclasses.replace(self.one.trial(self.settings.ladder.num_anomalous), trace=None, labels=None)
+
+def _measured(floor: object, compared: list[np.ndarray]) -> "pd.DataFrame":
+    """Measures of realism, means over draws; what cannot be computed once has no mean."""
+    import pandas as pd
+
+    rows = [{"measure": row.measure, "value": row.value, "ratio": row.ratio} for each in compared for row in floor.evaluate(each).rows]
+    return pd.DataFrame(rows).groupby("measure", sort=False).agg(lambda each: each.mean(skipna=False)).reset_index()
+
+
+def _mean(rows: list[dict], key: str) -> float:
+    return float(np.mean([row[key] for row in rows]))

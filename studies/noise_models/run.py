@@ -1,11 +1,11 @@
-"""`python -m studies.noise_models`: every rung of the noise ladder on every family of the gallery."""
+"""Runs the study of noise models and writes tables, findings and the figure."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enhsim_tf.common.atomic_files import make_folder
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages
 from studies.common.replicates import collect, seed_by_seed, write_results
 from studies.common.settings import Settings
@@ -13,36 +13,51 @@ from studies.common.settings import Settings
 if TYPE_CHECKING:
     import pandas as pd
 
-FOLDER = "noise"  # below the folder of the figures
-
 
 def run(
-    settings: Settings, cache: Path, out: Path, families: Sequence[str], rungs: Sequence[str], fresh: bool, tell: Callable[[str], None]
+    settings: Settings, cache: Path, out: Path, families: Sequence[str], model: str | None, fresh: bool, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Runs the experiment and writes its results; finished rungs are read from the cache.
+    """Runs the study and writes its results; finished models are read from the cache.
 
     Args:
-        settings: All settings; `ladder.num_seeds` says how many seeds.
+        settings: All settings; `noise_models.num_seeds` says how many seeds.
         cache: Folder of cached stages.
-        out: Output folder for tables, findings and figures.
-        families: Names of the families of the gallery.
-        rungs: Names of the rungs of the noise ladder.
+        out: An existing folder for tables, findings and the figure.
+        families: Names of the families of noise.
+        model: Name of the only noise model to try, or None for all. Tables in the output folder keep their other rows.
         fresh: Whether to run every stage again instead of using the cache.
         tell: Called with a line about each stage.
 
     Returns:
         The findings.
+
+    Raises:
+        InputError: If there is no model of that name.
     """
-    from studies.noise_models.cells import Cell
-    from studies.noise_models.figures import FIGURES
-    from studies.noise_models.findings import KEPT, summarise
+    from studies.noise_models.cells import MODELS, REAL, Cell
+    from studies.noise_models.figure import FIGURES
+    from studies.noise_models.summary import KEPT, summarise
 
-    def replicate(family: str, seed: int, stages: Stages) -> "Mapping[str, pd.DataFrame]":
+    if model not in (None, *MODELS):
+        raise InputError(f"Expected --model among {', '.join(MODELS)}. Received: {model!r}.")
+
+    def tables_of(family: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
         telemetry = dataclasses.replace(settings.telemetry, noise=family)
-        return Cell(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages).tables(rungs)
+        return Cell(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages).tables(
+            (REAL, *MODELS) if model is None else (model,)
+        )
 
-    make_folder(out)
-    first = settings.ladder.first_seed
-    seeds = range(first, first + settings.ladder.num_seeds)
-    tables = collect("noise", seed_by_seed(replicate, families, seeds), cache, fresh, tell)
-    return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget, "first_seed": first})
+    first = settings.noise_models.first_seed
+    tables = collect("noise", seed_by_seed(tables_of, families, range(first, first + settings.noise_models.num_seeds)), cache, fresh, tell)
+    if model is not None:
+        tables = {name: _joined(old, tables[name]) for name, old in KEPT.read(out).items()}
+    return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget})
+
+
+def _joined(old: "pd.DataFrame", new: "pd.DataFrame") -> "pd.DataFrame":
+    """Replaces the rows of the same families, seeds and models."""
+    import pandas as pd
+
+    keys = ["family", "seed", "model"]
+    known = old.set_index(keys).index.isin(new.set_index(keys).index)
+    return pd.concat([old[~known], new], ignore_index=True)

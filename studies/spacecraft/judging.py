@@ -1,25 +1,19 @@
-"""Judges fitted detectors on the test part of a channel: ranks of their scores, thresholds of two kinds, and rankings of samples."""
+"""How a detector is judged on the test part of a channel: false alarms, labelled sequences that are found, and areas under curves."""
 
-import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import evaluation, metrics
-from enhsim_tf.enhancer.training_pairs import cut_windows_from_parts
 from enhsim_tf.telemetry.telemanom import LabelledChannel
-from enhsim_tf.telemetry.windows import time_blocks
-from studies.spacecraft.matched import windows_that_meet
+from enhsim_tf.telemetry.windows import cut_windows, time_blocks
 
-RULES = {
-    "own": "held-out windows of the arm itself",
-    "past": "windows of the train part",
-}
-"""Windows whose scores set a threshold. For the arm `real` the two are the same: windows of the train part, cross-fitted."""
-_STRIDES = 8  # scored windows a window's length
+RATES = (0.01, 0.05, 0.1)
+"""Shares of nominal test windows at which the sequences that detectors find are compared."""
+STRIDES = 8
+"""Scored windows a window's length."""
 
 
 class Judge:
@@ -36,71 +30,65 @@ class Judge:
     """
 
     def __init__(self, channel: LabelledChannel, window: int, period: float, rate: float):
-        self.channel, self.window, self.period, self.rate = channel, window, period, rate
+        self.window, self.period, self.rate = window, period, rate
         self.labels = np.array(channel.is_anomalous)
-        self.rows: dict[str, list[dict[str, Any]]] = {"scores": [], "thresholds": [], "ranking": []}
+        self.begins = np.arange(0, len(channel.test) - window + 1, max(1, window // STRIDES))
+        self.windows = cut_windows(channel.test.values, self.begins, window)
+        self.meets = windows_that_meet(self.begins, window, channel.labels.sequences)
+        self.is_nominal = ~self.meets.any(axis=0)
         if not self.is_nominal.any():
             raise InputError(
                 f"Expected a test part with windows of {window} samples that hold no labelled sample. "
                 f"Received: none of {len(self.begins)} in {channel.labels.channel}. Use another channel."
             )
 
-    @functools.cached_property
-    def begins(self) -> np.ndarray:
-        """First samples of the scored windows of the test part."""
-        return np.arange(0, len(self.channel.test) - self.window + 1, max(1, self.window // _STRIDES))
+    def judge(self, scores: np.ndarray, own: np.ndarray, past: np.ndarray) -> dict[str, Any]:
+        """Judges one detector.
 
-    @functools.cached_property
-    def windows(self) -> np.ndarray:
-        """The scored windows of the test part, shape `(windows, samples)`."""
-        return cut_windows_from_parts([self.channel.test], self.begins, self.window)[0]
-
-    @functools.cached_property
-    def is_nominal(self) -> np.ndarray:
-        """Which of them hold no labelled sample."""
-        return ~windows_that_meet(self.begins, self.window, len(self.channel.test), self.channel.labels.sequences).any(axis=0)
-
-    def add(self, arm: str, detector: str, scores: np.ndarray, own: np.ndarray, past: np.ndarray) -> None:
-        """Adds the results of one detector that was trained on one arm.
+        Detectors whose thresholds give different false-alarm rates cannot be compared by what they find. Each `found_at` is
+        therefore counted with the lowest threshold that at most this share of the nominal test windows is above.
 
         Args:
-            arm: Name of the arm.
-            detector: Name of the detector.
-            scores: Scores of the windows of the test part, in their order.
-            own: Scores of held-out windows of the arm.
-            past: Scores of windows of the train part.
-        """
-        about = {"arm": arm, "detector": detector}
-        ranks = rankdata(scores, method="max").astype(np.int16)
-        self.rows["scores"] += [about | {"place": place, "rank": rank} for place, rank in enumerate(ranks)]
-        for rule, held_out in (("own", own), ("past", past)):
-            threshold, rate = metrics.finite_threshold(held_out, self.rate)
-            self.rows["thresholds"].append(about | {"rule": rule, "rank": int(np.sum(scores <= threshold)), "rate": rate})
-        self.rank(arm, detector, evaluation.mean_over_windows(scores, self.begins, self.window, len(self.labels)))
+            scores: Its scores of `windows`.
+            own: Its scores of held-out windows of its training data, which set its threshold.
+            past: Its scores of windows of the train part.
 
-    def rank(self, arm: str, detector: str, scores: np.ndarray) -> None:
-        """Adds how well scores of samples rank the labelled samples of the test part."""
+        Returns:
+            `false_alarms` and `false_alarms_past`, the shares of nominal test windows above the thresholds that `own` and `past`
+            set; `found_at_` each of `RATES`, in labelled sequences; `sequences`, their number; `auc_pr` and `vus_pr`, the areas
+            under the precision-recall curve of the samples.
+        """
         from sklearn.metrics import average_precision_score
 
-        areas = {
-            "vus_pr": metrics.vus_pr(self.labels, scores, round(self.period)),
-            "auc_pr": float(average_precision_score(self.labels, scores)),
+        nominal = np.sort(scores[self.is_nominal])
+        limits = {rate: nominal[-1 - int(rate * len(nominal) + 1e-9)] for rate in RATES}
+        by_sample = evaluation.mean_over_windows(scores, self.begins, self.window, len(self.labels))
+        return {
+            "false_alarms": float(np.mean(nominal > metrics.finite_threshold(own, self.rate)[0])),
+            "false_alarms_past": float(np.mean(nominal > metrics.finite_threshold(past, self.rate)[0])),
+            **{f"found_at_{rate:g}": sum(bool((scores[each] > limit).any()) for each in self.meets) for rate, limit in limits.items()},
+            "sequences": len(self.meets),
+            "auc_pr": float(average_precision_score(self.labels, by_sample)),
+            "vus_pr": metrics.vus_pr(self.labels, by_sample, round(self.period)),
         }
-        self.rows["ranking"].append({"arm": arm, "detector": detector} | areas)
-
-    def share_of_alarms(self, arm: str) -> dict[str, float]:
-        """Share of nominal test windows above the arm's own threshold, for each detector."""
-        limits = {row["detector"]: row["rank"] for row in self.rows["thresholds"] if row["arm"] == arm and row["rule"] == "own"}
-        ranks: dict[str, list[int]] = {}
-        for row in self.rows["scores"]:
-            if row["arm"] == arm:
-                ranks.setdefault(row["detector"], []).append(row["rank"])
-        return {name: float(np.mean(np.array(ranks[name])[self.is_nominal] > limit)) for name, limit in limits.items()}
 
 
-def cross_fitted_scores(
-    make: Callable[[], Any], windows: np.ndarray, starts: np.ndarray, num_folds: int, on_fold: Callable[[int], None] | None = None
-) -> np.ndarray:
+def windows_that_meet(begins: np.ndarray, window: int, ranges: Sequence[tuple[int, int]]) -> np.ndarray:
+    """Tells which windows share a sample with which range.
+
+    Args:
+        begins: First sample of each window, shape `(windows,)`.
+        window: Length of a window in samples.
+        ranges: Half-open ranges of samples.
+
+    Returns:
+        Boolean array of shape `(ranges, windows)`.
+    """
+    bounds = np.asarray(ranges, np.int64).reshape(-1, 2)
+    return (begins < bounds[:, 1:]) & (begins + window > bounds[:, :1])
+
+
+def cross_fitted_scores(make: Callable[[], Any], windows: np.ndarray, starts: np.ndarray, num_folds: int) -> np.ndarray:
     """Scores windows by detectors that were fitted to other blocks of time, which share no sample with them.
 
     Args:
@@ -108,14 +96,11 @@ def cross_fitted_scores(
         windows: Windows of one series, shape `(windows, samples)`.
         starts: First sample of each window, shape `(windows,)`.
         num_folds: Number of blocks of time.
-        on_fold: Called after each block with the number of completed blocks.
 
     Returns:
         A score for each window, shape `(windows,)`.
     """
     scores = np.full(len(windows), np.nan)
-    for done, (training, held_out) in enumerate(time_blocks(starts, num_folds, windows.shape[1]), 1):
+    for training, held_out in time_blocks(starts, num_folds, windows.shape[1]):
         scores[held_out] = make().fit(windows[training]).score(windows[held_out])
-        if on_fold is not None:
-            on_fold(done)
     return scores

@@ -15,18 +15,19 @@ import pytest
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
+from enhsim_tf.cli.options import cleaning_options, matching_channels
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.enhanced_simulator import report_measure
+from enhsim_tf.enhanced_simulator import fit_many, report_measure
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.noise.surrogates import GaussianNoise
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "enhsim_tf"]
-TINY = ["--num-windows", "40", "--epochs", "1", "--iterations", "2", "--window", "64"]
+TINY = ["--num-windows", "40", "--epochs", "1", "--window", "64"]
 
 
 def table(num_samples=1_500, interval="10s"):
@@ -289,11 +290,32 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
     assert not list((tmp_path / "models").iterdir())
 
 
+def test_columns_without_a_simulator_are_left_out_and_none_is_refused(refused, capsys):
+    series, models = {"volts": 1, "note": 2}, {"volts": Path("a"), "amps": Path("b")}
+    assert matching_channels(series, models) == {"volts": 1} and "left out: note" in capsys.readouterr().out
+    with refused("volts, amps", "note"):
+        matching_channels({"note": 2}, models)
+
+
+def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
+    monkeypatch.setattr(fit_many, "fit_job", lambda job: {}["defect"])
+    outcome = fit_many.fit_or_say(fit_many.Job("volts", None, Path("x"), None, None))
+    assert "KeyError" in outcome.failure and "'defect'" in outcome.failure and len(outcome.failure.splitlines()) == 1
+
+
+def test_several_sources_and_what_reading_takes_are_options():
+    words = ["inject", "a.csv", "b.csv", "--missing-values=-999.9,9999", "--label-column", "x", "--no-header", "--out", "y"]
+    options = parse(words)
+    chosen = cleaning_options(options, 3)
+    assert options.source == ["a.csv", "b.csv"] and parse(["inject", "a.csv", "--out", "y"]).source == "a.csv"
+    assert (chosen.missing_values, chosen.label_column, chosen.no_header) == (("-999.9", "9999"), ("x",), True)
+
+
 # examples of the README and of the page on telemetry of one's own
 
 
 def test_the_commands_of_the_readme_can_be_parsed():
-    pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/own_telemetry.md")]
+    pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/own_data.md")]
     texts = [*pages, commands.EXAMPLES]
     lines = [line.strip() for text in texts for line in text.splitlines()]
     asked = [line.split()[3:] for line in lines if line.startswith("python -m enhsim_tf ") and "--help" not in line]
@@ -307,11 +329,9 @@ def test_the_commands_of_the_readme_can_be_parsed():
 
 @pytest.mark.usefixtures("narrow_enhancer")
 def test_the_python_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs" / "own_telemetry.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "own_data.md").read_text(encoding="utf-8")
     (snippet,) = [part.partition("```")[0] for part in page.split("```python")[1:] if "fit_channel" in part.partition("```")[0]]
-    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1, num_iterations=2)").replace(
-        "num_windows=1000", "num_windows=20"
-    )
+    snippet = snippet.replace("seed=0)", "seed=0, window=64, num_windows=40, epochs=1)").replace("num_windows=1000", "num_windows=20")
     table()[["utc", "volts"]].to_csv(tmp_path / "telemetry.csv", index=False)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(report_measure, "_NUM_WINDOWS", 60)
@@ -350,7 +370,6 @@ WRONG = {
     "window of nothing": ([*FIT, "--window", "0"], "window=0"),
     "no training windows": ([*FIT, "--num-windows", "0"], "window"),
     "no epoch": ([*FIT, "--epochs", "0"], "epoch"),
-    "iterations below zero": ([*FIT, "--iterations", "-1"], "iterations"),
     "no workers": ([*FIT, "--workers", "0"], "worker"),
     "workers that are no number": ([*FIT, "--workers", "two"], "'two'"),
     "more workers than there can be": ([*FIT, "--workers", "513"], "513"),
@@ -403,7 +422,6 @@ WRONG = {
     "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
     "rate of half": ([*SCORE, "--false-alarm-rate", "0.5"], "0.5"),
     "too few windows to learn from": ([*SCORE, "--windows", "9"], "num_windows=9"),
-    "channels that were not fitted": (["score", "WORLD/single", "WORLD/two.csv", "--out", "x"], "'amps'"),
     "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "telemetry below a window": (["score", "WORLD/single", "WORLD/short.csv", "--out", "x.parquet"], "60 samples"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
@@ -488,8 +506,8 @@ def test_an_interrupt_ends_a_fit_with_its_processes(engine, after_s, world, tmp_
     if engine == "ray":
         pytest.importorskip("ray", reason="the optional extra ray is not installed")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "2"]
-    command += ["--iterations", "1000000", "--engine", engine]
+    command = [*COMMAND, "fit", world / "two.csv", "--out", tmp_path / "models", "--workers", "2", "--epochs", "1000000"]
+    command += ["--enhancer", "network", "--engine", engine]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True, start_new_session=True)
     while not (tmp_path / "models").is_dir():
         assert process.poll() is None

@@ -4,9 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from enhsim_tf.coarse_simulator.pairing import pair_with_recording
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
+from enhsim_tf.telemetry.series import Telemetry
 
 
 def recording():
@@ -129,3 +131,54 @@ def test_unusable_runs_are_refused(refused, written):
         read_recording(written(frame), ["volts"])
     with refused("without times"):
         read_recording(written(table().drop(columns="time")), ["volts"], interval_s=10.0)
+
+
+# runs of other simulators
+
+
+def stepped(times):
+    """A run whose columns are known functions of time."""
+    return pd.DataFrame({"time": times, "volts": 1.5 * np.asarray(times), "amps": 7.0 - np.asarray(times)})
+
+
+def test_steps_of_any_length_are_interpolated(written):
+    times = np.concatenate([[0.0], np.cumsum(np.random.default_rng(0).exponential(3.0, 400))])
+    found = read_recording(written(stepped(times)), interval_s=2.0)
+    (part,) = found.parts
+    assert found.columns == ("volts", "amps") and part.offset_s == 0
+    np.testing.assert_allclose(part.values[:, 0], 3.0 * np.arange(len(part)), atol=1e-3)
+    assert len(part) == int(times[-1] // 2) + 1 and "interpolated to one every 2 s" in found.notes[0]
+
+
+@pytest.mark.parametrize("events", [[20.0, 40.0], [21.3, 44.9]], ids=["at samples", "between samples"])
+def test_an_event_has_the_value_after_it(written, events):
+    steady = stepped(2.0 * np.arange(60))
+    after = stepped(np.repeat(events, 2)).assign(volts=lambda frame: frame["volts"] + np.tile([0.0, 5.0], len(events)))
+    frame = pd.concat([steady, after]).sort_values("time", kind="stable")
+    found = read_recording(written(frame), ["volts"], interval_s=2.0)
+    (part,) = found.parts
+    assert len(part) == 60
+    is_event = np.isin(2.0 * np.arange(60), events)
+    between = np.isin(np.arange(60), np.ceil(np.array(events) / 2)) & ~is_event
+    np.testing.assert_allclose(part.values[~between, 0], (3.0 * np.arange(60) + 5.0 * is_event)[~between], atol=1e-5)
+
+
+def test_the_zero_of_a_run_can_be_given(written, refused):
+    path = written(stepped(2.0 * np.arange(60)))
+    found = read_recording(path, start="2024-03-01T02:00:00+01:00")
+    assert found.start == "2024-03-01T01:00:00+00:00"
+    telemetry = Telemetry(np.zeros(50, np.float32), 2.0, 4.0, "2024-03-01T01:00:00+00:00", "celsius")
+    (pair,) = pair_with_recording([telemetry], found)
+    np.testing.assert_allclose(pair.coarse[:, 0], 6.0 + 3.0 * np.arange(50))
+    with refused("--coarse-start 2024-03-01T01:00:04"):
+        pair_with_recording([telemetry], read_recording(path))
+    with refused("--coarse-start"):
+        read_recording(written(table()), start="2024-03-01")
+
+
+def test_a_clock_is_no_input_even_if_samples_are_counted(written):
+    assert read_recording(written(stepped(2.0 * np.arange(60))), time="none").columns == ("volts", "amps")
+
+
+def test_a_frame_is_a_run():
+    assert read_recording(stepped(2.0 * np.arange(60))).columns == ("volts", "amps")

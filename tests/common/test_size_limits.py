@@ -155,7 +155,7 @@ BOMBS = {
     "yaml": lambda path: path.write_text(
         "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(f"{b}: &{b} [{', '.join(9 * [f'*{a}'])}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
     ),
-    "_manifest.json": lambda path: path.write_text('{"format": "enhsim_tf.datasets.generate/1", "settings": {"windows": 1000000000, "shard": 1, "window": 1,'
+    "_manifest.json": lambda path: path.write_text('{"format": "enhsim_tf.datasets.generate/2", "settings": {"windows": 1000000000, "shard": 1, "window": 1,'
                                                    ' "interval_s": 1.0, "models": []}, "shards": [' + "{}," * 300_000 + "{}]}"),
 }  # fmt: skip
 READS = """

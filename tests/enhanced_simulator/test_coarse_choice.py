@@ -26,7 +26,7 @@ from enhsim_tf.telemetry.commands import has_commands, read_commands
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 
-TINY = FitOptions(num_windows=60, epochs=1, num_iterations=2, seed=3, enhancer="best", noise="residual windows")
+TINY = FitOptions(num_windows=60, epochs=1, seed=3, enhancer="best", noise="residual windows")
 RNG = np.random.default_rng(0)
 T = np.arange(4_308)
 

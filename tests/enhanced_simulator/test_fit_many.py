@@ -24,7 +24,7 @@ from enhsim_tf.enhancer import network as enhancer
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
-TINY = {"window": 64, "num_windows": 30, "epochs": 1, "num_iterations": 2, "noise": "autoregression", "seed": 3, "enhancer": "network"}
+TINY = {"window": 64, "num_windows": 30, "epochs": 1, "noise": "autoregression", "seed": 3, "enhancer": "network"}
 REPORTS = []  # reports of the first fit
 HOSTILE = ["../x", "a/b", "<b>", ".", "..", ".hidden", "%2E", "a%2Fb", " ", "ä 漢", "C:\\x", "[!.]*", "~", "-rf", "a\nb", "manifest.json"]
 
@@ -140,18 +140,10 @@ def in_one_process(tmp_path_factory):
 
 
 def same_models(folder, other):
-    """Whether two folders contain the same models, except for the dates that Keras stores."""
+    """Whether two folders contain the same models."""
     assert models_of(folder).keys() == models_of(other).keys() == {"../sine", "slow"}
     for name, path in models_of(folder).items():
-        one, another = files(path), files(models_of(other)[name])
-        assert one.keys() == another.keys()
-        for file in ("settings.json", "report.json", "report.png"):
-            assert one[file] == another[file], file
-        first, second = (EnhancedSimulator.load(model) for model in (path, models_of(other)[name]))
-        for networks in ((first.enhancer, second.enhancer), (first.noise.generator, second.noise.generator)):
-            weights, others = ([each.tobytes() for each in network.get_weights()] for network in networks)
-            assert weights == others
-        np.testing.assert_array_equal(first.generate(20, seed=1), second.generate(20, seed=1))
+        assert files(path) == files(models_of(other)[name])
     return True
 
 

@@ -18,7 +18,7 @@ from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
-TINY = FitOptions(window=64, num_windows=40, epochs=1, num_iterations=2, noise="residual windows", seed=3, enhancer="network")
+TINY = FitOptions(window=64, num_windows=40, epochs=1, noise="residual windows", seed=3, enhancer="network")
 DETECTORS = ("limit check", "PCA residual", "nearest neighbours", "isolation forest")
 
 
@@ -61,7 +61,7 @@ def test_an_error_of_the_enhancer_that_depends_on_the_phase_does_not_make_all_no
     num_samples, period = 40_000, 40  # the window is two periods: windows one after the other would all begin at one phase
     whole = channel(num_samples)
     coarse = SquareWaveSimulator([SquareWave(period, low=18.0, high=22.0)])
-    options = {"window": 2 * period, "num_windows": 400, "num_iterations": 0, "enhancer": "coarse", "noise": "residual windows"}
+    options = {"window": 2 * period, "num_windows": 400, "enhancer": "coarse", "noise": "residual windows"}
     simulator = EnhancedSimulator.fit(whole, coarse, 3, epochs=1, verbose=0, **options)
     _, rows = report_measure._compare_noise(simulator, [whole], 3)
     beyond = [row["measure"] for row in rows if row["ratio"] is not None and row["ratio"] > 2]
@@ -166,7 +166,6 @@ def test_telemetry_that_cannot_be_fitted_is_refused(refused, values, word):
         {"window": 31},
         {"num_windows": 0},
         {"epochs": 0},
-        {"num_iterations": -1},
     ],
 )
 def test_options_out_of_range_are_refused(refused, options):

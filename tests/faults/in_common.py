@@ -52,20 +52,14 @@ class Bench(abc.ABC):
         """Waits for a random moment of a run."""
         time.sleep(rng.uniform(0.02, 0.95) * self.seconds)
 
-    def copy(self, name):
-        """Copies the results of the undisturbed run, to be damaged."""
-        return Path(shutil.copytree(self.folder / "undisturbed", self.folder / name))
+    def again(self, name):
+        """Runs the same command again and describes what is wrong with its exit code or results; None if nothing is."""
+        code, _, err = self.ran(name)
+        return f"NOT recovered: {code} {err.strip()[-200:]}" if code or err else self.wrong(name)
 
-    def again(self, name, said=None):
-        """Runs the same command again and describes what is wrong with its exit code, results or output (`said`); None if nothing is."""
-        code, out, err = self.ran(name)
-        if code or err:
-            return f"NOT recovered: {code} {err.strip()[-200:]}"
-        return self.wrong(name) or (f"NOT said: {said}" if said is not None and out.count(said) != 1 else None)
-
-    def recovered(self, name, said=None):
+    def recovered(self, name):
         """Runs the same command again and returns the outcome of the try. If it recovered, the folder of the try is removed."""
-        wrong = self.again(name, said)
+        wrong = self.again(name)
         if wrong is None:
             shutil.rmtree(self.folder / name)
         return wrong or f"recovered, {self.same}"
@@ -148,68 +142,3 @@ def read_only(bench, name, rng):
         wrong = not_one_line(code, err) or bench.again(name)
     shutil.rmtree(bench.folder / name)
     return wrong or f"one line{f' ({which})' if len(bench.disks) > 1 else ''}; recovered, {bench.same}"
-
-
-def flip(path, rng):
-    """Flips one bit of a file."""
-    content = bytearray(path.read_bytes())
-    content[rng.integers(len(content))] ^= 1 << rng.integers(8)
-    path.write_bytes(content)
-
-
-CLOCK = """
-import os, time
-_time, _time_ns = time.time, time.time_ns
-def _step():
-    with open(os.environ["CLOCK_STEP"]) as file:
-        return float(file.read() or 0)
-time.time, time.time_ns = lambda: _time() + _step(), lambda: _time_ns() + int(1e9 * _step())
-"""
-
-
-@contextlib.contextmanager
-def stepping(folder):
-    """Yields a function that moves the clock of a running command by seconds, and the environment to start the command with.
-
-    The machine's own clock stays: a `sitecustomize.py` in front of the command's modules shifts `time.time`, by what a file
-    says at that moment. `time.monotonic` goes on evenly, as it does when an administrator steps the clock. Files are stamped
-    by the kernel; `stepped` shifts their times as the clock would have.
-    """
-    folder.mkdir()
-    (folder / "sitecustomize.py").write_text(CLOCK)
-
-    def step(seconds):
-        (folder / "new").write_text(str(seconds))
-        os.replace(folder / "new", folder / "seconds")
-
-    step(0)
-    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
-    try:
-        yield step, os.environ | {"PYTHONPATH": path, "CLOCK_STEP": str(folder / "seconds")}
-    finally:
-        shutil.rmtree(folder)
-
-
-def stepped(folder, seconds):
-    """Shifts the modification times of a folder and of all files in it."""
-    for path in (folder, *folder.rglob("*")):
-        with contextlib.suppress(FileNotFoundError):  # a run may be changing the folder
-            about = path.stat()
-            os.utime(path, (about.st_atime + seconds, about.st_mtime + seconds))
-
-
-def clock_change(bench, name, rng):
-    """Moves the clock by years during a run. The next run finds files with those times while the clock is correct again."""
-    with stepping(bench.folder / f"{name}.clock") as (step, environment):
-        process = bench.start(name, env=environment)
-        bench.moment(rng)
-        step(seconds := float(rng.choice([-1, 1]) * rng.uniform(2, 20) * 365 * 86_400))
-        if (bench.folder / name).is_dir():
-            stepped(bench.folder / name, seconds)
-        err = process.communicate()[1]
-        if process.returncode or err:
-            return f"NOT undisturbed: {process.returncode} {err.strip()[-300:]}"
-        if wrong := bench.wrong(name):
-            return wrong
-        stepped(bench.folder / name, -2 * seconds)
-        return f"went on; {bench.recovered(name)}"

@@ -3,12 +3,10 @@
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import time
 
 from tests.datasets.test_generate import children_of, content_of
-from tests.faults.in_common import MISSED, ROOT, Bench, clock_change, flip, full_disk, interrupt, kill, not_one_line, read_only
+from tests.faults.in_common import MISSED, ROOT, Bench, full_disk, interrupt, kill, read_only
 
 MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n"
 
@@ -45,45 +43,6 @@ def kill_worker(bench, name, rng):
     return missed + bench.recovered(name) if process.returncode == 0 else f"NOT recovered by itself: {err.strip()[-200:]}"
 
 
-def damaged_shard(bench, name, rng):
-    shard = sorted(bench.copy(name).glob("shard-*"))[rng.integers(60)]
-    flip(shard, rng)
-    verified = subprocess.run([sys.executable, "-m", "enhsim_tf", "verify", bench.folder / name], cwd=ROOT, capture_output=True, text=True)
-    found = verified.returncode == 2 and verified.stdout.splitlines() == [f"{shard.name}: its checksum differs from the recorded one"]
-    return f"named by verify; {bench.recovered(name)}" if found else "NOT found by verify"
-
-
-def damaged_manifest(bench, name, rng):
-    manifest = bench.copy(name) / "_manifest.json"
-    os.truncate(manifest, rng.integers(manifest.stat().st_size - 2))
-    code, _, err = bench.ran(name)
-    if "Remove it" not in err:
-        return f"NOT said what to do: {code} {err.strip()[-200:]}"
-    manifest.unlink()
-    return not_one_line(code, err) or f"one line; {bench.recovered(name)}"
-
-
-def damaged_model(bench, name, rng):
-    model = bench.folder / "models" / "volts" / "enhancer.keras"
-    content = model.read_bytes()
-    model.write_bytes(content[: rng.integers(len(content))])
-    code, _, err = bench.ran(name)
-    model.write_bytes(content)
-    return not_one_line(code, err) or f"one line; {bench.recovered(name)}"
-
-
-def two_runs(bench, name, rng):
-    first = bench.start(name)
-    bench.moment(rng)
-    code, _, err = bench.ran(name)
-    first.communicate()
-    late = f"{MISSED}; " if code == 0 else ""  # the first run had already ended
-    wrong = not_one_line(code, err) if code else None
-    if first.returncode:
-        wrong = f"NOT undisturbed: {first.returncode}"
-    return wrong or late + bench.recovered(name)
-
-
 def lost_node(bench, name, rng):
     """Removes one node of a two-node Ray cluster while both nodes are working."""
     try:
@@ -113,10 +72,5 @@ FAULTS = {
     "interrupt by the user (SIGINT)": interrupt,
     "disk full (a small tmpfs)": full_disk,
     "read-only output": read_only,
-    "damaged shard": damaged_shard,
-    "damaged manifest": damaged_manifest,
-    "damaged model": damaged_model,
-    "two runs into one folder": two_runs,
-    "clock change": clock_change,
     "a node of a Ray cluster removed": lost_node,
 }

@@ -1,13 +1,11 @@
 """Fault injection into `python -m enhsim_tf.reproduce` and its cache."""
 
 import json
-import os
 import zipfile
 
 from tests.datasets.test_generate import content_of
-from tests.faults.in_common import ROOT, Bench, clock_change, flip, full_disk, interrupt, kill, read_only
+from tests.faults.in_common import ROOT, Bench, full_disk, interrupt, kill, read_only
 
-DAMAGED = "damaged in the cache"
 LEFT_OUT = ("timings", "from_cache", "this_run_s")  # keys of results.json that differ between runs: times, and use of the cache
 
 
@@ -61,47 +59,9 @@ class ReproduceBench(Bench):
         return None
 
 
-def damaged(pattern, harm):
-    """A fault that damages one file of a finished cache. The next run must report it and compute the stage again."""
-
-    def fault(bench, name, rng):
-        files = sorted(path for path in (bench.copy(name) / "cache").rglob(pattern) if path.is_file())
-        harm(files[rng.integers(len(files))], rng)
-        return f"told; {bench.recovered(name, DAMAGED)}"
-
-    return fault
-
-
-def cut(path, rng):
-    os.truncate(
-        path, rng.integers(path.stat().st_size - 1)
-    )  # truncates at least two bytes: losing the final line break alone does no damage
-
-
-def flip_or_cut(path, rng):
-    (flip, cut)[rng.integers(2)](path, rng)
-
-
-def two_runs(bench, name, rng):
-    first = bench.start(name)
-    bench.moment(rng)
-    second = bench.start(name)
-    for process in (first, second):
-        err = process.communicate()[1]
-        if process.returncode or err:
-            return f"NOT both ended well: {process.returncode} {err.strip()[-300:]}"
-    return bench.wrong(name) or f"both ended well, same results; {bench.recovered(name)}"
-
-
 FAULTS = {
     "run killed (SIGKILL)": kill,
     "interrupt by the user (SIGINT)": interrupt,
     "disk full (a small tmpfs)": full_disk,
     "read-only cache or output": read_only,
-    "damaged array of a stage": damaged("*.npz", flip_or_cut),
-    "damaged stage.json": damaged("stage.json", flip_or_cut),
-    "damaged saved network": damaged("*.keras", flip_or_cut),
-    "missing file of a stage": damaged("*", lambda path, rng: path.unlink()),
-    "two runs with one cache at once": two_runs,
-    "clock change": clock_change,
 }

@@ -18,6 +18,7 @@ from enhsim_tf.datasets import generate  # noqa: E402
 from enhsim_tf.datasets.mix import Mix, ScenarioShare  # noqa: E402
 from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
+from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput  # noqa: E402
 from enhsim_tf.noise.surrogates import GaussianNoise  # noqa: E402
 
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
@@ -25,7 +26,7 @@ WINDOW, INTERVAL_S = 60, 2.0
 MIX = Mix(0.5, (ScenarioShare("stuck", 0.3, (0.2, 0.9), (0.0, 0.5)), ScenarioShare("gain_loss", 0.2, (0.5, 0.5), (0.25, 0.25))))
 
 
-class Plain:
+class Plain(NoisyOutput):
     """Stands in for an enhanced simulator, without a network: the coarse signal, a level, and white noise."""
 
     def __init__(self, noise_sd=0.1, levels=None):
@@ -34,9 +35,6 @@ class Plain:
 
     def enhance(self, coarse):
         return coarse
-
-    def draw_noise(self, clean, rng):
-        return self.noise.generate(len(clean), rng)
 
 
 class PlainMaker(ShardMaker):

@@ -24,12 +24,10 @@ def model(tmp_path_factory):
     """A simulator whose networks are wide enough for their sums to be rounded in many ways."""
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
     from enhsim_tf.enhancer.network import build_enhancer
-    from enhsim_tf.noise.convolutional_gan import convolutional_noise_gan
+    from enhsim_tf.noise.surrogates import GaussianAutoregression
     from tests.enhanced_simulator.test_simulator import COARSE
 
-    windows = np.random.default_rng(0).normal(size=(50, 120)).astype(np.float32)
-    noise = convolutional_noise_gan(windows, 2, 0)
-    noise.fit(windows, 2, verbose=False)
+    noise = GaussianAutoregression([0.5], 1.0, 120)
     folder = tmp_path_factory.mktemp("models") / "volts"
     EnhancedSimulator(COARSE, build_enhancer(120, 256, seed=0), noise, interval_s=2.0, trained={"seed": 0}).save(folder)
     return folder

@@ -13,8 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
 WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_adam keras_tools.blockwise_training keras_tools.convolution_maximum
-    enhancer.network enhancer.ladder enhancer.rung_networks noise.generator noise.discriminator noise.gan noise.latent noise.convolutional_gan
-    noise.autoregressive_network noise.changes noise.shrinkage noise.linear_noise noise.guarded_training
+    enhancer.network enhancer.ladder enhancer.rung_networks noise.generator noise.discriminator noise.gan noise.latent
     enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting enhanced_simulator.choosing
     enhanced_simulator.updating
     enhanced_simulator.runs.model enhanced_simulator.runs.fitting enhanced_simulator.runs.residuals""".split()
@@ -49,9 +48,9 @@ def test_public_names_resolve_to_their_objects():
         _ = enhsim_tf.nothing
 
 
-def test_the_papers_recipe_is_found_where_the_readme_says():
-    from enhsim_tf.enhanced_simulator import PAPER, EnhancedSimulator, simulator
+def test_the_simulator_is_found_in_its_package():
+    from enhsim_tf.enhanced_simulator import EnhancedSimulator, simulator
 
-    assert PAPER is simulator.PAPER and EnhancedSimulator is simulator.EnhancedSimulator
+    assert EnhancedSimulator is simulator.EnhancedSimulator
     with pytest.raises(ImportError):
         from enhsim_tf.enhanced_simulator import nothing  # noqa: F401

@@ -10,19 +10,10 @@ from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import Delay, Pair, estimate_delay, pair_with_recording
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
-from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.checks import check_parts, check_size
 from enhsim_tf.enhanced_simulator.fit_options import LEAST_LEARNT, default_window
-from enhsim_tf.enhanced_simulator.noise_fitting import (
-    JUDGED_SHARE,
-    MOST_JUDGED,
-    NoiseTraining,
-    NoiseWindows,
-    auc_of,
-    choose_noise,
-    fit_noise,
-)
+from enhsim_tf.enhanced_simulator.noise_fitting import JUDGED_SHARE, MOST_JUDGED, NoiseWindows, auc_of, choose_noise
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhanced_simulator.runs.model import RunModel
 from enhsim_tf.enhanced_simulator.runs.options import RunOptions
@@ -30,11 +21,11 @@ from enhsim_tf.enhanced_simulator.runs.report import RATE, RunReport, compare_no
 from enhsim_tf.enhanced_simulator.runs.residuals import held_out_residuals, windows_of
 from enhsim_tf.enhanced_simulator.runs.scoring import ResidualDetector
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
-from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, Rung, fit_ladder, fit_rung
+from enhsim_tf.enhancer.ladder import COARSE, RUNGS, Ladder, fit_ladder, fit_rung
 from enhsim_tf.enhancer.overlapping import enhance_run
 from enhsim_tf.enhancer.training_pairs import split_end
-from enhsim_tf.noise.rung_names import BEST
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.noise.names import BEST
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, first_samples, random_window_starts
@@ -47,8 +38,6 @@ def fit_run_model(
     telemetry: Telemetry | Sequence[Telemetry],
     coarse: CoarseSimulator,
     options: RunOptions | None = None,
-    verbose: int | str = 0,
-    progress: Progress = SILENT,
 ) -> tuple[RunModel, RunReport]:
     """Fits a run model and evaluates it on the held-out end of the telemetry.
 
@@ -56,8 +45,6 @@ def fit_run_model(
         telemetry: Nominal telemetry, or the parts between its gaps on a common clock.
         coarse: A recorded run of the same time, or a coarse simulator, which is run at the times of the telemetry.
         options: Settings of the fit. None uses the defaults.
-        verbose: Progress bars of the noise networks: 0 none, 1 always, "auto" on a terminal.
-        progress: Reports the progress of the noise training as lines of text.
 
     Returns:
         The model and the report.
@@ -94,7 +81,7 @@ def fit_run_model(
     residuals = held_out_residuals(learnt, windows, ladder.edges, ladder.before_refit[ladder.chosen], options.seed, options.epochs)
     below = list(zip(residuals, _clean_below(residuals, learnt), strict=True))
     levels = Levels.find(np.concatenate([pair.telemetry.values for pair in learnt]))
-    noise, judged_noise, noted = _fit_noise(below, rung, levels, window, options, verbose, progress)
+    noise, judged_noise, noted = _fit_noise(below, levels, window, options)
     notes += noted
     coverage = Coverage.fit(windows[0], windows[2], rung.scaling)
     trained = {
@@ -102,7 +89,7 @@ def fit_run_model(
         "num_samples": sum(map(len, learnt)),
         "coarse": _kept(coarse),
         "rungs": {each.name: each.error for each in ladder.judged},
-        "noise_ladder": judged_noise,
+        "noise_candidates": judged_noise,
     } | dataclasses.asdict(options)
     nominal = dataclasses.replace(recording, parts=tuple(Run(pair.coarse, pair.telemetry.offset_s) for pair in learnt))
     nominal = dataclasses.replace(nominal, interval_s=parts[0].interval_s, start=parts[0].start)
@@ -178,35 +165,26 @@ def split_pairs(pairs: Sequence[Pair], share: float) -> tuple[list[Pair], list[P
 
 
 def _fit_noise(
-    residuals: Sequence[tuple[Telemetry, Telemetry]],
-    rung: Rung,
-    levels: Levels | None,
-    window: int,
-    options: RunOptions,
-    verbose: int | str,
-    progress: Progress,
-) -> tuple[Any, list[dict[str, Any]], list[str]]:
+    residuals: Sequence[tuple[Telemetry, Telemetry]], levels: Levels | None, window: int, options: RunOptions
+) -> tuple[NoiseModel, list[dict[str, Any]], list[str]]:
     """Fits the noise model to held-out residuals, each with the enhanced run below it.
 
     Returns:
-        The noise model, the judgements of all rungs, and what is to be said about it.
+        The noise model, the judgements of all candidates, and what is to be said about it.
     """
-    # `score --coarse` judges the difference from the enhanced run, so the detectors see the noise alone
-    training = NoiseTraining(
-        options.num_iterations, options.seed, rung.scaling.scale_target, levels, with_signal=False, verbose=verbose, progress=progress
-    )
     notes: list[str] = []
     noise = [each for each, _ in residuals]
     everything = _cut(residuals, random_window_starts(noise, window, options.num_windows, np.random.default_rng([options.seed, 1])), window)
-    if not np.std(everything.noise, dtype=np.float64) > 0:  # networks cannot learn noise of size 0
-        return WindowBootstrap(everything.noise), [], notes
+    if not np.std(everything.noise, dtype=np.float64) > 0:  # noise of size 0 cannot be judged
+        return everything.fit("residual windows"), [], notes
     if options.noise != BEST:
-        return fit_noise(options.noise, everything, training, notes), [], notes
+        return everything.fit(options.noise), [], notes
     halves = [
         _evenly_spaced(list(zip(*some, strict=True)), window, options.num_windows)
         for some in zip(*(split_end(each, JUDGED_SHARE) for each in zip(*residuals, strict=True)), strict=True)
     ]
-    return *choose_noise(*halves, everything, training, notes), notes
+    # `score --coarse` judges the difference from the enhanced run, so the detectors see the noise alone
+    return *choose_noise(*halves, everything, options.seed, notes, levels, with_signal=False), notes
 
 
 def _clean_below(residuals: Sequence[Telemetry], pairs: Sequence[Pair]) -> list[Telemetry]:
@@ -270,7 +248,7 @@ def _report(
         compare_noise([part.values for part, _ in residuals], generated),
         float(np.mean(alarms)),
         float(np.mean(outside)),
-        tuple(model.trained["noise_ladder"]),
+        tuple(model.trained["noise_candidates"]),
         options.noise,
         _noise_auc(model, residuals, list(zip(map(Telemetry, left), map(Telemetry, enhanced), strict=True)), options.seed),
         judged[0].telemetry.unit,

@@ -17,6 +17,7 @@ from enhsim_tf.enhanced_simulator.runs import saving
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
 from enhsim_tf.enhancer.ladder import Rung
 from enhsim_tf.enhancer.overlapping import cut_run, enhance_run
+from enhsim_tf.noise.candidates import NoiseModel
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -29,7 +30,7 @@ class RunModel(NoisyOutput):
 
     Args:
         rung: The enhancer.
-        noise: The noise model, of any rung of `noise.ladder`.
+        noise: The noise model, see `noise.candidates`.
         coverage: The range of the training runs.
         nominal: The nominal run of the fit, with the model's columns. It is saved with the model.
         window: Length of a window in samples.
@@ -47,7 +48,7 @@ class RunModel(NoisyOutput):
     def __init__(
         self,
         rung: Rung,
-        noise: Any,
+        noise: NoiseModel,
         coverage: Coverage,
         nominal: Recording,
         window: int,
@@ -135,10 +136,6 @@ class RunModel(NoisyOutput):
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
             yield [self.add_noise(enhanced, rng) for enhanced in clean]
-
-    def in_unit(self, clean: np.ndarray) -> np.ndarray:
-        """Converts enhanced values to the units of the enhancer."""
-        return self.rung.scaling.scale_target(clean)
 
     def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
         """Runs the coarse simulator of the model.

@@ -4,7 +4,7 @@ import dataclasses
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, NOISES
-from enhsim_tf.noise.rung_names import BEST
+from enhsim_tf.noise.names import BEST
 
 RUNGS = ("coarse", "level and gain", "ridge", "ridge and network", "network")  # as in `enhancer.ladder`, which imports TensorFlow
 
@@ -17,7 +17,6 @@ class RunOptions:
         window: Length of a window in samples. None: a twentieth of the training telemetry, from 64 to 500 samples.
         num_windows: Number of training windows, evenly spaced over the time.
         epochs: Passes of the networks over the training windows.
-        num_iterations: Adversarial iterations of the GANs of noise; the autoregressive network takes three times as many.
         noise: Model of the noise, as in `FitOptions`.
         enhancer: One of `RUNGS`, or None, which chooses the simplest rung that is not measurably worse than the best one.
         delay_s: How much later the telemetry is than the coarse run, in seconds. None: it is estimated.
@@ -31,7 +30,6 @@ class RunOptions:
     window: int | None = None
     num_windows: int = 2_500
     epochs: int = 6
-    num_iterations: int = 1_000
     noise: str = BEST
     enhancer: str | None = None
     delay_s: float | None = None
@@ -43,7 +41,7 @@ class RunOptions:
             raise InputError(f"Expected held_out from 0 to 0.5. Received: held_out={self.held_out}.")
         if self.window is not None and self.window < FEWEST_SAMPLES:
             raise InputError(f"Expected a window of at least {FEWEST_SAMPLES} samples. Received: window={self.window}.")
-        for name, least in (("num_windows", 10), ("epochs", 1), ("num_iterations", 0)):
+        for name, least in (("num_windows", 10), ("epochs", 1)):
             if getattr(self, name) < least:
                 raise InputError(f"Expected {name} to be at least {least}. Received: {name}={getattr(self, name)}.")
         if self.noise not in NOISES or self.enhancer not in (None, *RUNGS):

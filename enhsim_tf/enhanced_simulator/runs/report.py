@@ -32,7 +32,7 @@ class RunReport:
         noise: Standard deviation (`sd`) and correlation of neighbouring samples (`lag_1`), for `real` residuals and `generated` noise.
         false_alarms: Share of these samples that the residual detector flags, at a threshold set for `RATE`.
         outside: Share of these samples whose coarse run is outside the training range.
-        noise_ladder: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for, or if there was too little to judge on.
+        noise_candidates: Rows of `noise_fitting.choose_noise`. Empty if a noise model was asked for, or if there was too little to judge on.
         noise_model: Name of the noise model that was asked for, or `best`.
         noise_auc: AUC of a classifier that separates `generated` noise from the residuals of the judged telemetry, and of one that
             separates `real` residuals of the training telemetry from them. Empty if there is too little telemetry.
@@ -55,8 +55,8 @@ class RunReport:
     noise: Mapping[str, Mapping[str, float]]
     false_alarms: float
     outside: float
-    noise_ladder: tuple[Mapping[str, Any], ...] = ()
-    noise_model: str = "convolutional"
+    noise_candidates: tuple[Mapping[str, Any], ...] = ()
+    noise_model: str = "best"
     noise_auc: Mapping[str, float] = dataclasses.field(default_factory=dict)
     unit: str = "1"
     examples: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
@@ -69,7 +69,7 @@ class RunReport:
         return plain | {
             "nrmse": dict(self.nrmse),
             "noise": {kind: dict(each) for kind, each in self.noise.items()},
-            "noise_ladder": [dict(each) for each in self.noise_ladder],
+            "noise_candidates": [dict(each) for each in self.noise_candidates],
             "noise_auc": dict(self.noise_auc),
             "verdict": self.verdict,
         }
@@ -95,7 +95,7 @@ class RunReport:
         ]
 
     def _of_the_noise_models(self) -> str:
-        said = sentence_of(self.noise_ladder, self.noise_model)
+        said = sentence_of(self.noise_candidates, self.noise_model)
         if not self.noise_auc:
             return said
         return f"{said} AUC of a classifier against held-out residuals: generated {self.noise_auc['generated']:.2f}, real {self.noise_auc['real']:.2f}."

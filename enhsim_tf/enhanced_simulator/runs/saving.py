@@ -10,12 +10,12 @@ import numpy as np
 from enhsim_tf.coarse_simulator.constant_level import waves_or_level
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.enhanced_simulator.runs.coverage import Coverage
-from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, read_saved, saved_noise, write_saved
+from enhsim_tf.enhanced_simulator.saving import RUNS_FORMAT, read_saved, write_saved
 from enhsim_tf.enhancer.ladder import Rung
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.rung_networks import network_from, weights_of
 from enhsim_tf.enhancer.scaling import Scaling
-from enhsim_tf.noise.states import model_from
+from enhsim_tf.noise.states import model_from, state_of
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 
@@ -46,7 +46,7 @@ def save_run_model(
         InputError: If the folder contains something other than a saved model, if a number is not finite, or if the noise is a GAN,
             which is not saved; the folder is left unchanged.
     """
-    state = saved_noise(noise)
+    state = state_of(noise)
     arrays = {
         "enhancer": weights_of(rung.network),
         "noise": state.arrays,
@@ -86,7 +86,7 @@ def load_run_model(folder: str | os.PathLike) -> dict[str, Any]:
 
 def _arguments_from(arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> dict[str, Any]:
     scaling, window, trained = Scaling.from_config(settings["scaling"]), int(settings["window"]), dict(settings["trained"])
-    noise = model_from(settings["noise"], {}, arrays.get("noise", {}))
+    noise = model_from(settings["noise"], arrays["noise"])
     parts = tuple(Run(arrays["nominal"][f"part_{number}"], float(each)) for number, each in enumerate(settings["nominal"]["offsets_s"]))
     nominal = Recording(parts, tuple(settings["columns"]), float(settings["interval_s"]), settings["nominal"]["start"], "the nominal run")
     coverage = Coverage(OutOfRange.from_arrays(arrays["range"]), settings["limit"], scaling, window)

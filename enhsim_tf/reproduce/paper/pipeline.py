@@ -269,7 +269,7 @@ class Experiment:
                 "coarse": coarse,
                 "enhanced": clean,
                 "enhanced + GAN noise": clean + simulator.noise.generate(len(clean), seed),
-                "enhanced + Gaussian noise": clean + gaussian.generate(len(clean), seed),
+                "enhanced + Gaussian noise": clean + gaussian.generate(len(clean), np.random.default_rng(seed)),
             }
 
         training, threshold = arms_of("arms, training"), arms_of("arms, threshold")

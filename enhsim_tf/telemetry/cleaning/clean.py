@@ -12,9 +12,10 @@ import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
+from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
 from enhsim_tf.telemetry.cleaning.regular_grid import find_binned_segments, find_interval, find_regular_segments, regular_step_fraction
-from enhsim_tf.telemetry.cleaning.report import CleaningLog, Report, finding_from_dict, iso_time
+from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, finding_from_dict, iso_time
 from enhsim_tf.telemetry.cleaning.resampling import (
     Rows,
     build_parts,
@@ -26,75 +27,6 @@ from enhsim_tf.telemetry.cleaning.times import UNITS_NS, localize_times, parse_t
 from enhsim_tf.telemetry.series import Telemetry
 
 _MIN_REGULAR_FRACTION = 0.4  # of the steps between rows; random times reach 0.25
-_CHOICES = {
-    "on_bad_times": ("refuse", "drop"),
-    "on_bad_values": ("refuse", "drop"),
-    "same_time": ("mean", "first", "last", "refuse"),
-    "other_rates": ("resample", "leave out"),
-    "fill": ("linear", "hold"),
-}
-_MAX_FILL = {"linear": 5, "hold": 1_000_000}
-
-
-@dataclasses.dataclass(frozen=True)
-class Cleaning:
-    """Options of `clean`.
-
-    Args:
-        interval_s: Sampling interval in seconds. Every row is assigned to the nearest point of this grid, and rows that share
-            a point are averaged. None: the interval that most rows have.
-        timezone: Time zone of times without one, such as "Europe/Berlin". None: UTC; times that jump back by one hour, as a
-            local clock does, then raise an `InputError`.
-        time_unit: Unit of numeric times: D, h, min, s, ms, us or ns. None: inferred from their magnitude.
-        time_format: Format of times given as text, as for `datetime.strptime`. None: ISO 8601.
-        on_bad_times: Treatment of times that cannot be read: "refuse" raises an `InputError`, "drop" drops their rows.
-        on_bad_values: Treatment of values that cannot be read: "refuse" raises an `InputError`, "drop" treats them as missing.
-        decimal: "," if commas are decimal separators even where they could separate thousands.
-        same_time: Treatment of different values at the same time: take their "mean", the "first" or the "last", or "refuse".
-        max_jitter: Largest distance of a time from the regular grid, in intervals, at most 0.5. The series is split where the
-            distance is larger.
-        max_fill: Longest gap that is filled, in samples. The series is split at longer gaps. None: 5, or 1,000,000 with
-            `fill="hold"`.
-        fill: How gaps are filled: "linear", by straight lines, or "hold", with the last value before the gap, for telemetry that is
-            sent only when its value changes. With "hold", the last of several rows in an interval is used, not their mean.
-        other_rates: Treatment of stretches with another sampling rate: "resample" or "leave out".
-        min_part: Shortest part that is kept, in samples.
-
-    Raises:
-        InputError: If an option is out of range.
-    """
-
-    interval_s: float | None = None
-    timezone: str | None = None
-    time_unit: str | None = None
-    time_format: str | None = None
-    on_bad_times: str = "refuse"
-    on_bad_values: str = "refuse"
-    decimal: str | None = None
-    same_time: str = "mean"
-    max_jitter: float = 0.25
-    max_fill: int | None = None
-    fill: str = "linear"
-    other_rates: str = "resample"
-    min_part: int = 2
-
-    def __post_init__(self):
-        for name, choices in _CHOICES.items():
-            if getattr(self, name) not in choices:
-                raise InputError(f"Expected {name}, one of: {', '.join(choices)}. Received: {name}={getattr(self, name)!r}.")
-        if self.interval_s is not None and not 1e-9 <= self.interval_s <= 1e9:
-            raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
-        if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
-            raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
-        if self.time_unit is not None and self.time_unit not in UNITS_NS:
-            raise InputError(f"Expected time_unit, one of: {', '.join(UNITS_NS)}. Received: time_unit={self.time_unit!r}.")
-        if self.decimal not in (None, ".", ","):
-            raise InputError(f"Expected decimal, '.' or ','. Received: decimal={self.decimal!r}.")
-
-    @property
-    def longest_gap(self) -> int:
-        """Longest gap that is filled, in samples."""
-        return _MAX_FILL[self.fill] if self.max_fill is None else self.max_fill
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,22 +67,24 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     is_series = isinstance(series, pd.Series)
     name = "telemetry" if not is_series or series.name is None else str(series.name)
     about = series.attrs if is_series else {}
-    values, bad, noted = parse_numbers(series, name, options.on_bad_values == "drop", options.decimal)
+    places, decimal = about.get("places", ROWS), options.decimal or about.get("decimal")
+    values, bad, noted = parse_numbers(series, name, options.on_bad_values == "drop", decimal, options.missing_values, places)
     if not len(values):
         raise InputError(f"Expected samples. Received: none from {name}. Give a source that holds a series.")
     has_time = is_series and not isinstance(series.index, pd.RangeIndex)
     if has_time:
-        log, rows = _rows_with_times(series.index, values, name, options, about)
+        log, rows, clock = _rows_with_times(series.index, values, name, options, about)
     elif options.interval_s is not None:
         raise InputError(f"Expected interval_s with times only. Received: interval_s={options.interval_s} with {name}, which has none.")
     else:
-        log = CleaningLog(None, map(finding_from_dict, about.get("findings", ())))
+        log = CleaningLog(None, map(finding_from_dict, about.get("findings", ())), places)
         numbers = np.arange(len(values))
         begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
         rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers, np.ones(len(values), np.int64))
+    log.findings[:0] = [_clock_finding(clock, rows.times) if has_time else _NO_CLOCK]
     log.findings += noted
 
-    rows = drop_duplicate_timestamps(rows, bad, log, name, options.same_time)
+    rows = drop_duplicate_timestamps(rows, bad, log, name, options.same_time, options.interval_s is not None)
     rows = drop_missing_values(rows, bad, log, name)
     base = int(rows.times[0])
     rows.times = rows.times - base
@@ -163,19 +97,22 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         if regular_step_fraction(rows.times, interval) < _MIN_REGULAR_FRACTION:
             raise InputError(
                 f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
-                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. Give interval_s, and fill='hold' for telemetry that is sent only when it changes."
+                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. "
+                "Give interval_s (--interval), and fill='hold' (--fill hold) for telemetry that is sent only when it changes."
             )
         if not holds:  # a long step of telemetry that is held is no slower rate
             rows = resample_to_common_interval(rows, interval, log, options.other_rates == "resample", max_fill)
     else:
-        raise InputError(f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s.")
+        raise InputError(
+            f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s (--interval)."
+        )
     if options.interval_s is not None or holds:
         segments = find_binned_segments(rows.times, interval, max_fill + 1)
     else:
         segments = find_regular_segments(rows.times, interval, options.max_jitter, max_fill + 1)
-    same_place = "last" if holds else "mean" if options.interval_s is not None else options.same_time
+    same_place = "last" if holds else "mean" if options.interval_s is not None else options.same_time or "mean"
     parts, used = build_parts(rows, segments, interval, log, name, same_place, max_fill, options.min_part, holds)
-    describe_values(parts, log)
+    describe_values(parts, values[np.isfinite(values)], log)
 
     first = parts[0].begin if has_time else -base
     start = iso_time(base + round(first)) if has_time else None
@@ -185,16 +122,51 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     return Cleaned(telemetry, report)
 
 
-def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
-    """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
-    stamps, bad, noted = parse_times(index, f"the times of {name}", options.on_bad_times == "drop", options.time_unit, options.time_format)
+@dataclasses.dataclass(frozen=True)
+class _Clock:
+    """The clock of a channel, for its report: the column, how its times are written, their zone, and whether they count from zero."""
+
+    column: str
+    form: str
+    zone: str
+    counts: bool
+
+
+_NO_CLOCK = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
+
+
+def _clock_finding(clock: _Clock, times: np.ndarray) -> Finding:
+    """Describes the clock; `times` are those of all rows with a time, in ascending order."""
+    first, last = int(times[0]), int(times[-1])
+    if clock.counts:
+        span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s"
+    else:
+        span = f"from {iso_time(first)} to {iso_time(last)}"
+    text = f"the clock is {clock.column}: {clock.form}, zone {clock.zone}, {span}"
+    return Finding("clock", 1, text, details=dataclasses.asdict(clock) | {"first_ns": first, "last_ns": last})
+
+
+def _rows_with_times(
+    index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]
+) -> tuple[CleaningLog, Rows, _Clock]:
+    """Parses the times of a raw series and returns the cleaning log, the rows that have a time, in chronological order, and the clock."""
+    places = about.get("places", ROWS)
+    what, drop = f"the times of {name}", options.on_bad_times == "drop"
+    parsed = parse_times(index, what, drop, options.time_format, options.timezone, places)
+    stamps, bad = parsed.stamps, parsed.bad
+    known = about.get("clock") or {
+        "column": "the index" if index.name is None else repr(str(index.name)),
+        "form": parsed.form,
+        "zone": parsed.zone,
+        "counts": parsed.counts,
+    }
     had_time = stamps.notna()
     local = stamps.tz is None
     if local and options.timezone:
         stamps = localize_times(stamps, options.timezone)
     changed = had_time & stamps.isna()
     times = stamps.as_unit("ns").asi8 if stamps.tz is None else stamps.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8
-    log = CleaningLog(times, [*map(finding_from_dict, about.get("findings", ())), *noted])
+    log = CleaningLog(times, [*map(finding_from_dict, about.get("findings", ())), *parsed.findings], places, known["counts"])
     kept = np.flatnonzero(stamps.notna())
     unreadable, missing = np.flatnonzero(bad), np.flatnonzero(~had_time & ~bad)
     log.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))
@@ -204,10 +176,11 @@ def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cl
     if not len(kept):
         raise InputError(f"Expected rows with times. Received: none in {name}. Name another time column.")
     if local:
-        zone = options.timezone or "UTC"
-        log.add("time zone", (), f"times without a zone, taken as {zone}: {{count}}", count=len(kept))
+        known = known | {"zone": f"{options.timezone or 'UTC'}, as none is stated"}
         if options.timezone is None:
             refuse_repeated_local_hour(times[kept], kept, log, name)
+    elif options.timezone and known["zone"] != "none":
+        known = known | {"zone": f"{known['zone']}, which goes before {options.timezone}"}
     steps = np.diff(times[kept])
     if len(steps) and (steps <= 0).all() and (steps < 0).any():
         log.add("descending", (), "rows in descending order of time, reversed: {count}", count=len(kept))
@@ -215,4 +188,4 @@ def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cl
         early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
         log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
-    return log, Rows(times[kept], values[kept], kept, np.ones(len(kept), np.int64))
+    return log, Rows(times[kept], values[kept], kept, np.ones(len(kept), np.int64)), _Clock(**known)

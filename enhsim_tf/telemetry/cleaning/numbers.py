@@ -6,30 +6,45 @@ that the caller can count it.
 
 import decimal as decimal_module
 import numbers
+import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.report import Finding
+from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
 
-_MISSING = ("", "nan", "na", "n/a", "#n/a", "<na>", "null", "none", "nat")
+_MISSING = ("", "na", "n/a", "#n/a", "<na>", "null", "none", "nat")
+_C_NAN = r"[+-]?(?:nan(?:\([a-z0-9_]*\))?|1\.#(?:qnan|snan|ind|nan)0*)"  # as printf of C writes NaN
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _INFINITE = r"[+-]?inf(?:inity)?"
-_COMMA = r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?"
-_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
+_COMMA = r"[+-]?(?:\d*|[1-9]\d{0,2}(?:\.\d{3})+),\d+(?:[eE][+-]?\d+)?"
+_COMMA_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+"
+_POINT_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
+_BOTH = rf"{_COMMA_THOUSANDS}\.\d*"  # 1,234.5 shows that commas separate thousands
+_WHOLE = r"[+-]?\d+"
 _LARGEST = float(np.finfo(np.float32).max)
 
 
-def parse_numbers(values: Any, what: str, drop: bool = False, decimal: str | None = None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
+def parse_numbers(
+    values: Any,
+    what: str,
+    drop: bool = False,
+    decimal: str | None = None,
+    missing_values: Sequence[float | str] = (),
+    places: Places = ROWS,
+) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
     """Parses a column of values.
 
     Args:
         values: One-dimensional array, pandas Series or list of numbers, text or objects.
         what: Description of the source, for messages.
         drop: If True, a value that is not a number is marked and treated as missing. If False, it raises an `InputError`.
-        decimal: "," if commas are decimal separators even where they could separate thousands. None: inferred from the text.
+        decimal: Decimal sign of text; the other sign separates thousands. None: inferred from the text.
+        missing_values: Numbers and text that mean "no value".
+        places: Where the rows are in their file, for messages.
 
     Returns:
         `(values, bad, findings)`: float64 values with NaN where missing, the mask of values that could not be parsed, and
@@ -45,13 +60,17 @@ def parse_numbers(values: Any, what: str, drop: bool = False, decimal: str | Non
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
     findings: list[Finding] = []
     if is_text(values):
-        parsed, bad, findings = _parse_text_numbers(values.astype(object), decimal)
+        cells, findings = _without(values.astype(object), missing_values)
+        parsed, bad, noted = _parse_text_numbers(cells, decimal)
+        findings += noted
     else:
         with np.errstate(over="ignore"):
             parsed = values.to_numpy(np.float64, na_value=np.nan)
         bad = np.zeros(len(parsed), bool)
         if values.dtype == np.longdouble:
             bad = np.isinf(parsed) & np.isfinite(values.to_numpy())
+        parsed, findings = _without(pd.Series(parsed), missing_values)
+        parsed = parsed.to_numpy()
     too_fine = np.abs(parsed) > 2**53
     if pd.api.types.is_integer_dtype(values.dtype) and too_fine.any():
         findings.append(Finding("resolution", int(too_fine.sum()), f"integers beyond 2^53, rounded to float64: {too_fine.sum():,}"))
@@ -60,8 +79,8 @@ def parse_numbers(values: Any, what: str, drop: bool = False, decimal: str | Non
         row = int(np.argmax(bad | beyond))
         expected = f"values that float32 holds, up to {_LARGEST:.1e}" if beyond[row] else "numbers"
         raise InputError(
-            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at row {row} of {what}, and {int((bad | beyond).sum()) - 1:,} more. "
-            "Correct them, or leave them out with on_bad_values='drop' (--drop-bad)."
+            f"Expected {expected}. Received: {format_cell(values.iloc[row])} at {places.of(row)} of {what}, and "
+            f"{int((bad | beyond).sum()) - 1:,} more. {_advice(values.iloc[row])}"
         )
     return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
 
@@ -92,9 +111,65 @@ def format_cell(cell: Any) -> str:
 def is_missing(cells: pd.Series) -> np.ndarray:
     """Mask of missing cells: None, NaN, empty text and words such as "n/a"."""
     missing = cells.isna().to_numpy(bool, copy=True)
-    of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
-    missing[of_text] = cells[of_text].str.strip().str.casefold().isin(_MISSING).to_numpy(bool)
+    of_text = ~missing
+    if cells.dtype == object:
+        of_text &= cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+    text = cells[of_text]
+    if pd.api.types.is_string_dtype(text.dtype) and text.dtype != object and (text.str.len() > len("-nan(snan)") + 2).all():
+        return missing  # no such word is that long, as dates are
+    text = text.str.strip().str.casefold()
+    missing[of_text] = text.isin(_MISSING).to_numpy(bool) | text.str.fullmatch(_C_NAN).to_numpy(bool)
     return missing
+
+
+def _without(cells: pd.Series, missing_values: Sequence[float | str]) -> tuple[pd.Series, list[Finding]]:
+    """Empties the cells that mean "no value", and says how many."""
+    if not len(missing_values):
+        return cells, []
+    words = {str(value).strip() for value in missing_values}
+    numbers_of = [float(word) for word in words if re.fullmatch(f"{_NUMBER}|{_INFINITE}", word)]
+    found = pd.to_numeric(cells, errors="coerce").isin(numbers_of).to_numpy(bool)
+    if cells.dtype == object:
+        found |= cells.map(lambda cell: isinstance(cell, str) and cell.strip() in words).to_numpy(bool)
+    if not found.any():
+        return cells, []
+    text = f"values that mean no value ({', '.join(sorted(words))}), taken as missing: {found.sum():,}"
+    return cells.mask(found), [Finding("missing words", int(found.sum()), text)]
+
+
+def _advice(cell: Any) -> str:
+    if isinstance(cell, str) and re.fullmatch(f"{_COMMA_THOUSANDS}|{_COMMA}", cell.strip()):
+        return "Give decimal (--decimal , or --decimal .), or leave them out with on_bad_values='drop' (--drop-bad)."
+    return "Correct them, name words with missing_values (--missing-values), or leave them out with on_bad_values='drop' (--drop-bad)."
+
+
+def shows_comma(text: pd.Series) -> bool:
+    """Whether text has numbers whose comma can only be a decimal sign, such as 20,5, but not 1,500.
+
+    Args:
+        text: Text without missing cells.
+    """
+    cells = text.str.strip()
+    commas = cells[cells.str.fullmatch(_COMMA).to_numpy(bool)]
+    return bool(len(commas)) and not commas.str.fullmatch(_COMMA_THOUSANDS).all() and not cells.str.fullmatch(_BOTH).any()
+
+
+def has_commas(text: pd.Series) -> bool:
+    """Whether text has numbers with commas, whatever these mean.
+
+    Args:
+        text: Text without missing cells.
+    """
+    return bool(text.str.strip().str.fullmatch(f"{_COMMA}|{_COMMA_THOUSANDS}").any())
+
+
+def allows_point_thousands(text: pd.Series) -> bool:
+    """Whether every point in a column of numbers may separate thousands, such as in 1.200 and 999.
+
+    Args:
+        text: Text without missing cells.
+    """
+    return bool(text.str.strip().str.fullmatch(f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
 
 
 def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
@@ -107,15 +182,26 @@ def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarr
     text = cells.iloc[rows].str.strip()
     plain = text.str.fullmatch(f"{_NUMBER}|{_INFINITE}", case=False).to_numpy(bool)
     commas = ~plain & text.str.fullmatch(_COMMA).to_numpy(bool)
-    if commas.any():
+    thousands = ~plain & text.str.fullmatch(f"{_COMMA_THOUSANDS}|{_BOTH}").to_numpy(bool)
+    if decimal == "," and text.str.contains(",", regex=False).any() | text.str.fullmatch(_POINT_THOUSANDS).any():
+        with_points = text.str.fullmatch(_POINT_THOUSANDS).to_numpy(bool)
+        plain = plain & ~text.str.contains(".", regex=False).to_numpy(bool)
+        commas = commas | with_points
+        thousands = np.zeros_like(plain)
+    elif decimal == "." or text[thousands].str.fullmatch(_BOTH).any():
+        commas = np.zeros_like(plain)
+    elif commas.any():
         has_points = text[plain].str.contains(".", regex=False).any()
-        maybe_thousands = text[commas].str.fullmatch(_THOUSANDS).all() and decimal != ","
+        maybe_thousands = text[commas].str.fullmatch(_COMMA_THOUSANDS).all()
+        thousands = np.zeros_like(plain)
         if has_points or maybe_thousands:  # commas and points are mixed, or 1,500 could mean 1500 or 1.5
-            commas[:] = False
-        else:
-            findings.append(Finding("decimal comma", int(commas.sum()), f"numbers written with a decimal comma: {commas.sum():,}"))
-    readable = plain | commas
-    parsed[rows[readable]] = text[readable].str.replace(",", ".", regex=False).astype(np.float64)
+            commas = np.zeros_like(plain)
+    if commas.any():
+        findings.append(Finding("decimal comma", int(commas.sum()), f"numbers written with a decimal comma: {commas.sum():,}"))
+    text = text.mask(thousands, text.str.replace(",", "", regex=False))
+    text = text.mask(commas, text.str.replace(".", "", regex=False).str.replace(",", ".", regex=False))
+    readable = plain | commas | thousands
+    parsed[rows[readable]] = text[readable].astype(np.float64)
     written_finite = readable & ~text.str.contains("inf", case=False).to_numpy(bool)
     bad[rows[~readable]] = True
     bad[rows[written_finite]] |= ~np.isfinite(parsed[rows[written_finite]])  # 1e999 is a number but overflows float64

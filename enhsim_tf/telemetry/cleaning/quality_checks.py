@@ -1,5 +1,6 @@
 """Quality checks of a cleaned channel, for its report: quantised, stuck, constant or drifting values. The values are not changed."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,25 +10,56 @@ from enhsim_tf.telemetry.cleaning.resampling import Part
 
 _NUM_STRETCHES = 10  # consecutive stretches whose level and amplitude are compared
 _MAX_LEVELS = 4_096  # a channel with more distinct values does not count as quantised
+_FEWEST_OTHERS = 10  # a channel with fewer other values has states, none of which is a fill value
+_FAR = 3  # distance of a fill value that has no usual digits from all others, in their range
 _STUCK = 20  # a shorter run of one value, in samples, does not count as stuck
 
 
-def describe_values(parts: Sequence[Part], log: CleaningLog) -> None:
+def describe_values(parts: Sequence[Part], read: np.ndarray, log: CleaningLog) -> None:
     """Adds findings about the values of a channel to the cleaning log.
 
     Args:
         parts: The regular parts of one channel.
+        read: The finite values as they were read, before any was averaged or filled in.
         log: The cleaning log.
     """
+    _log_fill_values(read, log)
     values = np.concatenate([part.values for part in parts])
     numbers = np.concatenate([part.source_row for part in parts])
     if np.ptp(values) == 0:
         log.add("constant", (), f"the channel is {values[0]:g} throughout", count=len(values))
         return
     _log_resolution(values, log)
-    _log_levels(values, log)
+    _log_levels(read, log)
     _log_stuck(values, numbers, log)
     _log_drift(values, log)
+
+
+def _log_fill_values(read: np.ndarray, log: CleaningLog) -> None:
+    """Reports a lowest or highest value that repeats exactly, far outside all others, as loggers write where they have no value."""
+    distinct, counts = np.unique(read, return_counts=True)
+    low, high, found = 0, len(distinct) - 1, []
+    while high - low >= _FEWEST_OTHERS:
+        spread = distinct[high - 1] - distinct[low + 1]
+        places = [
+            place
+            for place, distance in ((low, distinct[low + 1] - distinct[low]), (high, distinct[high] - distinct[high - 1]))
+            if counts[place] >= 2 and distance > (1 if _is_usual_fill(distinct[place]) else _FAR) * spread
+        ]
+        if not places:
+            break
+        found += places
+        low, high = low + (low in places), high - (high in places)
+    if found:
+        said = ", ".join(f"{distinct[place]:g} ({counts[place]:,} times)" for place in found)
+        advice = " ".join(f"--missing-values={distinct[place]:g}" for place in found)
+        text = f"far outside all other values, {distinct[low]:g} to {distinct[high]:g}: {said}; if this means that there is no value, give {advice}"
+        log.add("fill values", (), text, count=int(counts[found].sum()), details={"values": distinct[found].tolist()})
+
+
+def _is_usual_fill(value: float) -> bool:
+    """Whether a value has the digits of those that loggers write for a missing one: 999.9, -9999, -32768, 1e20."""
+    return bool(re.fullmatch(r"-?9{2,}\.?9*|-?6999|-?3276[78]|65535|-?9\.9+e\+\d+|-?1e\+[23]\d", f"{value:.15g}"))
 
 
 def _log_resolution(values: np.ndarray, log: CleaningLog) -> None:

@@ -13,40 +13,86 @@ import pandas as pd
 from enhsim_tf.common.errors import printable
 
 KINDS = {
-    "header lines": ("accepted", "lines that begin with # above the header are skipped"),
-    "encoding": ("accepted", "text that is not UTF-8"),
-    "columns left out": ("accepted", "columns without numbers, if no columns were named"),
-    "commands": ("accepted", "columns of zeros and ones beside the value of an array, which are commands and not channels"),
-    "time column": ("accepted", "the time column was detected, not named"),
-    "time unit": ("accepted", "the unit of numeric times, inferred from their magnitude"),
-    "time zone": ("accepted", "times with a zone are converted to UTC; times without one are taken as UTC"),
-    "leap seconds": ("repaired", "second 60 is taken as the first second of the next minute"),
-    "decimal comma": ("accepted", "numbers written with a decimal comma"),
-    "missing times": ("left out", "rows without a time"),
-    "bad times": ("left out", "rows whose time cannot be read"),
-    "clock change": ("left out", "local times that a clock change makes ambiguous or nonexistent"),
-    "descending": ("repaired", "rows in descending order of time, reversed"),
-    "unsorted": ("repaired", "rows out of chronological order, sorted"),
-    "duplicate rows": ("left out", "rows that repeat the time and value of another row"),
-    "same time": ("left out", "rows with another value at the same time"),
-    "missing values": ("left out", "NaN, None, infinite or empty values"),
-    "bad values": ("left out", "text among numbers, and numbers beyond float32"),
-    "finer stretches": ("repaired", "stretches with a higher sampling rate, averaged to the common interval"),
-    "coarser stretches": ("repaired", "stretches with a lower sampling rate, interpolated to the common interval"),
-    "other rates": ("left out", "stretches with another sampling rate"),
-    "averaged": ("left out", "rows merged with another row of the same interval"),
-    "jitter": ("repaired", "times off the regular grid, snapped to it"),
-    "gaps filled": ("repaired", "short gaps, filled by linear interpolation or with the value before them"),
-    "gaps": ("accepted", "long gaps, at which the series is split"),
-    "clock steps": ("accepted", "jumps of the sampling clock, at which the series is split"),
-    "short parts": ("left out", "parts that are too short"),
-    "constant": ("accepted", "a channel that does not vary"),
-    "stuck": ("accepted", "long stretches of one value"),
-    "quantised": ("accepted", "few distinct values, and the step between them"),
-    "resolution": ("accepted", "differences that are lost in float32 rounding"),
-    "changing level": ("accepted", "a level or amplitude that changes over time"),
+    "files": "accepted",
+    "header lines": "accepted",
+    "encoding": "accepted",
+    "padding": "left out",
+    "clock": "accepted",
+    "time zone": "accepted",
+    "further clocks": "accepted",
+    "labels": "accepted",
+    "quality flags": "accepted",
+    "row numbers": "accepted",
+    "own columns": "accepted",
+    "series": "accepted",
+    "columns left out": "accepted",
+    "commands": "accepted",
+    "leap seconds": "repaired",
+    "decimal comma": "accepted",
+    "fill values": "accepted",
+    "missing words": "accepted",
+    "missing times": "left out",
+    "bad times": "left out",
+    "clock change": "left out",
+    "descending": "repaired",
+    "unsorted": "repaired",
+    "duplicate rows": "left out",
+    "same time": "left out",
+    "missing values": "left out",
+    "bad values": "left out",
+    "finer stretches": "repaired",
+    "coarser stretches": "repaired",
+    "other rates": "left out",
+    "averaged": "left out",
+    "jitter": "repaired",
+    "gaps filled": "repaired",
+    "gaps": "accepted",
+    "clock steps": "accepted",
+    "short parts": "left out",
+    "constant": "accepted",
+    "stuck": "accepted",
+    "quantised": "accepted",
+    "resolution": "accepted",
+    "changing level": "accepted",
 }
+"""What was done about each kind of finding."""
 _NUM_PLACES = 3  # places named in each finding
+
+
+class Places(list):
+    """Where the rows of a channel are: `[first row, its line, name of the file]` of each file, in the order of the rows.
+
+    A list, because it is kept in the attributes of a pandas Series, which pandas writes as JSON. Without files, rows are counted from 0.
+
+    Args:
+        files: The files.
+        rows: Row of the table for each row of the channel, shape `(rows,)`, if a table holds several series. None: they are equal.
+    """
+
+    def __init__(self, files: Sequence[Sequence[Any]] = (), rows: np.ndarray | None = None):
+        super().__init__(map(list, files))
+        self.rows = rows
+
+    __hash__ = object.__hash__  # never changed, and a default of dataclasses
+
+    def __deepcopy__(self, memo: dict) -> "Places":
+        return self  # pandas copies attributes with every operation
+
+    def of(self, row: int) -> str:
+        """Describes a row of the channel, for messages.
+
+        Args:
+            row: Number of the row, from 0.
+        """
+        row = int(row) if self.rows is None else int(self.rows[row])
+        inside = [each for each in self if each[0] <= row]
+        if not inside:
+            return f"row {row}"
+        first, line, name = inside[-1]
+        return f"line {row - first + line}" + (f" of {name}" if len(self) > 1 else "")
+
+
+ROWS = Places()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +120,7 @@ class Finding:
     @property
     def action(self) -> str:
         """What was done: "accepted", "repaired" or "left out"."""
-        return KINDS[self.kind][0]
+        return KINDS[self.kind]
 
     def line(self) -> str:
         """The finding as one line of text."""
@@ -150,17 +196,20 @@ class CleaningLog:
     Args:
         times: Times of all rows in the order of the source, int64 nanoseconds since 1970. None: the source has no times.
         findings: Findings made when the source was read.
+        places: Where the rows are in their files.
+        counts: Whether the times count from a zero of their own and are no dates.
     """
 
-    def __init__(self, times: np.ndarray | None, findings: Sequence[Finding] = ()):
-        self.times, self.findings = times, list(findings)
+    def __init__(self, times: np.ndarray | None, findings: Sequence[Finding] = (), places: Places = ROWS, counts: bool = False):
+        self.times, self.findings, self.places, self.counts = times, list(findings), places, counts
 
     def place(self, row: int) -> str:
-        """Describes a row of the source by its number, counted from 0, and its time."""
+        """Describes a row of the source by its place and its time."""
         row = int(row)
         if self.times is None or self.times[row] == pd.NaT.value:
-            return f"row {row}"
-        return f"row {row}, {iso_time(self.times[row])}"
+            return self.places.of(row)
+        time = f"{self.times[row] / 1e9:.10g} s" if self.counts else iso_time(self.times[row])
+        return f"{self.places.of(row)}, {time}"
 
     def add(self, kind: str, rows: Sequence[int] | np.ndarray, text: str, count: int | None = None, **numbers: Any) -> None:
         """Adds a finding, unless its count is 0.

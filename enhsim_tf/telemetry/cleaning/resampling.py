@@ -53,7 +53,7 @@ class Part:
     source_row: np.ndarray
 
 
-def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, same_time: str) -> Rows:
+def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, same_time: str | None, bins: bool) -> Rows:
     """Keeps one row for each time.
 
     Args:
@@ -61,20 +61,26 @@ def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, nam
         bad: Mask of the source rows whose value cannot be read.
         log: The cleaning log, to which findings are added.
         name: Channel name, for messages.
-        same_time: Which of several values is kept: mean, first, last or refuse.
+        same_time: Which of several values is kept: mean, first, last or refuse. None: the mean, if this merges less than half of the rows.
+        bins: Whether rows are averaged over given intervals, so that the mean may merge any number.
 
     Returns:
         Rows with unique times.
 
     Raises:
-        InputError: If a time has several values and `same_time` is "refuse".
+        InputError: If a time has several values and `same_time` is "refuse", or None where it would merge most rows.
     """
     values = np.where(bad[rows.source_row], np.inf, rows.values)  # an unreadable value is not a duplicate of a missing one
     is_copy = pd.DataFrame({"time": rows.times, "value": values}).duplicated().to_numpy()
     copies = rows.source_row[is_copy]
     log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
     rows = rows.take(~is_copy)
-    kept, left = _merge_groups(rows, rows.times, same_time)
+    kept, left = _merge_groups(rows, rows.times, same_time or "mean")
+    if same_time is None and not bins and 2 * len(left) >= len(rows) > 2:
+        raise InputError(
+            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
+            "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval) or same_time='mean'."
+        )
     if same_time == "refuse" and len(left):
         raise InputError(
             f"Expected one value for each time. Received: {len(left):,} more in {name}, the first at {log.place(left[0])}. Give same_time='mean'."
@@ -82,7 +88,7 @@ def drop_duplicate_timestamps(rows: Rows, bad: np.ndarray, log: CleaningLog, nam
     log.add(
         "same time",
         left,
-        f"rows with another value at the same time, of which the {same_time} was taken: {{count}}",
+        f"rows with another value at the same time, of which the {same_time or 'mean'} was taken: {{count}}",
         rows_left_out=len(left),
     )
     return kept
@@ -245,7 +251,7 @@ def build_parts(
         longest = max(int(segment.places[-1]) + 1 for segment in segments)
         raise InputError(
             f"Expected regular samples, at least {min_part} in a row. Received: {longest} at most, every {interval / 1e9:.6g} s, in {name}. "
-            "Give interval_s, a longer max_fill or a shorter min_part."
+            "Give interval_s (--interval), a longer max_fill (--max-fill) or a shorter min_part."
         )
     _log_breaks(rows, segments, interval, log, max_fill)
     _log_jitter(rows, off, interval, log)

@@ -1,9 +1,10 @@
-"""Parses a raw column as times: date-times, ISO 8601 text, other formats, numbers since 1970, time zones and clock changes.
+"""Parses a raw column as times: date-times, dates as text, durations, numbers since 1970 or any other zero, days of spreadsheets.
 
-An empty cell is a missing time. A cell that cannot be parsed either raises an `InputError` that names its row or is marked, so
+An empty cell is a missing time. A cell that cannot be parsed either raises an `InputError` that names its place or is marked, so
 that the caller can count it.
 """
 
+import dataclasses
 import datetime
 import re
 from typing import Any
@@ -12,103 +13,183 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, parse_dates
 from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
-from enhsim_tf.telemetry.cleaning.report import CleaningLog, Finding, iso_time
+from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Places
 
 UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-_EPOCHS = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+UNIT_NAMES = {"D": "days", "h": "hours", "min": "minutes", "s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_529.0}
+"""Kinds of days and their number of 1970-01-01: spreadsheets, modified Julian dates, Julian dates, MATLAB."""
+_DAY_NAMES = {"excel": "days of spreadsheets", "mjd": "modified Julian dates", "jd": "Julian dates", "datenum": "MATLAB's day numbers"}
 _YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
+_DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
+
+
+@dataclasses.dataclass(frozen=True)
+class Times:
+    """Parsed times.
+
+    Args:
+        stamps: Times with NaT where missing, in UTC if the source says so and without a zone otherwise.
+        bad: Mask of the times that could not be parsed.
+        form: How the times are written, for the report.
+        zone: The zone that the source states, for the report; empty if it states none.
+        counts: Whether the times count from a zero of their own and are no dates.
+        findings: Findings for the cleaning log.
+    """
+
+    stamps: pd.DatetimeIndex
+    bad: np.ndarray
+    form: str = "dates"
+    zone: str = ""
+    counts: bool = False
+    findings: tuple[Finding, ...] = ()
+
+
+def check_time_format(form: str | None) -> None:
+    """Checks a time format before it is used.
+
+    Args:
+        form: A format as for `datetime.strptime`, a unit of `UNITS_NS`, a kind of `DAYS`, or None.
+
+    Raises:
+        InputError: If it is none of these.
+    """
+    if form is not None and form not in UNITS_NS and form not in DAYS and "%" not in form:
+        raise InputError(
+            f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%Y %H:%M:%S', or one of: "
+            f"{', '.join((*UNITS_NS, *DAYS))}. Received: time_format={form!r}."
+        )
 
 
 def parse_times(
-    times: Any, what: str, drop: bool = False, unit: str | None = None, form: str | None = None
-) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+    times: Any, what: str, drop: bool = False, form: str | None = None, zone: str | None = None, places: Places = ROWS
+) -> Times:
     """Parses a column of times.
 
     Args:
-        times: Date-times, ISO 8601 text, objects, time spans, or numbers counted from 1970 or from any other zero.
+        times: Date-times, text, objects, time spans, or numbers.
         what: Description of the source, for messages.
         drop: If True, a time that cannot be parsed is marked and treated as missing. If False, it raises an `InputError`.
-        unit: Unit of numeric times, one of `UNITS_NS`. None: inferred from their magnitude.
-        form: Format of text, as for `datetime.strptime`. None: ISO 8601.
+        form: A format of text as for `datetime.strptime`, or the unit or kind of numbers, see `Cleaning.time_format`. None: detected.
+        zone: Time zone of cells without one among others with one. None: UTC.
+        places: Where the rows are in their file, for messages.
 
     Returns:
-        `(stamps, bad, findings)`: times with NaT where missing, in UTC if the source gives a time zone and without a zone
-        otherwise; the mask of times that could not be parsed; and findings for the cleaning log.
+        The times.
 
     Raises:
-        InputError: If the times cannot be parsed, or their unit cannot be inferred.
+        InputError: If the times cannot be parsed, or their unit or form cannot be told.
     """
-    if unit is not None and unit not in UNITS_NS:
-        raise InputError(f"Expected time_unit, one of: {', '.join(UNITS_NS)}. Received: time_unit={unit!r}.")
+    check_time_format(form)
     if isinstance(times, pd.MultiIndex):
         raise InputError(f"Expected one time for a row. Received: an index of {times.nlevels} levels from {what}. Name one time column.")
     times = column(times, what)
     if isinstance(times.dtype, pd.PeriodDtype):
-        times = (
-            pd.to_datetime(times.astype(str).where(times.notna()), format="ISO8601", errors="coerce")
-            if len(times)
-            else times.astype(object)
-        )
-    kind = times.dtype
+        times = times.astype(str).where(times.notna()) if len(times) else times.astype(object)
+    kind, is_format = times.dtype, form is not None and "%" in form
     if pd.api.types.is_datetime64_any_dtype(kind):
-        return _times_from_dates(times, what, drop)
+        return _from_dates(times, what, drop, places)
     if pd.api.types.is_timedelta64_dtype(kind):
-        return _times_from_numbers(times.dt.total_seconds(), what, drop, "s")
+        return _from_numbers(times.dt.total_seconds(), what, drop, "s", places)
     if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
-        raise InputError(f"Expected times as ISO 8601 date-times or seconds. Received: dtype {kind} from {what}. Name another time column.")
+        raise InputError(f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another time column.")
     if not is_text(times):
-        return _times_from_numbers(times, what, drop, unit)
-    cells = times.astype(object)
+        if not is_format:
+            return _from_numbers(times, what, drop, form, places)
+        times = times.astype("Int64").astype(str).where(times.notna()) if (times.dropna() % 1 == 0).all() else times.astype(str)
+    return _from_text(times, what, drop, form if is_format else None, None if is_format else form, zone, places)
+
+
+def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: str | None, zone: str | None, places: Places) -> Times:
     missing = is_missing(cells)
-    given = cells[~missing]
-    if given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # datetime is a subclass of date
-        aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
-        dates = pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")
-        return _times_from_dates(pd.Series(dates), what, drop)
-    if form is None and not parse_numbers(given.iloc[:1], what, drop=True)[1].any():  # if the first cell is a number, all may be
-        values, bad, _ = parse_numbers(cells, what, drop=True)
-        if not bad.any():
-            exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
-            is_exact = pd.api.types.is_integer_dtype(exact.dtype)
-            return _times_from_numbers(exact if is_exact else pd.Series(values), what, drop, unit)
-    return _times_from_text(cells, missing, what, drop, form)
+    given = cells[~missing] if missing.any() else cells
+    if cells.dtype == object:
+        of_text = given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
+        if len(given) and given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # datetime is a subclass of date
+            aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
+            return _from_dates(pd.Series(pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")), what, drop, places)
+    else:
+        of_text = np.ones(len(given), bool)
+    if form is None and len(given):
+        if (numbers := _as_numbers(cells, given, missing, what)) is not None:
+            values, bad = numbers
+            _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
+            return _mark(_from_numbers(values, what, drop, unit, places), bad)
+        if given.iloc[:20].astype(str).str.strip().str.fullmatch(_DURATION).all():
+            spans = pd.to_timedelta(cells.where(~missing), errors="coerce")
+            bad = spans.isna().to_numpy() & ~missing
+            _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
+            return _mark(_from_numbers(spans.dt.total_seconds(), what, drop, "s", places), bad)
+    text = cells.where(~missing).map(_to_text).astype("str") if cells.dtype == object else cells.where(~missing) if missing.any() else cells
+    forms = [form] if form is not None else date_forms(given[of_text].astype("str"))
+    if len(forms) > 1:
+        raise InputError(
+            f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {what}, where both are at most 12 "
+            f"throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
+        )
+    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else ISO, zone, places)
 
 
-def _refuse_time(cells: pd.Series, bad: np.ndarray, what: str, then: str) -> None:
+def _to_text(cell: Any) -> str | None:
+    return str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None
+
+
+def _as_numbers(cells: pd.Series, given: pd.Series, missing: np.ndarray, what: str) -> tuple[pd.Series, np.ndarray] | None:
+    """Returns text as numbers and the mask of cells that are none, or None if most of the first cells are none."""
+    head = given.iloc[:20]
+    if parse_numbers(head, what, drop=True)[1].mean() > 0.5:
+        return None
+    values, bad, _ = parse_numbers(cells, what, drop=True)
+    exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
+    return exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values), bad
+
+
+def _mark(times: Times, bad: np.ndarray) -> Times:
+    return dataclasses.replace(times, bad=times.bad | bad)
+
+
+def _refuse(cells: pd.Series, bad: np.ndarray, what: str, places: Places, drop: bool, then: str) -> None:
+    """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
+    if drop or not bad.any():
+        return
     row = int(np.argmax(bad))
     try:
         received = format_cell(cells.iloc[row])
     except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
         received = "a time out of range"
     raise InputError(
-        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at row {row} of {what}, and "
+        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {places.of(row)} of {what}, and "
         f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
     )
 
 
-def _times_from_dates(times: pd.Series, what: str, drop: bool) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
-    stamps, findings = pd.DatetimeIndex(times), []
+def _from_dates(times: pd.Series, what: str, drop: bool, places: Places) -> Times:
+    stamps, zone = pd.DatetimeIndex(times), ""
     if stamps.tz is not None:
-        if str(stamps.tz) != "UTC":
-            findings.append(Finding("time zone", len(stamps), f"times of the zone {stamps.tz}, converted to UTC: {len(stamps):,}"))
+        zone = str(stamps.tz)
         stamps = stamps.tz_convert("UTC")
     coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
     bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
-    if bad.any() and not drop:
-        _refuse_time(times, bad, what, "Give times from 1678 to 2261")
-    return stamps.where(~bad).as_unit("ns"), bad, findings
+    _refuse(times, bad, what, places, drop, "Give times from 1678 to 2261")
+    return Times(stamps.where(~bad).as_unit("ns"), bad, "dates", zone)
 
 
-def _times_from_numbers(times: pd.Series, what: str, drop: bool, unit: str | None) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+def _from_numbers(times: pd.Series, what: str, drop: bool, unit: str | None, places: Places) -> Times:
     values = times.to_numpy(np.float64, na_value=np.nan)
     finite = np.isfinite(values)
     unit = unit or _infer_unit(values[finite], what)
+    if unit in DAYS:
+        values, unit, form = (values - DAYS[unit]) * 86_400, "s", _DAY_NAMES[unit]
+        times = pd.Series(np.round(values, 3))  # a spreadsheet's eight decimals are a millisecond
+        values = times.to_numpy()
+    else:
+        form = ""
     factor = UNITS_NS[unit]
     bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
-    if bad.any() and not drop:
-        _refuse_time(times, bad, what, "Correct them or name another time column")
+    _refuse(times, bad, what, places, drop, "Correct them or name another time column")
     usable = finite & ~bad
     since = np.full(len(values), pd.NaT.value, np.int64)
     if pd.api.types.is_integer_dtype(times.dtype):
@@ -116,75 +197,127 @@ def _times_from_numbers(times: pd.Series, what: str, drop: bool, unit: str | Non
     else:
         whole = np.floor(values[usable])
         since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
-    findings = []
-    if usable.any():
-        is_epoch = np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9
-        name = _EPOCHS.get(unit, unit)
-        text = f"times are numbers: {name} since 1970, the first is {iso_time(since[usable][0])}" if is_epoch else f"times count {name}"
-        findings.append(Finding("time unit", int(usable.sum()), text, details={"unit": unit}))
-    return pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC"), bad, findings
+    is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
+    if is_epoch:
+        _refuse_lost_digits(values[usable], what)
+    form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
+    stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
+    return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
+
+
+def _refuse_lost_digits(values: np.ndarray, what: str) -> None:
+    """Refuses times since 1970 that a spreadsheet wrote as 1.70925E+12, so that most rows share their time with others."""
+    unit = 10.0 ** (np.floor(np.log10(max(np.abs(values).max(), 1))) - 6)
+    if len(values) >= 10 and (values[:1_000] % unit == 0).all() and len(np.unique(values)) < len(values) / 2 and (values % unit == 0).all():
+        raise InputError(
+            f"Expected times with all their digits. Received: {len(values):,} rows with {len(np.unique(values)):,} different times, the first "
+            f"{values[0]:g}, in {what}, as a spreadsheet shortens numbers. Export the column as text or as a date."
+        )
+
+
+def are_days(values: np.ndarray, even_whole: bool = False) -> bool:
+    """Whether numbers look like days of a spreadsheet or calendar: from the years 1954 to 2119, at steps of whole or tenth seconds.
+
+    Args:
+        values: Finite numbers.
+        even_whole: Whether whole days and tenths of days count too, as in a column whose name speaks of dates.
+    """
+    ranges = ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))
+    if len(values) < 2 or not any(low <= values.min() and values.max() < high for low, high in ranges):
+        return False
+    step = float(np.median(np.abs(np.diff(values))))
+    seconds = step * 86_400 * 10
+    is_odd = abs(step * 1000 - round(step * 1000)) > 1e-6 and round(seconds) > 0 and abs(seconds - round(seconds)) < 0.01 * seconds
+    return bool(is_odd or even_whole)
 
 
 def _infer_unit(values: np.ndarray, what: str) -> str:
     size = float(np.median(np.abs(values))) if len(values) else 0.0
     if len(values) and (values == np.floor(values)).all():
-        for digits, form in ((8, "%Y%m%d"), (14, "%Y%m%d%H%M%S")):
+        for digits, form in ((7, "%Y%j"), (8, "%Y%m%d"), (14, "%Y%m%d%H%M%S")):
             if 1.9 * 10 ** (digits - 1) <= values.min() and values.max() < 2.2 * 10 ** (digits - 1):
                 text = pd.Series(values[:1_000].astype(np.int64).astype(str))
                 if pd.to_datetime(text, format=form, errors="coerce").notna().all():
                     raise InputError(
                         f"Expected dates as text or times as numbers. Received: {text.iloc[0]} in {what}, which reads as both. "
-                        f"Give time_format='{form}', or time_unit='s'."
+                        f"Give time_format {form!r}, or 's' (--time-format)."
                     )
-    for unit in _EPOCHS:
+    if are_days(values):
+        refuse_days(values, what)
+    for unit in ("s", "ms", "us", "ns"):
         low, high = (bound * 1e9 / UNITS_NS[unit] for bound in _YEARS_S)
         if (unit == "s" and size < low) or low <= size <= high:
             return unit
     raise InputError(
-        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:g} in {what}, which are not from 1980 to 2100 in any of these units. "
-        "Give time_unit."
+        f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in {what}, which are not from 1980 to 2100 in any of "
+        "these units. Give time_format, such as 'ms' (--time-format)."
     )
 
 
-def _times_from_text(
-    cells: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str | None
-) -> tuple[pd.DatetimeIndex, np.ndarray, list[Finding]]:
+def refuse_days(values: np.ndarray, what: str) -> None:
+    """Raises an `InputError` that says which dates the days would be.
+
+    Args:
+        values: Numbers for which `are_days` is true.
+        what: Description of the source.
+
+    Raises:
+        InputError: Always.
+    """
+    dates = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
+    possible = {kind: pd.Timestamp(round(second), unit="s") for kind, second in dates.items() if _YEARS_S[0] < second < _YEARS_S[1]}
+    said = ", ".join(f"{kind} (from {date})" for kind, date in possible.items())
+    raise InputError(
+        f"Expected times whose unit is known. Received: {values[0]:.12g} to {values[-1]:.12g} in {what}, which may be days or seconds. "
+        f"Give time_format {said or 'D'}, or s (--time-format)."
+    )
+
+
+def _from_dates_as_text(
+    cells: pd.Series, text: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str, zone: str | None, places: Places
+) -> Times:
     findings = []
-    text = cells.where(~missing).map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None)
-    of_text = text.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
-    words = text[of_text].astype(str).str.strip()
-    leap, zoned = np.zeros((2, len(cells)), bool)
-    leap[of_text] = words.str.contains(r":\d\d:60")
-    zoned[of_text] = words.str.contains(r"(?:Z|[+-]\d\d:?\d\d)$")
-    text[of_text] = words.str.replace(r"(:\d\d):60", r"\1:59", regex=True)
     try:
-        stamps = pd.to_datetime(text, utc=True, format=form or "ISO8601", errors="coerce")
+        dates, zoned = parse_dates(text, form)
+        leap = np.zeros(len(text), bool)
+        left = (dates.isna() & text.notna()).to_numpy()
+        leap[left] = text[left].astype(str).str.contains(r":\d\d:60").to_numpy()
+        if leap.any():
+            earlier, zoned[leap] = parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
+            dates = dates.fillna(earlier + pd.Timedelta(seconds=1))
+            leap &= dates.notna().to_numpy()
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
-    bad = (stamps.isna() & ~missing).to_numpy(bool)
-    if bad.any() and not drop:
-        _refuse_time(cells, bad, what, f"Give time_format (such as {'%d.%m.%y %H:%M:%S'!r}) or name another time column")
-    stamps, too_far, _ = _times_from_dates(stamps, what, drop)
-    stamps = stamps + pd.to_timedelta(leap.astype(np.int64), unit="s").as_unit("ns")
+    bad = dates.isna().to_numpy() & ~missing
+    _refuse(cells, bad, what, places, drop, f"Give time_format (--time-format {'%d.%m.%Y %H:%M:%S'!r}) or name another time column")
     if leap.any():
-        rows = tuple(f"row {row}" for row in np.flatnonzero(leap)[:3])
-        findings.append(Finding("leap seconds", int(leap.sum()), f"leap seconds, taken as the following second: {leap.sum():,}", rows))
-    given = zoned[~missing & ~bad]
-    aware = given.any()
-    if aware and not given.all():
-        findings.append(
-            Finding("time zone", int((~given).sum()), f"times without a zone among others with one, taken as UTC: {(~given).sum():,}")
-        )
-    if not aware and not (form and "%z" in form):
-        stamps = stamps.tz_localize(None)
-    return stamps, bad | too_far, findings
+        text = f"leap seconds, taken as the following second: {leap.sum():,}"
+        findings.append(Finding("leap seconds", int(leap.sum()), text, tuple(places.of(row) for row in np.flatnonzero(leap)[:3])))
+    parsed = _from_dates(dates, what, drop, places)
+    there = parsed.stamps.notna()
+    stated, stamps = zoned & there, parsed.stamps
+    words = ""
+    if stated.any():
+        words = "stated, converted to UTC"
+        local = there & ~zoned
+        if local.any():
+            taken = zone or "UTC"
+            findings.append(
+                Finding("time zone", int(local.sum()), f"times without a zone among others with one, taken as {taken}: {local.sum():,}")
+            )
+            inside = localize_times(stamps.where(local), taken).tz_convert("UTC")
+            stamps = stamps.tz_localize("UTC").where(stated, inside)
+        else:
+            stamps = stamps.tz_localize("UTC")
+    name = "ISO 8601 dates" if form == ISO else f"dates of the form {form}"
+    return Times(stamps, bad | parsed.bad, name, words, False, tuple(findings))
 
 
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """Assigns a time zone to local times.
 
-    Local times that do not exist because of a clock change become NaT. So do times that occur twice, if the order of the rows does
-    not show which one is meant.
+    Of an hour that a clock repeats in autumn, the order of the rows or their neighbours show which is meant; where they do not, times
+    become NaT. So do local times that do not exist.
 
     Args:
         stamps: Times without a zone.
@@ -197,12 +330,50 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
         InputError: If the time zone is unknown.
     """
     try:
-        try:
-            return stamps.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
-        except ValueError:  # the order of the rows does not resolve the repeated hour
-            return stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
+        local = stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
+        if not (local.isna() & stamps.notna()).any():
+            return local
+        first, second = (stamps.tz_localize(zone, ambiguous=np.full(len(stamps), is_dst), nonexistent="NaT") for is_dst in (True, False))
     except (KeyError, ValueError, TypeError, OSError):
         raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
+    unclear = local.isna() & first.notna()
+    rows = np.flatnonzero(stamps.notna())
+    known = stamps[rows].as_unit("ns").asi8
+    if len(rows) > 1 and np.median(np.sign(np.diff(known))) < 0:
+        rows = rows[::-1]
+    if np.mean(np.diff(stamps[rows].as_unit("ns").asi8) >= 0) < 0.9:
+        return local  # out of order, so that neighbours show nothing
+    starts = np.flatnonzero(np.diff(unclear[rows].astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    utc = [each.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8 for each in (first, second)]
+    is_first, is_second = np.zeros(len(stamps), bool), np.zeros(len(stamps), bool)
+    for begin, end in starts.tolist():
+        split = _end_of_first_hour(rows, begin, end, utc)
+        if split is not None:
+            is_first[rows[begin:split]], is_second[rows[split:end]] = True, True
+    return local.where(~is_first, first).where(~is_second, second)
+
+
+def _end_of_first_hour(rows: np.ndarray, begin: int, end: int, utc: list[np.ndarray]) -> int | None:
+    """Returns where, among consecutive rows of an hour that occurs twice, its second occurrence begins; None if that is unclear.
+
+    Args:
+        rows: All rows with a time, in ascending order of time.
+        begin: First of the rows in question.
+        end: End of the rows in question (exclusive).
+        utc: Times of all rows in nanoseconds, if the first and if the second occurrence is meant.
+    """
+    steps = np.diff(utc[0][rows[begin:end]])
+    back = np.flatnonzero(steps < 0)
+    if len(back) == 1:
+        return begin + int(back[0]) + 1
+    if len(back):
+        return None
+    near = UNITS_NS["h"] / 2
+    if begin > 0 and 0 < utc[0][rows[begin]] - utc[0][rows[begin - 1]] < near:
+        return end
+    if end < len(rows) and 0 < utc[1][rows[end]] - utc[1][rows[end - 1]] < near:
+        return begin
+    return None
 
 
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
@@ -227,5 +398,5 @@ def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: Clea
         place = log.place(numbers[back[0] + 1])
         raise InputError(
             f"Expected ascending times, or their time zone. Received: times without a zone that step back by one hour at {place} of {name}, "
-            "as local clocks do. Give timezone (such as 'Europe/Berlin', or 'UTC' to take them as they are)."
+            "as local clocks do. Give timezone (--timezone Europe/Berlin, or UTC to take them as they are)."
         )

@@ -20,7 +20,7 @@ from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhanced_simulator.training import TrainingSettings
 from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, RIDGE
-from enhsim_tf.noise.rung_names import BEST
+from enhsim_tf.noise.names import BEST
 from enhsim_tf.telemetry.series import Telemetry
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")

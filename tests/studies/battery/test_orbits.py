@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.common.errors import InputError
 from studies.battery.faults import ALL, SEVERITIES, SIZES, Fault, drift_under, load_under, measure, simulator_inputs
 from studies.battery.orbits import (
     CAPACITY_AH,
@@ -67,8 +66,3 @@ def test_the_sensor_adds_noise_and_rounds():
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-3)
     expected = np.hypot(0.002, 5 / 4096 / np.sqrt(12))  # the variances of the noise and of the rounding add
     assert np.std(steps) * 5 / 4096 == pytest.approx(expected, rel=0.02)
-
-
-def test_an_unknown_fault_is_refused():
-    with pytest.raises(InputError, match="Expected one of raised resistance.*Received: 'fire'"):
-        Fault("fire", 1.0)

@@ -11,7 +11,7 @@ pybamm = pytest.importorskip("pybamm", reason="PyBaMM is an optional extra: pip 
 from enhsim_tf.common.errors import InputError  # noqa: E402
 from studies.battery import simulate as module  # noqa: E402
 from studies.battery.faults import Fault  # noqa: E402
-from studies.battery.orbits import ORBIT_SAMPLES, REGIMES, draw_load  # noqa: E402
+from studies.battery.orbits import REGIMES, draw_load  # noqa: E402
 from studies.battery.simulate import simulate, simulate_all  # noqa: E402
 
 GENTLE = REGIMES["gentle"]
@@ -83,7 +83,7 @@ def test_a_failed_run_is_repeated_with_less_current_and_counted(monkeypatch):
     def failing(model, current, regime, faults, onset):
         tried.append((model, float(current[0])))
         ok = abs(current[0]) < 0.85
-        return [module.Run(np.zeros((len(current), 3), np.float32), 1.0) if ok or fault is None else None for fault in faults]
+        return [module.Run(np.zeros((len(current), 3), np.float32)) if ok or fault is None else None for fault in faults]
 
     monkeypatch.setattr(module, "simulate", failing)
     monkeypatch.setattr(module, "battery_current", lambda load, regime: np.ones(5))
@@ -93,8 +93,3 @@ def test_a_failed_run_is_repeated_with_less_current_and_counted(monkeypatch):
     monkeypatch.setattr(module, "simulate", lambda model, current, regime, faults, onset: [None] * len(faults))
     with pytest.raises(InputError, match="Expected loads that the solver can follow"):
         simulate_all(np.zeros(5), GENTLE, [None])
-
-
-def test_an_unknown_model_is_refused():
-    with pytest.raises(InputError, match="Expected one of coarse, fine"):
-        simulate("medium", np.zeros(ORBIT_SAMPLES), GENTLE, [None])

@@ -1,19 +1,20 @@
 """Errors, trust and detectors on made-up simulators whose map is known, so that PyBaMM is not needed."""
 
+import sys
+
 import numpy as np
 import pytest
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.ladder import RIDGE
-from enhsim_tf.reproduce.__main__ import main, parse
-from studies.battery import detectors, errors, labelled, simulate, windows
-from studies.battery.detectors import RESIDUALS, Judge
+from studies.battery import classifiers, detectors, errors, simulate, windows
+from studies.battery.__main__ import command
+from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, Judge, alarm_rows
 from studies.battery.faults import ALL
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, battery_current, draw_load
 from studies.battery.record import Recorded, key_of
 
 GENTLE = REGIMES["gentle"]
-OHMS = 0.02  # by which the made-up vehicle differs from the book
+OHMS = 0.02  # by which the made-up vehicle differs from the published one
 
 
 def _run(load, added=0.0):
@@ -46,7 +47,7 @@ def small_numbers(monkeypatch):
     counted = {
         errors: {"NUM_WINDOWS": 300, "NUM_TEST": 80, "NUM_FAULT": 10},
         detectors: {"NUM": 100, "WINDOW": 100},
-        windows: {"WINDOW": 100},  # shorter than the study's, so that few orbits are enough to learn from
+        windows: {"NUM_TEST": 80, "NUM_FAULT": 10, "WINDOW": 100},  # shorter windows, so that few orbits are enough to learn from
     }
     for module, counts in counted.items():
         for name, value in counts.items():
@@ -59,15 +60,12 @@ def pairs(recorded):
 
 
 def test_windows_of_both_simulators_cover_the_same_time_behind_the_first_orbit(recorded):
-    for target, column in (("volts", 0), ("celsius", 2)):
-        each = windows.pair_windows(recorded, "test", 30, 1, target=target)
-        fine = recorded.get("test", "fine")[:, column]
-        assert each.starts.min() >= ORBIT_SAMPLES and each.starts.max() + windows.WINDOW <= len(fine)
-        np.testing.assert_array_equal(each.fine[7], fine[each.starts[7] : each.starts[7] + windows.WINDOW])
-        np.testing.assert_array_equal(each.coarse[7, :, 0], recorded.get("test", "coarse")[each.starts[7] :][: windows.WINDOW, column])
-    again = windows.pair_windows(recorded, "test", 30, 1, target="celsius")
-    np.testing.assert_array_equal(each.telemetry, again.telemetry)
-    assert not np.array_equal(each.telemetry, windows.pair_windows(recorded, "test", 30, 2, target="celsius").telemetry)
+    each, fine = windows.pair_windows(recorded, "test", 30, 1), recorded.get("test", "fine")[:, 0]
+    assert each.starts.min() >= ORBIT_SAMPLES and each.starts.max() + windows.WINDOW <= len(fine)
+    np.testing.assert_array_equal(each.fine[7], fine[each.starts[7] : each.starts[7] + windows.WINDOW])
+    np.testing.assert_array_equal(each.coarse[7], recorded.get("test", "coarse")[each.starts[7] :][: windows.WINDOW])
+    np.testing.assert_array_equal(each.telemetry, windows.pair_windows(recorded, "test", 30, 1).telemetry)
+    assert not np.array_equal(each.telemetry, windows.pair_windows(recorded, "test", 30, 2).telemetry)
 
 
 def test_windows_share_the_noise_of_their_common_samples(recorded):
@@ -96,59 +94,57 @@ def test_the_trust_score_calls_the_changed_fault_alone_out_of_range(recorded, pa
 
 def test_the_residual_finds_the_fault_that_the_planned_run_does_not_have(recorded, pairs):
     judge = Judge(recorded, pairs, RIDGE, 0)
-    rows = {(row["arm"], row["fault"], row["severity"]): row["alarms"] for row in judge.residual_rows()}
-    for arm in RESIDUALS:
-        assert rows[arm, "raised resistance", 1.0] > 0.5  # not all: the current is small where the battery is nearly full
-    assert rows["residual of the enhanced run", "nominal", 0.0] < 0.1
+    rows = {(row["training"], row["fault"], row["severity"]): row["alarms"] for row in judge.reference_rows()}
+    for reference in (ENHANCED_RUN, COARSE_RUN):
+        assert rows[reference, "raised resistance", 1.0] > 0.5  # not all: the current is small where the battery is nearly full
+    assert rows[ENHANCED_RUN, "nominal", 0.0] < 0.1
 
 
-def test_arms_hold_what_they_say_and_training_and_threshold_share_no_orbit(recorded, pairs):
+def test_training_and_threshold_share_no_orbit_and_residual_windows_have_the_size_of_the_residuals(recorded, pairs):
     judge = Judge(recorded, pairs, RIDGE, 0)
-    arms = judge.arms()
-    assert set(arms) == set(detectors.ARMS) - {detectors.CONVOLUTIONAL}
-    coarse, enhanced, noisy = (arms[name][0] for name in (detectors.COARSE, detectors.ENHANCED, detectors.RESAMPLED))
+    sources = judge.sources()
+    assert set(sources) == set(detectors.SOURCES)
+    coarse, enhanced, noisy = (sources[name][0] for name in (detectors.COARSE, detectors.ENHANCED, detectors.WITH_RESIDUALS))
     assert np.std(noisy - enhanced) == pytest.approx(np.std(judge.residuals), rel=0.1)
     assert np.abs(coarse - enhanced).max() > 0.05
-    clean, real = arms[detectors.CLEAN][0], arms[detectors.REAL_120][0]
-    assert np.std(real - clean) == pytest.approx(np.hypot(0.002, 5 / 4096 / np.sqrt(12)), rel=0.05)
-    for training, held_out in arms.values():
+    for training, held_out in sources.values():
         assert not (training[:, None, :50] == held_out[None, :, :50]).all(axis=2).any()
-    again = Judge(recorded, pairs, RIDGE, 0).arms()
-    np.testing.assert_array_equal(again[detectors.AUTOREGRESSION][1], arms[detectors.AUTOREGRESSION][1])
+    again = Judge(recorded, pairs, RIDGE, 0).sources()
+    np.testing.assert_array_equal(again[detectors.WITH_RESIDUALS][1], sources[detectors.WITH_RESIDUALS][1])
+
+
+def test_a_threshold_comes_from_the_training_data():
+    held_out = np.arange(1, 1_001, dtype=float)  # the conformal threshold of 1 % is the 991st of 1,000 scores
+    nominal, faulty = np.full(100, 991.0), np.full(40, 992.0)
+    nominal[[3, 70]] = 2_000
+    rows = alarm_rows("training", "name", held_out, {None: nominal, ALL[0]: faulty}, 4)
+    assert [row["alarms"] for row in rows] == [0.02, 1.0]
+    assert [row["is_found"] for row in rows] == [0.5, 1.0]  # of four stretches of 25 windows, the first and the third
+    assert rows[0]["fault"] == "nominal" and (rows[1]["fault"], rows[1]["severity"]) == (ALL[0].kind, ALL[0].severity)
 
 
 def test_a_classifier_learns_simulated_faults_and_each_has_orbits_of_its_own(recorded, pairs, monkeypatch):
     def made_up(load, regime, faults, models):
-        return [(simulate.Run(_run(load, _added(fault))[0], 1.0),) for fault in faults]
+        return [(simulate.Run(_run(load, _added(fault))[0]),) for fault in faults]
 
-    monkeypatch.setattr(labelled, "simulate_all", made_up)
-    monkeypatch.setattr(labelled, "NUM", 200)
-    faulty, planned = faults = labelled.simulate_faults(2, GENTLE, 5)
+    monkeypatch.setattr(classifiers, "simulate_all", made_up)
+    monkeypatch.setattr(classifiers, "NUM", 200)
+    faulty, planned = faults = classifiers.simulate_faults(2, GENTLE, 5)
     each = len(faulty) // len(ALL)
-    assert not np.array_equal(planned[0], planned[each]) and np.array_equal(faulty, labelled.simulate_faults(2, GENTLE, 5)[0])
+    assert not np.array_equal(planned[0], planned[each]) and np.array_equal(faulty, classifiers.simulate_faults(2, GENTLE, 5)[0])
     changed = np.abs(faulty - planned).max(axis=(1, 2)).reshape(len(ALL), each).min(axis=1) > 0.01
     assert [bool(value) for value in changed] == [fault.kind == "raised resistance" for fault in ALL]
-    rows = labelled.labelled_rows(Judge(recorded, pairs, RIDGE, 0), faults)
-    assert {row["arm"] for row in rows} >= {labelled.DIFFERENCE} and len(rows) == 3 * 2 * (1 + len(ALL))
-    worst = {row["detector"]: row["alarms"] for row in rows if row["arm"] == labelled.DIFFERENCE and row["fault"] == "raised resistance"}
+    rows = classifiers.classifier_rows(Judge(recorded, pairs, RIDGE, 0), faults)
+    of_reference = [row for row in rows if row["training"] == ENHANCED_RUN + classifiers.FAULTS]
+    assert len(rows) == 3 * 2 * (1 + len(ALL)) == 3 * len(of_reference)
+    worst = {row["detector"]: row["alarms"] for row in of_reference if row["fault"] == "raised resistance"}
     assert worst["boosted trees"] > 0.5
 
 
 def test_without_pybamm_the_command_says_what_to_install(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(__import__("sys").modules, "pybamm", None)
+    monkeypatch.setitem(sys.modules, "pybamm", None)
     simulate._pybamm.cache_clear()
-    assert main(["--experiment", "battery", "--budget", "smoke"]) == 2
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1 and "pip install 'enhsim_tf[battery]'" in said[0]
+    assert command(["--budget", "smoke", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "pip install 'enhsim_tf[battery]'" in line
     simulate._pybamm.cache_clear()
-
-
-def test_seeds_go_with_the_battery_and_an_environment_does_not():
-    from enhsim_tf.reproduce.__main__ import check, is_other
-
-    options = parse(["--experiment", "battery", "--seeds", "2"])
-    check(options)
-    assert is_other(options) and not is_other(parse(["--experiment", "battery"]))
-    with pytest.raises(InputError, match="--environment together with --experiment robustness"):
-        check(parse(["--experiment", "battery", "--environment", "shot"]))

@@ -1,5 +1,7 @@
 """The cells have the signal and the noise that their names say, and those of the study of robustness where they agree."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,8 @@ from enhsim_tf.common.stages import Stages
 from studies.common.settings import make_settings
 from studies.factorial.cells import CELLS, DETECTORS, PAPER_CELL, REFERENCES, Cell
 from studies.factorial.pipelines import THRESHOLD, TRAINING, Pipelines
+from studies.factorial.run import run
+from studies.factorial.summary import KEPT
 from studies.robustness.replicate import Replicate
 
 SMALL = {"telemetry__num_windows": 40, "second__num_windows": 90, "robustness__num_windows": 30, "adversarial__num_iterations": 0}
@@ -56,12 +60,19 @@ def test_training_and_threshold_windows_differ_and_are_repeatable(without_networ
     assert np.array_equal(again.arm(cell, TRAINING), first)
 
 
-def test_every_cell_is_judged_once_by_every_detector(tmp_path, monkeypatch):
-    one = Pipelines(Replicate(make_settings("smoke", **SMALL), Stages(tmp_path)))
-    monkeypatch.setattr(one, "judged", lambda cell: [{"detector": name, "alarms": 1, "windows": 2} for name in DETECTORS])
-    table = one.tables()["cells"]
-    assert sorted(set(table["cell"])) == sorted([*REFERENCES, *CELLS]) and len(table) == 34 * len(DETECTORS)
-    assert not table.duplicated(["cell", "detector"]).any() and set(table["environment"]) == {"white"}
+def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
+    def judged(self, cell):
+        alarms = {"coarse": 50, "real": 1}.get(cell, 9)
+        return [{"detector": name, "alarms": alarms, "windows": 59, "recall": 0.5, "recall_at_real_rate": 0.25} for name in DETECTORS]
+
+    monkeypatch.setattr(Pipelines, "judged", judged)
+    found = run(make_settings("smoke", **SMALL), tmp_path / "cache", tmp_path, ["white", "shot"], False, lambda line: None)
+    table = KEPT.read(tmp_path)["cells"]
+    assert set(table["cell"]) == {*REFERENCES, *CELLS} and len(table) == 2 * 34 * len(DETECTORS)
+    assert not table.duplicated(["environment", "cell", "detector"]).any()
+    assert found["cells"]["coarse"]["false_alarms"]["mean"] == pytest.approx(50 / 59)
+    assert json.loads((tmp_path / "findings.json").read_text(encoding="utf-8")) == found
+    assert 'id="watermark"' in (tmp_path / "contributions.svg").read_text(encoding="utf-8")
 
 
 SAME = {

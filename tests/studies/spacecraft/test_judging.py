@@ -1,4 +1,4 @@
-"""Thresholds, ranks and cross-fitted scores of the study of labelled telemetry."""
+"""False alarms, finds, and cross-fitted scores, compared with small cases by hand."""
 
 import numpy as np
 import pytest
@@ -6,30 +6,42 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.telemanom import LabelledChannel, Labels
-from studies.spacecraft.judging import Judge, cross_fitted_scores
+from studies.spacecraft.judging import Judge, cross_fitted_scores, windows_that_meet
 
 
-def channel(sequences=((100, 120),), samples=400):
-    values = np.random.default_rng(0).standard_normal(samples).astype(np.float32)
-    commands = np.zeros((samples, 0), np.float32)
-    series = Telemetry(values)
-    return LabelledChannel(Labels("A", tuple(sequences), ("point",) * len(sequences)), series, series, commands, commands)
+def channel(sequences, samples=400):
+    series, none = Telemetry(np.random.default_rng(0).standard_normal(samples).astype(np.float32)), np.zeros((samples, 0), np.float32)
+    return LabelledChannel(Labels("A", tuple(sequences), ("point",) * len(sequences)), series, series, none, none)
 
 
-def test_ranks_and_thresholds_keep_every_alarm():
-    judge = Judge(channel(), 16, 8, 0.1)
-    rng = np.random.default_rng(1)
-    scores = np.round(rng.standard_normal(len(judge.begins)), 1)  # with ties
-    own, past = rng.standard_normal(99), rng.standard_normal(5)
-    judge.add("real", "PCA residual", scores, own, past)
-    ranks = np.array([row["rank"] for row in judge.rows["scores"]])
-    limits = {row["rule"]: row for row in judge.rows["thresholds"]}
-    np.testing.assert_array_equal(ranks > limits["own"]["rank"], scores > np.sort(own)[89])  # rank ceil(100 * 0.9)
-    assert limits["own"]["rate"] == 0.1
-    np.testing.assert_array_equal(ranks > limits["past"]["rank"], scores > past.max())
-    assert limits["past"]["rate"] == pytest.approx(1 / 6)  # five scores support no smaller rate
-    nominal = ~((judge.begins < 120) & (judge.begins + 16 > 100))
-    assert judge.share_of_alarms("real") == {"PCA residual": pytest.approx(np.mean(scores[nominal] > np.sort(own)[89]))}
+def test_windows_meet_the_ranges_whose_samples_they_hold():
+    begins, window, ranges = np.arange(0, 91, 5), 10, [(20, 23), (60, 75)]
+    for row, labelled in zip(windows_that_meet(begins, window, ranges), map(set, (range(*each) for each in ranges)), strict=True):
+        assert row.tolist() == [bool(labelled & set(range(begin, begin + window))) for begin in begins]
+
+
+def test_alarms_and_finds_by_hand():
+    judge = Judge(channel([(100, 120), (300, 301)]), 16, 8, 0.1)  # a window every second sample
+    first, second = (slice(50 - 7, 60), slice(150 - 7, 151))  # begin from 86 to 118, and from 286 to 300
+    nominal = len(judge.begins) - 17 - 8
+    assert judge.is_nominal.sum() == nominal and not judge.is_nominal[first].any() and not judge.is_nominal[second].any()
+    scores = np.zeros(len(judge.begins))
+    scores[np.flatnonzero(judge.is_nominal)[: nominal // 20]] = 2.0  # 5 % of the nominal windows
+    scores[first], scores[second.start] = 1.0, 3.0
+    own, past = np.arange(99) / 66, np.zeros(5)
+    found = judge.judge(scores, own, past)
+    assert found["false_alarms"] == pytest.approx(nominal // 20 / nominal)  # the threshold is the 90th of 99 scores, 1.35
+    assert found["false_alarms_past"] == found["false_alarms"]  # five scores support no smaller rate than 1 / 6: their largest, 0
+    assert (found["found_at_0.01"], found["found_at_0.05"], found["found_at_0.1"]) == (1, 2, 2) and found["sequences"] == 2
+
+
+def test_the_areas_of_a_perfect_and_of_a_random_score():
+    judge = Judge(channel([(2_000, 2_300)], samples=5_000), 16, 8, 0.1)
+    own = np.zeros(20)
+    perfect = judge.judge(np.where(judge.is_nominal, 0.0, 1.0), own, own)
+    random = judge.judge(np.random.default_rng(1).random(len(judge.begins)), own, own)
+    assert perfect["auc_pr"] > 0.95  # the windows at its edges hold nominal samples, too
+    assert random["auc_pr"] == pytest.approx(300 / 5_000, abs=0.05)  # the share of labelled samples
 
 
 class Mean:

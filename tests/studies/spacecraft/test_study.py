@@ -1,28 +1,25 @@
-"""The study of labelled telemetry, run as a user does on a small data set whose channels are known."""
+"""The command of the study on a small data set whose channels are known, and the published findings."""
 
 import json
-import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from enhsim_tf.reproduce.publish.report import findings_of
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.reproduce.__main__ import main
-from studies.spacecraft import study
+from studies.spacecraft import summary, training_data
+from studies.spacecraft.__main__ import command
 from studies.spacecraft.enhancement import METHODS
-from studies.spacecraft.figures import FIGURES
-from studies.spacecraft.findings import CONTROLS, KEPT, summarise
-from studies.spacecraft.rates import rates_of
-from studies.spacecraft.run import table
-from studies.spacecraft.study import ARMS, DEGRADED_ARM, GENERATED_ARM
+from studies.spacecraft.figure import FIGURES
+from studies.spacecraft.reference import BOUNDS, NETWORK, REFERENCE, RIDGE
+from studies.spacecraft.summary import KEPT, summarise
+from studies.spacecraft.training_data import TRAINING
 
-ROOT = Path(__file__).parents[3]
+PUBLISHED = Path(summary.__file__).with_name("results")
 SEQUENCES = {"W-1": [[900, 1099]], "W-2": [[400, 459], [1200, 1259]]}
+NUM_SAMPLES = 1_800  # of a test part
 
 
 def wave(number, seed):
@@ -32,222 +29,115 @@ def wave(number, seed):
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """Two waves, with what stands still or leaps at the labelled samples, and a constant channel that cannot be used."""
-    folder = tmp_path_factory.mktemp("labelled")
+    """Two waves that stand still at the labelled samples, far outside their range, and a constant channel that cannot be used."""
+    folder = tmp_path_factory.mktemp("data")
     for part in ("train", "test"):
         (folder / part).mkdir()
-    for seed, name in enumerate(SEQUENCES):
-        test = wave(1_800, 10 + seed)
-        for first, last in SEQUENCES[name]:
+        np.save(folder / part / "flat.npy", np.ones((1_500, 2)))
+    for seed, (name, sequences) in enumerate(SEQUENCES.items()):
+        test = wave(NUM_SAMPLES, 10 + seed)
+        for first, last in sequences:
             test[first : last + 1] = 4.0
         np.save(folder / "train" / f"{name}.npy", np.stack([wave(1_500, seed), np.zeros(1_500)], axis=1))
-        np.save(folder / "test" / f"{name}.npy", np.stack([test, np.zeros(1_800)], axis=1))
-    for part in ("train", "test"):
-        np.save(folder / part / "flat.npy", np.ones((1_500, 2)))
-    rows = [f'{name},SMAP,"{sequences}","{["point"] * len(sequences)}",1800' for name, sequences in SEQUENCES.items()]
-    rows.append('flat,SMAP,"[[10, 20]]","[point]",1500')
+        np.save(folder / "test" / f"{name}.npy", np.stack([test, np.zeros(NUM_SAMPLES)], axis=1))
+    rows = [f'{name},SMAP,"{each}","{["point"] * len(each)}",{NUM_SAMPLES}' for name, each in (*SEQUENCES.items(), ("flat", [[10, 20]]))]
     (folder / "labeled_anomalies.csv").write_text("chan_id,spacecraft,anomaly_sequences,class,num_values\n" + "\n".join(rows) + "\n")
     return folder
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("stages")
+def results(data, narrow_enhancer, tmp_path_factory):
+    """Tables and findings of a smoke run, with the detectors whose training is quick and noise that diverges."""
 
+    def diverge(*_):
+        raise InputError("Expected noise that does not diverge. Received: NaN. Fit it again.")
 
-@pytest.fixture(scope="module", autouse=True)
-def quick_detectors():
-    """Leaves out the detectors whose training takes seconds; tests of their own package cover them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual", "nearest neighbours")})
-        yield
-
-
-@pytest.fixture(scope="module")
-def out(data, cache, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
-    command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(folder), "--cache", str(cache)]
-    assert main(command) == 0
-    return folder / "labelled"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training_data, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")})
+        patch.setattr(training_data.GaussianAutoregression, "fit", diverge)
+        assert command(["--budget", "smoke", "--data", str(data), "--out", str(folder), "--cache", str(folder / "cache")]) == 0
+    assert all((folder / f"{name}.png").is_file() for name in FIGURES)
+    return KEPT.read(folder), json.loads((folder / "findings.json").read_text())
 
 
-@pytest.fixture(scope="module")
-def found(out):
-    return json.loads((out / "findings.json").read_text())
+def test_every_training_data_that_can_be_made_has_a_row_for_every_detector(results):
+    tables, found = results
+    assert list(found["channels"]) == list(SEQUENCES) and "constant" in found["skipped"]["flat"]
+    assert set(found["sources"]) == set(TRAINING) - {"enhanced + AR"}
+    assert all(set(each["by_detector"]) == {"limit check", "PCA residual"} for each in found["sources"].values())
+    assert set(found["references"]) == {name + ending for name in (NETWORK, RIDGE) for ending in BOUNDS}
+    assert set(found["controls"]) == set(summary.CONTROLS) and set(tables["enhancement"]["method"]) == set(METHODS)
 
 
-def test_every_table_has_every_row(out):
-    tables = KEPT.read(out)
-    by = tables["thresholds"].groupby(["channel", "seed"])
-    assert sorted(by.groups) == [(name, 0) for name in SEQUENCES]
-    assert all(set(each) == {*ARMS, DEGRADED_ARM} for each in by["arm"].unique())
-    assert (by.size() == by.size().iloc[0]).all()
-    counts = tables["sequences"].drop_duplicates(["channel", "sequence"]).groupby("channel").size()
-    assert counts.to_dict() == {name: len(sequences) for name, sequences in SEQUENCES.items()}
-    assert set(tables["enhancement"]["method"]) == set(METHODS)
-
-
-def test_no_window_with_a_labelled_sample_counts_as_nominal(out):
-    tables = KEPT.read(out)
-    rates = rates_of(tables)
+def test_no_window_with_a_labelled_sample_counts_as_nominal(results):
+    tables, found = results
     for name, sequences in SEQUENCES.items():
-        about = tables["channels"][tables["channels"]["channel"] == name].iloc[0]
-        window, stride = int(about["window"]), int(about["stride"])
-        assert stride == window // 8
-        begins = range(0, 1_800 - window + 1, stride)
+        window = int(tables["channels"].query("channel == @name")["window"].iloc[0])
+        begins = range(0, NUM_SAMPLES - window + 1, window // 8)
         nominal = [begin for begin in begins if all(begin > last or begin + window <= first for first, last in sequences)]
-        assert rates.num_nominal[name] == len(nominal) > 10
+        assert found["channels"][name]["num_nominal"] == len(nominal) > 10
 
 
-def test_a_value_far_outside_is_found_by_the_limit_check_at_its_first_window(out, found):
-    control = found["controls"]["limit check"]
-    assert control["found"]["mean"] == 1 and [each["mean"] for each in control["matched"]] == [1, 1, 1]
-    assert control["median_delay"] <= 100 // 8 + 1, "a window is scored every eighth of its length"
+def test_a_value_far_outside_is_found_by_the_limit_check_and_by_the_reference(results):
+    _, found = results
+    for each in (found["controls"]["limit check"], found["references"][RIDGE]):
+        assert set(each["found"].values()) == {1.0} and each["auc_pr"]["mean"] > 0.8
 
 
-def test_a_perfect_score_is_perfect_and_a_random_one_alarms_at_its_rate(out, found):
-    assert found["oracle"]["auc_pr"] == pytest.approx(1.0) and found["oracle"]["vus_pr"] == pytest.approx(1.0)
-    cells = rates_of(KEPT.read(out)).cells.query("detector == 'random score'")
-    # set for 1 % on 200 windows, on some 240 windows for each channel and seed: a mean above 8 % would be less likely than one in ten thousand
-    assert len(cells) == 2 and cells["own"].mean() <= 0.08
+def test_regression_on_a_wave_that_follows_its_clock_is_as_near_as_the_noise_allows(results):
+    _, found = results
+    of_noise = 0.05 / np.sqrt(0.5 * (1 + 0.3**2))
+    for each in found["channels"].values():
+        assert of_noise < each["nrmse"]["ridge"] < 2 * of_noise < each["nrmse"]["coarse"] / 2
 
 
-def test_arms_alarm_as_their_scores_and_thresholds_say(out, found):
-    tables = KEPT.read(out)
-    chosen = "channel == 'W-1' and arm == @GENERATED_ARM and detector == 'PCA residual'"
-    limit = tables["thresholds"].query(f"{chosen} and rule == 'own'")["rank"].item()
-    rates = rates_of(tables)
-    cell = rates.cells.query(chosen)["own"].item()
-    ranks = tables["scores"].query(chosen)
-    stride, window = (int(tables["channels"].iloc[0][column]) for column in ("stride", "window"))
-    begins = ranks["place"].to_numpy() * stride
-    first, last = SEQUENCES["W-1"][0]
-    nominal = (begins > last) | (begins + window <= first)
-    assert cell == pytest.approx((ranks["rank"].to_numpy()[nominal] > limit).mean())
-    assert found["channels"]["W-1"]["false_alarms"][GENERATED_ARM]["PCA residual"] == pytest.approx(cell)
-
-
-def test_a_second_seed_with_the_same_results_changes_no_mean_and_no_chance(out, found):
-    tables = {name: pd.concat([table, table.assign(seed=1)], ignore_index=True) for name, table in KEPT.read(out).items()}
-    again = summarise(tables)
-    assert again["seeds"] == [0, 1] and again["num_sequences"] == found["num_sequences"]
-    for arm, about in found["arms"].items():
-        assert again["arms"][arm]["false_alarms"]["mean"] == pytest.approx(about["false_alarms"]["mean"])
-        for one, other in zip(again["arms"][arm]["matched"], about["matched"], strict=True):
-            assert (one["mean"], one["chance"]) == pytest.approx((other["mean"], other["chance"]))
-
-
-def test_real_telemetry_sets_both_of_its_thresholds_by_cross_fitting(out):
-    limits = KEPT.read(out)["thresholds"].query("arm == 'real'").pivot(index=["channel", "seed", "detector"], columns="rule", values="rank")
-    assert (limits["own"] == limits["past"]).all()
-
-
-def test_every_arm_and_control_has_finds_chance_and_p_values(found):
-    for about in (*found["arms"].values(), *found["controls"].values()):
-        assert [each["rate"] for each in about["matched"]] == found["rates"]
-        for each in about["matched"]:
-            assert 0 <= each["low"] <= each["mean"] <= each["high"] <= 1 and 0 <= each["chance"] <= 1 and 0 < each["p_value"] <= 1
-    assert set(found["controls"]) == set(CONTROLS)
-    pair = next(each for each in found["contrasts"] if each["second"] == "real")
-    arms = found["arms"]
-    difference = arms[pair["first"]]["false_alarms"]["mean"] - arms["real"]["false_alarms"]["mean"]
-    assert pair["false_alarms"]["mean"] == pytest.approx(difference)
-
-
-def test_a_channel_that_cannot_be_used_is_left_out_and_said_so(found):
-    assert list(found["skipped"]) == ["flat"] and "constant" in found["skipped"]["flat"]
-
-
-def test_an_arm_that_cannot_be_made_is_left_out_and_the_channel_stays(data, cache, out, found, tmp_path, monkeypatch, capsys):
-    def diverge(self, folder):
-        raise InputError("Expected finite noise. Received: noise that diverged. Fit it again.")
-
-    monkeypatch.setattr(study.ChannelStudy, "_make_gan_noise", diverge)
-    monkeypatch.setattr(
-        study.GaussianAutoregression, "fit", lambda *_: SimpleNamespace(generate=lambda number, seed: np.full((number, 1), np.nan))
-    )
-    command = [
-        "--budget",
-        "smoke",
-        "--experiment",
-        "labelled",
-        "--data",
-        str(data),
-        "--out",
-        str(tmp_path),
-        "--cache",
-        str(tmp_path / "cache"),
+def test_the_summary_takes_means_over_channels_seeds_and_detectors():
+    rows = [
+        {"channel": channel, "seed": seed, "training": REFERENCE, "detector": "residual", "false_alarms": alarms, "auc_pr": alarms}
+        | {"false_alarms_past": 0.0, "found_at_0.01": found, "found_at_0.05": 2, "found_at_0.1": 2, "sequences": 2}
+        for channel, seed, alarms, found in (
+            ("a", 0, 0.0, 2),
+            ("a", 1, 0.2, 1),
+            ("b", 0, 0.5, 0),
+            ("b", 1, 0.5, 1),
+            ("c", 0, 0.9, 2),
+            ("c", 1, 0.7, 0),
+        )
     ]
-    shutil.copytree(cache, tmp_path / "cache", ignore=lambda _, names: [name for name in names if name.startswith(("GAN", "study"))])
-    assert main([*command, "--channels", "W-1"]) == 0
-    said = capsys.readouterr().out
-    assert (
-        "enhanced + GAN             left out: Expected finite noise" in said
-        and "enhanced + AR              left out: Expected a simul" in said
-    )
-    tables = KEPT.read(tmp_path / "labelled")
-    assert set(tables["thresholds"]["arm"]) == {*ARMS, DEGRADED_ARM} - {"enhanced + GAN", "enhanced + AR"}
-    less = json.loads((tmp_path / "labelled" / "findings.json").read_text())
-    assert "enhanced + GAN" not in less["arms"] and "noise that diverged" in less["channels"]["W-1"]["dropped"][0]
-    assert less["channels"]["W-1"]["false_alarms"]["coarse"] == found["channels"]["W-1"]["false_alarms"]["coarse"]
-    assert "| W-1 |" in table(less) and "on generated" in table(less)
-    # next to channels and seeds that have every arm, shares are those of the rows that have it
-    whole = KEPT.read(out)
-    second = {name: pd.concat([tables[name], each.query("channel == 'W-2'")]).assign(seed=1) for name, each in whole.items()}
-    both = summarise({name: pd.concat([each, second[name]], ignore_index=True) for name, each in whole.items()})
-    for one, other in zip(both["arms"]["enhanced + GAN"]["matched"], found["arms"]["enhanced + GAN"]["matched"], strict=True):
-        assert (one["mean"], one["chance"]) == pytest.approx((other["mean"], other["chance"]))
-    assert both["channels"]["W-1"]["dropped"] == less["channels"]["W-1"]["dropped"] and "dropped" not in both["channels"]["W-2"]
+    found = summary._results(pd.DataFrame(rows))
+    assert found["median_false_alarms"] == pytest.approx(0.5) and found["false_alarms"]["mean"] == pytest.approx(2.8 / 6)
+    assert found["found"] == {"0.01": pytest.approx(6 / 12), "0.05": 1.0, "0.1": 1.0}
 
 
-def test_findings_are_those_of_the_tables(out, found):
-    again = json.loads(json.dumps(summarise(KEPT.read(out))))
-    assert again == {key: found[key] for key in again}
-
-
-def test_the_projects_report_and_page_are_those_of_its_tables(near):
-    kept = findings_of(ROOT, "labelled")
-    again = json.loads(json.dumps(summarise(KEPT.read(ROOT / "figures" / "labelled"))))
+def test_the_published_findings_are_those_of_the_published_tables(near):
+    kept = json.loads((PUBLISHED / "findings.json").read_text())
+    again = json.loads(json.dumps(summarise(KEPT.read(PUBLISHED))))
     assert again == near({key: kept[key] for key in again}) and kept["budget"] == "full"
-    assert table(kept) in (ROOT / "docs" / "spacecraft.md").read_text(encoding="utf-8")
 
 
-def test_figures_are_there(out):
-    assert all((out / f"{name}.{suffix}").is_file() for name in FIGURES for suffix in ("png", "svg"))
-
-
-def test_the_second_run_takes_every_channel_from_the_cache(data, cache, out, tmp_path, capsys):
-    command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(tmp_path), "--cache", str(cache)]
-    assert main([*command, "--channels", "W-2"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if line.endswith("...")] == [] and sum("(from the cache)" in line for line in lines) == 3
-    kept = KEPT.read(out)["ranking"].query("channel == 'W-2'").reset_index(drop=True)
-    pd.testing.assert_frame_equal(KEPT.read(tmp_path / "labelled")["ranking"], kept)
+def test_the_readme_has_the_numbers_of_the_findings(numbers_of):
+    rows, found = numbers_of("spacecraft"), json.loads((PUBLISHED / "findings.json").read_text())
+    results = found["references"] | found["controls"] | found["sources"]
+    shown = [name for name in results if name in rows]
+    assert len(shown) == 11
+    for name in shown:
+        about = results[name]
+        values = [about["auc_pr"]["mean"], 100 * about["false_alarms"]["mean"], 100 * about["found"]["0.01"]]
+        assert rows[name][:1] == pytest.approx(values[:1], abs=0.0051) and rows[name][1:] == pytest.approx(values[1:], abs=0.51), name
 
 
 @pytest.mark.parametrize(
     ("given", "word"),
     [
-        (["--experiment", "labelled"], "--data"),
-        (["--data", "x"], "--experiment labelled"),
-        (["--channels", "A"], "--channels"),
-        (["--experiment", "labelled", "--data", "nowhere"], "nowhere"),
-        (["--experiment", "labelled", "--seeds", "3", "--data", "nowhere"], "--seeds"),
+        ([], "--data"),
+        (["--data", "nowhere"], "nowhere"),
+        (["--data", "nowhere", "--seeds", "0"], "--seeds"),
+        (["--data", "{data}", "--channels", "W-9"], "'W-9'"),
     ],
 )
-def test_wrong_options_are_refused_in_one_line(given, word, tmp_path, capsys):
-    assert main([*given, "--out", str(tmp_path / "out")]) == 2
+def test_wrong_options_are_refused_in_one_line(given, word, data, tmp_path, capsys):
+    given = [each.format(data=data) for each in given]
+    assert command([*given, "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: Expected") and word in line
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_unknown_channel_is_refused(data, cache, tmp_path, capsys):
-    command = ["--budget", "smoke", "--experiment", "labelled", "--data", str(data), "--out", str(tmp_path), "--cache", str(cache)]
-    assert main([*command, "--channels", "W-1,W-9"]) == 2
-    assert "'W-9'" in capsys.readouterr().err
-
-
-def test_missing_tables_are_refused(tmp_path):
-    with pytest.raises(InputError, match="channels.parquet"):
-        KEPT.read(tmp_path)

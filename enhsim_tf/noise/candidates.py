@@ -1,0 +1,49 @@
+"""Fits the noise models among which a fit chooses (an extension of section 2.3)."""
+
+from typing import Protocol
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.noise.names import CANDIDATES
+from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
+
+_MOST_ORDER = 200  # of the autoregression
+
+
+class NoiseModel(Protocol):
+    """What every noise model can do. Models that do not depend on the signal ignore it."""
+
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws noise for `number` windows; `signal` is the enhanced signal of the same shape, in the telemetry's unit."""
+
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws one series of noise; `signal` is the enhanced signal of the same shape."""
+
+
+def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> NoiseModel:
+    """Fits a noise model.
+
+    Args:
+        name: One of `names.CANDIDATES`.
+        noise: Windows of noise of shape `(windows, samples)`, in the unit of the telemetry.
+        signal: The enhanced signal below them, of the same shape.
+        starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
+
+    Raises:
+        InputError: If there is no model of that name, or if it cannot be fitted to this noise.
+    """
+    window = noise.shape[1]
+    match name:
+        case "none":
+            return GaussianNoise(0.0, window)
+        case "gaussian":
+            return GaussianNoise.fit(noise)
+        case "autoregression":
+            return GaussianAutoregression.fit(noise, min(_MOST_ORDER, window - 1))
+        case "residual windows":
+            return WindowBootstrap.fit(noise, starts)
+        case "matched residual windows":
+            return MatchedWindowBootstrap.fit(noise, signal, starts)
+    raise InputError(f"Expected a noise model among {', '.join(CANDIDATES)}. Received: {name!r}.")

@@ -1,0 +1,108 @@
+"""The options of reading and cleaning telemetry, declared once for Python and the commands."""
+
+import dataclasses
+from collections.abc import Sequence
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.times import DAYS, UNITS_NS, check_time_format
+
+_CHOICES = {
+    "on_bad_times": ("refuse", "drop"),
+    "on_bad_values": ("refuse", "drop"),
+    "same_time": (None, "mean", "first", "last", "refuse"),
+    "other_rates": ("resample", "leave out"),
+    "fill": ("linear", "hold"),
+    "labelled": ("keep", "missing"),
+    "decimal": (None, ".", ","),
+}
+_MAX_FILL = {"linear": 5, "hold": 1_000_000}
+_NAMES = ("label_column", "series_column", "value_column")
+
+
+@dataclasses.dataclass(frozen=True)
+class Cleaning:
+    """Options of `read_source` and `clean`.
+
+    Args:
+        interval_s: Sampling interval in seconds. Every row is assigned to the nearest point of this grid, and rows that share
+            a point are averaged. None: the interval that most rows have.
+        timezone: Time zone of times without one, such as "Europe/Berlin". None: UTC; times that jump back by one hour, as a
+            local clock does, then raise an `InputError`.
+        time_format: How times are written: a format as for `datetime.strptime`, or for numbers their unit ("D", "h", "min", "s", "ms",
+            "us", "ns", since 1970 or any other zero) or kind of day ("excel", "mjd", "jd", "datenum"). None: detected.
+        on_bad_times: Treatment of times that cannot be read: "refuse" raises an `InputError`, "drop" drops their rows.
+        on_bad_values: Treatment of values that cannot be read: "refuse" raises an `InputError`, "drop" treats them as missing.
+        decimal: Decimal sign, "." or ",". The other sign then separates thousands. None: decided from all columns of a file.
+        missing_values: Values that mean "no value", numbers or text, such as `(-999.9, "offline")`.
+        same_time: Treatment of different values at the same time: take their "mean", the "first" or the "last", or "refuse".
+            None: the mean, unless it would merge most rows.
+        max_jitter: Largest distance of a time from the regular grid, in intervals, at most 0.5. The series is split where the
+            distance is larger.
+        max_fill: Longest gap that is filled, in samples. The series is split at longer gaps. None: 5, or 1,000,000 with
+            `fill="hold"`.
+        fill: How gaps are filled: "linear", by straight lines, or "hold", with the last value before the gap, for telemetry that is
+            sent only when its value changes. With "hold", the last of several rows in an interval is used, not their mean.
+        other_rates: Treatment of stretches with another sampling rate: "resample" or "leave out".
+        min_part: Shortest part that is kept, in samples.
+        label_column: Name, or names, of the columns of a table that label anomalous rows, or "none". None: detected.
+        labelled: Treatment of rows that are labelled anomalous: "keep" them, or take their values as "missing".
+        series_column: Name, or names, of the columns whose values tell several series of one table apart. None: detected.
+        value_column: Name, or names, of the columns that hold the values of such series. None: all columns of numbers.
+        no_header: Whether a text file has no line of column names. Its columns are then called "column 0", "column 1", ...
+
+    Raises:
+        InputError: If an option is out of range.
+    """
+
+    interval_s: float | None = None
+    timezone: str | None = None
+    time_format: str | None = None
+    on_bad_times: str = "refuse"
+    on_bad_values: str = "refuse"
+    decimal: str | None = None
+    missing_values: Sequence[float | str] = ()
+    same_time: str | None = None
+    max_jitter: float = 0.25
+    max_fill: int | None = None
+    fill: str = "linear"
+    other_rates: str = "resample"
+    min_part: int = 2
+    label_column: str | Sequence[str] | None = None
+    labelled: str = "keep"
+    series_column: str | Sequence[str] | None = None
+    value_column: str | Sequence[str] | None = None
+    no_header: bool = False
+
+    def __post_init__(self):
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise InputError(f"Expected {name}, one of: {', '.join(filter(None, choices))}. Received: {name}={getattr(self, name)!r}.")
+        if self.interval_s is not None and not 1e-9 <= self.interval_s <= 1e9:
+            raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
+        if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
+            raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
+        check_time_format(self.time_format)
+        for name in _NAMES:
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
+        given = self.missing_values
+        object.__setattr__(self, "missing_values", (given,) if isinstance(given, str | float | int) else tuple(given))
+
+    @property
+    def longest_gap(self) -> int:
+        """Longest gap that is filled, in samples."""
+        return _MAX_FILL[self.fill] if self.max_fill is None else self.max_fill
+
+    def of_run(self, **changes: object) -> "Cleaning":
+        """Returns the options for a recorded run of a simulator, which has another layout than the telemetry.
+
+        Args:
+            **changes: Further fields to change.
+        """
+        own = {"time_format": None, "label_column": None, "labelled": "keep", "series_column": None, "value_column": None}
+        return dataclasses.replace(self, **own | {"no_header": False} | changes)
+
+
+TIME_FORMATS = f"a format such as %d.%m.%Y %H:%M:%S, or for numbers {', '.join(UNITS_NS)} (since 1970 or any zero), {', '.join(DAYS)}"
+"""What `time_format` may be, as text."""

@@ -1,0 +1,168 @@
+"""Reads the channels of a table, each with its times and with findings that say what was decided."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.report import Finding, Places
+from enhsim_tf.telemetry.reading.clock import NO_TIME
+from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
+from enhsim_tf.telemetry.reading.files import read_table
+from enhsim_tf.telemetry.reading.series import keys_of, name_series
+from enhsim_tf.telemetry.reading.table import Table
+
+_SAID = {
+    "row numbers": "columns that number the rows, not taken as channels",
+    "quality flags": "columns of quality flags, not taken as channels; name them with columns (--column) if they are telemetry",
+    "further clocks": "columns that show the time once more, not taken as channels",
+    "own columns": "columns that this tool wrote beside the values, not taken as channels",
+    "columns left out": "columns without numbers",
+}
+
+
+def read_table_channels(
+    source: Path | Sequence[Path] | pd.DataFrame | pd.Series, columns: list[str] | None, time: str | None, options: Cleaning
+) -> dict[str, pd.Series]:
+    """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
+    what = (
+        source.name
+        if isinstance(source, Path)
+        else "the table"
+        if isinstance(source, pd.DataFrame | pd.Series)
+        else f"{source[0].name} ..."
+    )
+    table = _without_repeats(read_table(source, options), columns, time, options, what)
+    named = _wanted(table, columns)
+    layout = lay_out(table, named, time, options, what)
+    keys = [key for key in keys_of(table.frame, layout, options, what) if key not in (named or ())]
+    _check_names(table, [] if keys else columns, what, layout)
+    findings = [*table.findings, *_findings_of(layout, keys)]
+    if not keys:
+        chosen = {name: (name, None) for name in layout.channels}
+    else:
+        values = options.value_column or [name for name in layout.channels if name not in keys]
+        chosen = name_series(table.frame, keys, list(values), what)
+        said = ", ".join(list(chosen)[:6])
+        findings.append(Finding("series", len(chosen), f"series told apart by {', '.join(keys)}: {len(chosen):,} ({said})"))
+        if columns is not None and named is None:
+            missing = next((name for name in columns if name not in chosen), None)
+            if missing is not None:
+                raise InputError(f"Expected series of {what}: {said}. Received: {missing!r}. Name one of these.")
+            chosen = {name: chosen[name] for name in columns}
+    if not chosen:
+        left = "; left out: " + ", ".join(_with_cell(table, name) for names in layout.left_out.values() for name in names)
+        left = left if layout.left_out else ""
+        raise InputError(
+            f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
+        )
+    return {name: _channel(table, layout, name, *place, findings, options) for name, place in chosen.items()}
+
+
+def _with_cell(table: Table, name: str) -> str:
+    """Returns the name of a column with its first cell."""
+    cells = table.frame[name].dropna()
+    return f"{name} ({format_cell(cells.iloc[0])})" if len(cells) else name
+
+
+def _wanted(table: Table, columns: Sequence[str] | None) -> list[str] | None:
+    """Returns the columns of the table among those that were asked for, or None if these are names of series."""
+    return list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None
+
+
+def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Table:
+    """Refuses names that occur twice, unless other columns were asked for, and names of options that do not occur."""
+    names = table.frame.columns
+    repeated = set(names[names.duplicated()])
+    named = [
+        *(options.label_column or ()),
+        *(options.series_column or ()),
+        *(options.value_column or ()),
+        *([] if time is None else [time]),
+    ]
+    for name in [*(columns or ()), *named]:
+        if name in repeated or name in named and name not in names and name != NO_TIME:
+            received = f"{name!r} more than once in {what}" if name in repeated else repr(name)
+            raise InputError(
+                f"Expected a column of {what}: {', '.join(dict.fromkeys(names[:8]))}. Received: {received}. Name one of these."
+            )
+    if columns is None and repeated:
+        raise InputError(f"Expected columns of different names. Received: {min(repeated)!r} more than once in {what}. Rename them.")
+    return Table(table.frame.loc[:, ~names.isin(repeated)], table.places, table.decimal, table.findings) if repeated else table
+
+
+def _check_names(table: Table, columns: Sequence[str] | None, what: str, layout: Layout) -> None:
+    for name in columns or ():
+        if name not in table.frame.columns:
+            known = ", ".join((layout.channels or tuple(table.frame.columns))[:8])
+            raise InputError(f"Expected a column of {what}: {known}. Received: {name!r}. Name one of these.")
+
+
+def _findings_of(layout: Layout, keys: Sequence[str]) -> list[Finding]:
+    findings = []
+    for kind, text in _SAID.items():
+        names = [name for name in layout.left_out.get(kind, ()) if name not in keys]
+        if names:
+            findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
+    return findings
+
+
+def _channel(
+    table: Table, layout: Layout, name: str, column: str, rows: np.ndarray | None, findings: Sequence[Finding], options: Cleaning
+) -> pd.Series:
+    """Makes the raw series of one channel."""
+    frame, places = table.frame, table.places
+    take = slice(None) if rows is None else rows
+    cells = frame[column].iloc[take]
+    if layout.times is None:
+        index: pd.Index = pd.RangeIndex(len(cells))
+    else:
+        index = layout.times.stamps[take].rename(layout.clock.columns[0])
+    series = pd.Series(cells.array, index=index, name=name, copy=False)
+    findings = [*findings, *_bad_times(layout, places)]
+    for label in layout.labels:
+        if not _concerns(label, column, layout):
+            continue
+        mask = anomalous(frame[label].iloc[take])
+        if mask is None:
+            said = ", ".join(map(str, frame[label].dropna().unique()[:4]))
+            findings.append(
+                Finding("labels", 1, f"labels of {label!r}, not used, because its values do not say which is anomalous: {said}")
+            )
+            continue
+        how = "kept" if options.labelled == "keep" else "taken as missing"
+        findings.append(
+            Finding("labels", max(1, int(mask.sum())), f"rows that {label!r} labels anomalous, {how}: {mask.sum():,} of {len(mask):,}")
+        )
+        if options.labelled == "missing":
+            series = series.mask(mask) if not is_text(series) else series.astype(object).mask(mask)
+    series.attrs = {"findings": [finding.to_dict() for finding in findings], "places": places if rows is None else Places(places, rows)}
+    if table.decimal is not None:
+        series.attrs["decimal"] = table.decimal
+    if layout.times is not None:
+        times, columns = layout.times, " and ".join(map(repr, layout.clock.columns))
+        series.attrs["clock"] = {"column": columns, "form": times.form, "zone": times.zone, "counts": times.counts}
+    return series
+
+
+def _bad_times(layout: Layout, places: Places) -> list[Finding]:
+    """Findings of the times, which concern every channel."""
+    if layout.times is None:
+        return []
+    bad: Any = layout.times.bad
+    findings = list(layout.times.findings)
+    if bad.any():
+        rows = tuple(places.of(row) for row in np.flatnonzero(bad)[:3])
+        findings.append(Finding("bad times", int(bad.sum()), f"times that cannot be read, taken as missing: {int(bad.sum()):,}", rows))
+    return findings
+
+
+def _concerns(label: str, column: str, layout: Layout) -> bool:
+    """Whether a label concerns a channel: one that ends with the name of a channel concerns that channel alone."""
+    owner = [name for name in layout.channels if label != name and label.endswith(name) and len(name) > 1]
+    return not owner or max(owner, key=len) == column

@@ -1,0 +1,276 @@
+"""Says what each column of a table is: clock, label, quality flag, row number, key of several series, or channel."""
+
+import dataclasses
+import datetime
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.dates import LOOK, date_forms
+from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.times import Times, parse_times
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, is_epoch, is_same_clock, may_be_clock, named_clock
+from enhsim_tf.telemetry.reading.table import Table
+
+_LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
+_FLAGS = set("quality qc qa flag flags valid validity".split())
+_ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number".split())
+_NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
+_ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
+_OWN = {  # what the commands write beside the values: the columns that give it away, all columns, and the label among them
+    "labelled series": (("severity", "onset", "end", "mask"), ("scenario", "severity", "onset", "end", "mask"), "mask"),
+    "scores": (("value", "score", "flag"), ("enhanced", "score", "flag", "out_of_range"), None),
+    "copies of a run": (("copy", "value", "out_of_range"), ("out_of_range",), None),
+}
+_MAX_STATES = 10  # a label or flag has at most this many different values
+_DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|days?(?: [\d:.+-]+)?)"
+_TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Layout:
+    """What the columns of a table are.
+
+    Args:
+        clock: The clock.
+        times: Its times; None if samples are counted.
+        channels: Columns of telemetry.
+        labels: Columns that label anomalous rows.
+        words: Columns of words, which may tell several series apart.
+        left_out: Names of the other columns by the kind of finding that reports them.
+    """
+
+    clock: Clock
+    times: Times | None
+    channels: tuple[str, ...]
+    labels: tuple[str, ...]
+    words: tuple[str, ...]
+    left_out: Mapping[str, Sequence[str]]
+
+
+def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Layout:
+    """Says what each column of a table is.
+
+    Args:
+        table: The table; no name repeats.
+        columns: Columns that were asked for as channels, or None.
+        time: Name of the time column, `NO_TIME`, or None.
+        options: `label_column`, `series_column` and `value_column` are used.
+        what: Description of the source, for messages.
+
+    Returns:
+        The layout.
+
+    Raises:
+        InputError: If the clock cannot be told.
+    """
+    frame, asked = table.frame, {*(columns or ()), *(options.value_column or ())}
+    kinds = {name: kind_of(frame[name]) for name in frame.columns}
+    if "%" in (options.time_format or ""):
+        kinds |= {name: "dates" for name in frame.columns if name not in asked and _fits(frame[name], str(options.time_format))}
+    numbers = {name: _values(frame[name], table.decimal) for name, kind in kinds.items() if kind == "numbers"}
+    labels = _labels_of(frame, kinds, numbers, asked, options)
+    left_out: dict[str, list[str]] = {"labels": list(labels)}
+    free = [name for name in frame.columns if name not in asked and name not in labels and name not in (options.series_column or ())]
+    own = _own_columns(frame)
+    left_out["own columns"] = [name for name in free if name in own]
+    left_out["quality flags"] = [
+        name for name in free if _words_of(name) & _FLAGS and name not in own and _has_states(frame[name], kinds[name])
+    ]
+    left_out["row numbers"] = [name for name in free if name in numbers and _numbers_rows(name, numbers[name])]
+    if {"result", "table", "_time"} <= set(frame.columns):  # of InfluxDB
+        left_out["row numbers"] += [name for name in ("table",) if name in free and name in numbers]
+    gone = {name for names in left_out.values() for name in names}
+    if time is None:
+        candidates = {name: values for name, values in numbers.items() if name not in asked and name not in gone}
+        clock = find_clock(frame, {name: kind for name, kind in kinds.items() if name not in gone}, candidates, what, options.time_format)
+    else:
+        clock = Clock() if time == NO_TIME else named_clock(frame, time, what, options.time_format)
+    times = _times_of(clock, table, options, what)
+    gone |= set(clock.columns)
+    clocks = _further_clocks(clock, times, numbers, what)
+    further = [name for name in free if name not in gone and name in clocks]
+    rest = [name for name in numbers if name not in gone and name not in further]
+    counted = [name for name in rest if name in free and clock.columns and _counts(numbers[name])]
+    counted = counted if len(counted) < len(rest) else []  # the only column counts: it is the channel
+    left_out["further clocks"], left_out["row numbers"] = further, left_out["row numbers"] + counted
+    gone |= {*further, *counted}
+    channels = tuple(name for name in numbers if name not in gone) if columns is None else tuple(columns)
+    words = tuple(name for name, kind in kinds.items() if kind == "words" and name not in gone)
+    if columns is None:
+        left_out["columns left out"] = [name for name in frame.columns if name not in gone and name not in channels]
+    return Layout(clock, times, channels, tuple(labels), words, {kind: names for kind, names in left_out.items() if names})
+
+
+def kind_of(cells: pd.Series) -> str:
+    """Says what a column holds: "numbers", "dates", "spans" of time, "times of day", "words", other "objects", or nothing ("empty").
+
+    Text that holds at least some numbers is numbers.
+
+    Args:
+        cells: The column.
+    """
+    if pd.api.types.is_datetime64_any_dtype(cells.dtype) or isinstance(cells.dtype, pd.PeriodDtype):
+        return "dates"
+    if pd.api.types.is_timedelta64_dtype(cells.dtype):
+        return "spans"
+    if not is_text(cells):
+        if isinstance(cells.dtype, pd.CategoricalDtype):
+            return kind_of(cells.iloc[:LOOK].astype(object))
+        is_number = pd.api.types.is_numeric_dtype(cells.dtype) and not pd.api.types.is_bool_dtype(cells.dtype) and cells.dtype.kind != "c"
+        return (
+            "words"
+            if pd.api.types.is_bool_dtype(cells.dtype)
+            else "objects"
+            if not is_number
+            else "numbers"
+            if cells.notna().any()
+            else "empty"
+        )
+    given = cells.iloc[: 10 * LOOK]
+    given = given[~is_missing(given)].iloc[:LOOK]
+    if not len(given):
+        given = cells[~is_missing(cells)].iloc[:LOOK]
+    if not len(given):
+        return "empty"
+    first = given.iloc[0]
+    if isinstance(first, datetime.date | np.datetime64):
+        return "dates"
+    if isinstance(first, datetime.time):
+        return "times of day"
+    if isinstance(first, datetime.timedelta):
+        return "spans"
+    if not parse_numbers(given, "", drop=True)[1].all():
+        return "numbers"
+    text = given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)].astype("str").str.strip()
+    if len(text) < len(given) / 2:
+        return "objects"
+    if has_commas(text):  # which are refused where they can be read in two ways
+        return "numbers"
+    if text.str.fullmatch(_DURATION).mean() > 0.5:
+        return "spans"
+    if text.str.fullmatch(_TIME_OF_DAY).mean() > 0.5:
+        return "times of day"
+    return "dates" if date_forms(text) else "words"
+
+
+def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
+    if is_text(cells) or isinstance(cells.dtype, pd.CategoricalDtype):
+        return parse_numbers(cells, "", drop=True, decimal=decimal)[0]
+    return cells.to_numpy(np.float64, na_value=np.nan)
+
+
+def _words_of(name: str) -> set[str]:
+    split = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    return {*split, *("".join(pair) for pair in zip(split, split[1:], strict=False))}
+
+
+def _has_states(cells: pd.Series, kind: str) -> bool:
+    """Whether a column has only a few values, which are whole numbers or words."""
+    if kind not in ("numbers", "words") or len(states := cells.dropna().unique()) > _MAX_STATES:
+        return False
+    return kind == "words" or not any(isinstance(state, float) and state % 1 for state in states)
+
+
+def _labels_of(
+    frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], asked: set[str], options: Cleaning
+) -> list[str]:
+    """Returns the columns that label anomalous rows: those that the options name, or those whose name and values show it."""
+    if options.label_column is not None:
+        return [] if options.label_column == (NO_TIME,) else list(options.label_column)
+    own = [label for marks, _, label in _OWN.values() if label is not None and set(marks) <= set(frame.columns) and label not in asked]
+    found = [
+        name
+        for name, kind in kinds.items()
+        if name not in asked and _words_of(name) & _LABELS and kind in ("numbers", "words") and _has_states(frame[name], kind)
+    ]
+    return [*found, *(label for label in own if label not in found)]
+
+
+def _own_columns(frame: pd.DataFrame) -> set[str]:
+    names = set(frame.columns)
+    return {column for marks, columns, _ in _OWN.values() if set(marks) <= names for column in columns}
+
+
+def _numbers_rows(name: str, values: np.ndarray) -> bool:
+    """Whether a column numbers the rows: it has no name, or one that says so, and counts."""
+    is_unnamed = bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name))
+    if not (is_unnamed or _words_of(name) <= _ROWS and _words_of(name)) or not np.isfinite(values).all() or (values % 1).any():
+        return False
+    steps = np.diff(values)
+    return (
+        bool(np.mean(steps == 1) >= 0.9)
+        if len(steps) and not is_unnamed
+        else len(np.unique(values)) == len(values) or bool(np.mean(steps == 1) > 0.9)
+    )
+
+
+def _counts(values: np.ndarray) -> bool:
+    """Whether values beside a clock count the rows from 0 or 1."""
+    return len(values) > 2 and values[0] in (0, 1) and bool((np.diff(values) == 1).all())
+
+
+def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times | None:
+    """Parses the times of a clock."""
+    if not clock.columns:
+        return None
+    what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
+    form = options.time_format or clock.form
+    return parse_times(clock.cells, what, options.on_bad_times == "drop", form, options.timezone, table.places)
+
+
+def _fits(cells: pd.Series, form: str) -> bool:
+    """Whether most cells are dates of a given format."""
+    head = cells.dropna().iloc[:LOOK]
+    if pd.api.types.is_float_dtype(head.dtype) or not (is_text(head) or pd.api.types.is_integer_dtype(head.dtype)):
+        return False
+    try:
+        return bool(pd.to_datetime(head.astype(str).str.strip(), format=form, errors="coerce", utc=True).notna().mean() > 0.5)
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format, which the parser of times refuses
+        return False
+
+
+def _further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], what: str) -> set[str]:
+    """Returns the columns of numbers that show the time once more, or show it although samples are counted."""
+    if times is None:
+        try:
+            found = find_clock(pd.DataFrame(numbers), dict.fromkeys(numbers, "numbers"), numbers, what)
+        except InputError:  # nothing is clearly a clock
+            return set()
+        return {*found.columns, *found.others}
+    own = np.where(times.stamps.isna(), np.nan, times.stamps.tz_localize(None).as_unit("ns").asi8.astype(np.float64))
+    may = {name: values for name, values in numbers.items() if name not in clock.columns and (may_be_clock(name) or is_epoch(values))}
+    return {*clock.others, *(name for name, values in may.items() if is_same_clock(own, values))}
+
+
+def anomalous(cells: pd.Series) -> np.ndarray | None:
+    """Says which rows a column labels as anomalous.
+
+    Args:
+        cells: The column: true and false, 0 and others, -1 and 1 (where -1 is anomalous), or words such as "normal" and "attack".
+
+    Returns:
+        Mask of the rows, or None if its values do not show it.
+    """
+    missing = is_missing(cells.astype(object))
+    if pd.api.types.is_bool_dtype(cells.dtype):
+        return cells.to_numpy(bool)
+    values, bad, _ = parse_numbers(
+        cells.astype(object).map(lambda cell: int(cell) if isinstance(cell, bool | np.bool_) else cell), "", drop=True
+    )
+    if not bad.any():
+        states = set(np.unique(values[np.isfinite(values)]).tolist())
+        if states == {-1.0, 1.0}:
+            return values == -1
+        return (
+            np.isfinite(values) & (values != 0) if 0 in states or states == {1.0} else np.zeros(len(values), bool) if not states else None
+        )
+    words = cells.astype("str").str.strip().str.casefold()
+    normal = (words.isin(_NORMAL) | missing).to_numpy(bool)
+    if not words[~missing].isin(_NORMAL).any() and not words[~missing].isin(_ANOMALOUS).all():
+        return None
+    return ~normal

@@ -1,0 +1,194 @@
+"""Finds out how a text file is written: its encoding, separator, and the line that holds the columns' names."""
+
+import csv
+import dataclasses
+import re
+from collections.abc import Sequence
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.size_limits import MAX_COLUMNS
+from enhsim_tf.telemetry.cleaning.report import Finding
+
+BLANKS = r"\s+"  # the separator of files whose columns stand apart by blanks
+_SEPARATORS = ";\t|,"  # the comma comes last because it may be a decimal sign
+_HEAD_LINES, _HEAD = 120, 4_000_000  # lines and characters that are inspected
+_LOOK = 50  # columns that are inspected
+_NUMBER = r"[+-]?(?:\d[\d.,' ]*|[.,]\d+)(?:e[+-]?\d+)?(?: ?(?:[num\u00b5]?s|sec|min|h|hr|days?|%))?"
+_DATE = r"\d{1,4}[-/.: ]\d.*|\d{8}T.*|\d{1,2}[-/ ][a-z]{3}.*|(?:[a-z]{3}, )?\d{1,2} [a-z]{3} .*|[a-z]{3}\.? +\d{1,2},? +\d.*"
+_SOLID = re.compile(f"(?:{_NUMBER}|{_DATE}|[+-]?inf(?:inity)?)$", re.IGNORECASE)
+
+
+@dataclasses.dataclass(frozen=True)
+class Dialect:
+    """How a text file is written.
+
+    Args:
+        separator: What separates columns.
+        names: Names of the columns; "" for a column without one.
+        first_line: Line at which the data begin, counted from 0.
+        skipped: Lines before the data that are neither names nor blank.
+        head: Cells of the first rows of data.
+    """
+
+    separator: str
+    names: list[str]
+    first_line: int
+    skipped: int
+    head: list[list[str]]
+
+
+def decode(content: bytes) -> tuple[str, str, list[Finding]]:
+    """Decodes the content of a text file.
+
+    Args:
+        content: The bytes.
+
+    Returns:
+        The text (its first part if all of it is ASCII with lines), the encoding, and findings for the cleaning log.
+
+    Raises:
+        ValueError: If it is not text.
+    """
+    findings = []
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text, encoding = content.decode("utf-16"), "utf-16"
+    else:
+        whole = content.rstrip(b"\x00")
+        if len(whole) < len(content):
+            text = f"NUL bytes at the end, as after a power failure: {len(content) - len(whole):,}"
+            findings.append(Finding("padding", len(content) - len(whole), text))
+        try:
+            is_simple = b"\x00" not in content and content.isascii() and b"\n" in content
+            text, encoding = (
+                whole[:_HEAD].decode() if is_simple else whole.decode("utf-8-sig"),
+                "utf-8",
+            )  # with or without a byte order mark
+        except UnicodeDecodeError:
+            if b"\x00" in whole:
+                raise ValueError("it is not text") from None
+            text, encoding = whole.decode("latin-1"), "latin-1"
+            findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Latin-1"))
+    if "\x00" in text:
+        raise ValueError("it is not text")
+    if "\r" in text and "\n" not in text:
+        text = text.replace("\r", "\n")
+    if not text[:10_000].strip() and not text.strip():
+        raise ValueError("it is empty")
+    return text, encoding, findings
+
+
+def find_dialect(text: str, name: str, no_header: bool, separator: str | None = None) -> Dialect:
+    """Finds the separator, the names and the beginning of the data.
+
+    Args:
+        text: The text, or its first part.
+        name: Name of the file, for messages.
+        no_header: Whether there is no line of names.
+        separator: The separator, if it is known.
+
+    Returns:
+        The dialect.
+
+    Raises:
+        InputError: If there is no line of names above the data, and `no_header` is False.
+        ValueError: If there is nothing but comments.
+    """
+    lines = [line.rstrip("\r") for line in text[:_HEAD].split("\n", _HEAD_LINES)[:_HEAD_LINES]]
+    if stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip(" \ufeff")):  # as spreadsheets write it
+        lines[0], separator = "", stated[1]
+    if not any(map(_is_content, lines)):
+        raise ValueError("it is empty")
+    found = []
+    for mark in separator or _SEPARATORS:
+        layout = _lay_out(mark, _split(lines, mark), no_header)
+        if layout is not None and len(layout.names) > 1:
+            found.append(layout)
+    if not found:
+        blanks = _lay_out(BLANKS, [line.split() if _is_content(line) else [] for line in lines], no_header)
+        single = _lay_out(",", [[line.strip()] if _is_content(line) else [] for line in lines], no_header)
+        found = [each for each in (blanks, single) if each is not None and (each is single or len(each.names) > 1)]
+    with_header = [each for each in found if any(each.names)]
+    best = max(with_header or found, key=lambda each: len(each.names) if with_header else 0, default=None)
+    if best is None or len(best.names) > MAX_COLUMNS:
+        raise ValueError("lines of different lengths" if best is None else f"more than {MAX_COLUMNS:,} columns")
+    if not with_header and not no_header:
+        best = _named_by_comment(best, lines)
+        if best is None:
+            raise InputError(
+                f"Expected a header line with the columns' names. Received: {', '.join(found[0].head[0][:4]) if found[0].head else 'none'} "
+                f"in {name}. Add a line of names on top, or give no_header=True (--no-header)."
+            )
+    return best
+
+
+def _is_content(line: str) -> bool:
+    return bool(line.strip()) and not line.startswith("#")
+
+
+def _split(lines: Sequence[str], mark: str) -> list[list[str]]:
+    """Splits lines into cells; comments and blank lines have none."""
+    rows = []
+    for line in lines:
+        cells = next(csv.reader([line], delimiter=mark, skipinitialspace=mark != "\t"), []) if _is_content(line) else []
+        rows.append([cell.strip() for cell in cells])
+    return rows
+
+
+def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | None:
+    """Finds names and data among the first rows, or None if the rows have no common number of cells."""
+    filled = [row for row in rows if row]
+    last = filled[len(filled) // 2 :]
+    widths = [len(row) for row in last]
+    width = max(set(widths), key=lambda each: (widths.count(each), each))
+    if widths.count(width) < 0.6 * len(widths):
+        return None
+    sample = [row for row in last if len(row) == width]
+    solid = [place for place in range(min(width, _LOOK)) if _is_solid(sample, place)]
+
+    def share(row: list[str]) -> float:
+        """Share of the columns of numbers and dates that hold one in this row."""
+        return sum(place < len(row) and bool(_SOLID.match(row[place])) for place in solid) / max(1, len(solid))
+
+    begin = next((number for number, row in enumerate(rows) if len(row) == width and share(row) > 0.5), None)
+    if begin is None:  # words only
+        begin = next(number for number, row in enumerate(rows) if row) + (not no_header)
+    while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
+        begin -= 1
+    block = begin
+    while block > 0 and rows[block - 1] and len(rows[block - 1]) <= width and (share(rows[block - 1]) == 0 or len(rows) == 1):
+        block -= 1
+    names, skipped = [""] * width, sum(bool(row) for row in rows[:begin])
+    if block < begin and not no_header:
+        header = max(range(block, begin), key=lambda number: (len({cell for cell in rows[number] if cell}), -number))
+        given = rows[header]
+        short = width - len(given)
+        if short and any(row[len(given) :] != [""] * short for row in sample):
+            return None
+        names, skipped = [*given, *[""] * short], skipped - 1
+        if not any(names):
+            return None
+    elif block < begin and no_header:
+        begin, skipped = block, sum(bool(row) for row in rows[:block])
+    return Dialect(mark, names, begin, skipped, [row for row in rows[begin:] if row])
+
+
+def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
+    """Whether a column holds numbers or dates in most of the rows in which it holds anything."""
+    cells = [row[place] for row in sample if row[place]]
+    return bool(cells) and 2 * sum(bool(_SOLID.match(cell)) for cell in cells) > len(cells)
+
+
+def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
+    """Returns the dialect with names from the last comment above the data, as NumPy writes them, or None if it has not as many."""
+    comments = [line.lstrip("#").strip() for line in lines[: found.first_line] if line.startswith("#")]
+    if not comments:
+        return None
+    mark = (
+        (r"\s{2,}|\t" if len(comments[-1].split()) != len(found.names) else BLANKS)
+        if found.separator == BLANKS
+        else re.escape(found.separator)
+    )
+    names = [name.strip() for name in re.split(mark, comments[-1])]
+    if len(names) != len(found.names) or not all(names) or all(_SOLID.match(name) for name in names):
+        return None
+    return dataclasses.replace(found, names=names)

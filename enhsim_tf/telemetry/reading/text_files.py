@@ -1,0 +1,186 @@
+"""Reads text files as tables: one decision on the decimal sign from all columns, and messages with the lines of the file."""
+
+import io
+import re
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.numbers import allows_point_thousands, has_commas, is_text, shows_comma
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.report import Finding, Places
+from enhsim_tf.telemetry.reading.dialect import BLANKS, Dialect, decode, find_dialect
+from enhsim_tf.telemetry.reading.table import Table
+
+_LOOK = 2_000  # cells of a column that are searched for a decimal comma
+_ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
+
+
+def read_text(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads a text file.
+
+    Args:
+        content: Content of the file.
+        name: Name of the file, for messages.
+        options: `decimal` and `no_header` are used.
+
+    Returns:
+        The table. Every line behind the header is a row; blank lines are rows of missing values.
+
+    Raises:
+        InputError: If it has no header, or its decimal sign cannot be told.
+        ValueError: If it cannot be read. The message says why.
+    """
+    text, encoding, findings = decode(content)  # of ASCII, the first part only
+    if _ANNOTATION.search(text[:10_000]):
+        return _read_annotated(content.decode("utf-8-sig" if encoding == "utf-8" else encoding), name, findings)
+    dialect = find_dialect(text, name, options.no_header)
+    if dialect.skipped:
+        findings.append(Finding("header lines", dialect.skipped, f"lines before the data that were skipped: {dialect.skipped:,}"))
+    stream = _stream_of(content, text, encoding, dialect.first_line)
+    names = _unnamed(dialect.names)
+    frame, decimal = _read_rows(stream, dialect, names, name, options.decimal)
+    if decimal == ",":
+        findings.append(Finding("decimal comma", 1, "the decimal sign of the file is a comma; points separate thousands"))
+    frame, repeated = _without_repeated_headers(frame, names)
+    if repeated:
+        lines = ", ".join(str(row + dialect.first_line + 1) for row in repeated[:3])
+        findings.append(Finding("header lines", len(repeated), f"lines that repeat the header, left out: {len(repeated):,} (line {lines})"))
+    return Table(frame, Places([(0, dialect.first_line + 1, name)]), decimal, tuple(findings))
+
+
+def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.BytesIO | io.StringIO:
+    """Returns the data behind the header: the bytes of UTF-8, which pandas reads faster, otherwise text."""
+    is_plain = encoding == "utf-8" and b"\n" in content and not content.endswith(b"\x00")
+    whole: bytes | str = content if is_plain else text
+    end, place = (b"\n" if is_plain else "\n"), 0
+    for _ in range(first_line):
+        place = whole.find(end, place) + 1 or len(whole)
+    stream = io.BytesIO(content) if is_plain else io.StringIO(text)
+    stream.seek(place)
+    return stream
+
+
+def _unnamed(names: Sequence[str]) -> list[str]:
+    return [f"column {number}" if name == "" else name for number, name in enumerate(names)]
+
+
+def _read_rows(
+    stream: io.BytesIO | io.StringIO, dialect: Dialect, names: list[str], name: str, decimal: str | None
+) -> tuple[pd.DataFrame, str | None]:
+    """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
+    head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
+    sign = decimal or ("," if any(_shows_comma(head[column]) for column in head) else None)
+    if sign is None and dialect.separator == ";" and _is_of_comma_country(head):
+        sign = ","
+    frame = _parse(stream, dialect, name, sign)
+    if sign is None and any(is_text(frame[column]) and _shows_comma(frame[column]) for column in frame):
+        sign, frame = ",", _parse(stream, dialect, name, ",")
+    if sign == "," and decimal is None:
+        _check_points(frame, names, name)
+    frame.columns = names
+    return frame, sign
+
+
+def _shows_comma(cells: pd.Series) -> bool:
+    return shows_comma(cells.iloc[:: max(1, len(cells) // _LOOK)].dropna().astype("str"))
+
+
+def _is_of_comma_country(head: pd.DataFrame) -> bool:
+    """Whether dates are written with points and all numbers with commas, as where the comma is the decimal sign."""
+    columns = [head[column].astype("str").str.strip() for column in head]
+    dates = any(cells.str.fullmatch(r"\d\d?\.\d\d?\.\d{4}.*").any() for cells in columns)
+    points = any(cells.str.fullmatch(r"[+-]?\d+\.\d+").any() for cells in columns)
+    return dates and not points and any(has_commas(cells) for cells in columns)
+
+
+def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
+    """Refuses numbers with decimal points in one column of a file that has decimal commas in others."""
+    for column in frame:
+        if not is_text(frame[column]):
+            continue
+        cells = frame[column].iloc[:: max(1, len(frame) // _LOOK)].dropna().astype("str").str.strip()
+        points = cells[cells.str.fullmatch(r"[+-]?\d+\.\d+").to_numpy(bool)]
+        if len(points) > len(cells) / 2 and not allows_point_thousands(points):
+            raise InputError(
+                f"Expected one decimal sign in all columns. Received: a point in {names[column]!r} ({points.iloc[0]}), commas in others, in {name}. "
+                "Give decimal (--decimal . or --decimal ,)."
+            )
+
+
+def _parse(stream: io.BytesIO | io.StringIO, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
+    width, begin = len(dialect.names), stream.tell()
+    options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False}
+    options |= {"skip_blank_lines": dialect.separator == BLANKS, "decimal": decimal or ".", "skipinitialspace": dialect.separator != "\t"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)  # otherwise lines longer than the header are cut
+        warnings.simplefilter("error", pd.errors.DtypeWarning)
+        try:
+            try:
+                return pd.read_csv(stream, **options)
+            except pd.errors.DtypeWarning:  # numbers and text in one column: read as a whole, which is slower, all become text
+                stream.seek(begin)
+                return pd.read_csv(stream, low_memory=False, **options)
+        except pd.errors.EmptyDataError:
+            return pd.DataFrame(columns=range(width), dtype=object)
+        except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+            found = re.search(r"in line (\d+), saw (\d+)", str(error))
+            if found is None and isinstance(error, pd.errors.ParserWarning):
+                found = (None, 1, "more")
+            if found is None:
+                reason = (
+                    "a quote that does not end" if "EOF" in str(error) or "quot" in str(error) else "lines that do not match the header"
+                )
+                raise ValueError(reason) from None
+            line = int(found[1]) + dialect.first_line
+            raise ValueError(f"line {line} has {found[2]} cells, the header {width}") from None
+        finally:
+            if not stream.closed:
+                stream.seek(begin)  # it may be read again with another decimal sign
+
+
+def _without_repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> tuple[pd.DataFrame, list[int]]:
+    """Empties rows that repeat the names, as in files that were joined, and returns their numbers."""
+    first = next((place for place, name in enumerate(names) if not name.startswith("column ")), None)
+    if first is None or not is_text(frame.iloc[:, first]):
+        return frame, []
+    rows = np.flatnonzero((frame.iloc[:, first] == names[first]).fillna(False))
+    rows = [row for row in rows if all(str(cell).strip() in (name, "nan") for cell, name in zip(frame.iloc[row], names, strict=True))]
+    if rows:
+        frame = frame.astype(object)
+        frame.iloc[rows] = None
+    return frame, rows
+
+
+def _read_annotated(text: str, name: str, findings: list[Finding]) -> Table:
+    """Reads InfluxDB's annotated CSV, in which each table has annotations and a header of its own."""
+    lines = text.split("\n")
+    marks = [number for number, line in enumerate(lines) if _ANNOTATION.match(line)]
+    begins = [number for number in marks if number - 1 not in marks]
+    frames, places, row = [], [], 0
+    for begin, end in zip(begins, [*begins[1:], len(lines)], strict=True):
+        header = next((number for number in range(begin, end) if not lines[number].startswith("#")), end)
+        defaults = next((line for line in lines[begin:header] if line.startswith("#default")), "")
+        data = "\n".join(line.rstrip("\r") for line in lines[header:end]).rstrip("\n")
+        if not data.strip():
+            continue
+        try:
+            frame = pd.read_csv(io.StringIO(data), low_memory=False, skip_blank_lines=False)
+        except pd.errors.ParserError:
+            raise ValueError(f"a table in the lines {header + 1} to {end} whose lines have different lengths") from None
+        if "error" in frame and "reference" in frame:
+            raise ValueError(f"the database answered with an error: {str(frame['error'].iloc[0] if len(frame) else '')[:100]}")
+        values = defaults.rstrip("\r").split(",")
+        for column, value in zip(frame.columns[1:], values[1:], strict=False):
+            if value:
+                frame[column] = frame[column].astype(object).fillna(value)
+        frames.append(frame.iloc[:, 1:] if frame.shape[1] and str(frame.columns[0]).startswith("Unnamed") else frame)
+        places.append((row, header + 2, name))
+        row += len(frame)
+    if not frames:
+        raise ValueError("it has no table")
+    findings.append(Finding("header lines", len(frames), f"tables of annotated CSV: {len(frames):,}"))
+    return Table(pd.concat(frames, ignore_index=True), Places(places), ".", tuple(findings))

@@ -1,0 +1,124 @@
+"""The training data of detectors, all from the nominal train part of a channel: its own windows, and windows that simulators generate."""
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enhsim_tf.common.console import Progress
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.enhanced_simulator.checks import check_finite
+from enhsim_tf.noise.extraction import noise_unit
+from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.telemetry.series import Telemetry
+from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
+from studies.common.settings import Settings
+from studies.spacecraft.judging import Judge, cross_fitted_scores
+
+if TYPE_CHECKING:
+    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+REAL = "real"
+TRAINING = {
+    REAL: "the channel's own nominal train part",
+    "coarse": "the coarse simulator at the levels of the train part",
+    "enhanced": "the paper's network, without noise",
+    "enhanced + GAN": "plus noise of the paper's GAN",
+    "enhanced + Gaussian": "plus Gaussian noise of the same standard deviation",
+    "enhanced + AR": "plus a fitted autoregression",
+    "enhanced + bootstrap": "plus blocks of the residuals",
+    "ridge + residual windows": "no network: tuned ridge regression, plus whole windows of its residuals",
+}
+"""Training data by name, in the order of the tables."""
+
+
+def real_windows(train: Telemetry, window: int, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Windows that are spread evenly over the train part, shape `(windows, samples)`, and their first samples."""
+    starts = evenly_spaced_starts([train], window, number)
+    return cut_windows(train.values, starts, window), starts
+
+
+def generators(
+    train: Telemetry, simulator: "EnhancedSimulator", ridge: "EnhancedSimulator", settings: Settings, progress: Progress
+) -> dict[str, Callable[[int], np.ndarray]]:
+    """Functions from a seed to generated windows, by the name of the training data.
+
+    Args:
+        train: The train part, whose residuals the models of noise learn.
+        simulator: A simulator that was fitted to it, with the paper's network as its enhancer.
+        ridge: A simulator that was fitted to it without a network.
+        settings: All settings; `labelled` and `seed` are used.
+        progress: Reports the progress of the GAN.
+    """
+    chosen, window = settings.labelled, simulator.window
+    number = chosen.num_arm_windows
+    residuals = simulator.residual_windows(train, chosen.num_windows, np.random.default_rng([settings.seed, 1]))
+    noises = {
+        "GAN": lambda: _fit_paper_gan(residuals, chosen.num_iterations, settings.seed, progress),
+        "Gaussian": lambda: GaussianNoise.fit(residuals),
+        "AR": lambda: GaussianAutoregression.fit(residuals, min(chosen.max_order, window - 1)),
+        "bootstrap": lambda: BlockBootstrap.fit(residuals, min(chosen.block, window)),
+    }
+
+    def with_noise(fit: Callable[[], Any]) -> Callable[[int], np.ndarray]:
+        fit = functools.cache(fit)  # one model for training and thresholds
+        return lambda seed: simulator.generate_clean(number, seed=seed) + fit().generate(number, np.random.default_rng(seed))
+
+    return {
+        "coarse": lambda seed: simulator.generate_coarse(number, seed=seed),
+        "enhanced": lambda seed: simulator.generate_clean(number, seed=seed),
+        **{f"enhanced + {name}": with_noise(fit) for name, fit in noises.items()},
+        "ridge + residual windows": lambda seed: ridge.generate(number, seed=seed),
+    }
+
+
+def _fit_paper_gan(residuals: np.ndarray, num_iterations: int, seed: int, progress: Progress) -> Any:
+    from enhsim_tf.noise.discriminator import build_discriminator
+    from enhsim_tf.noise.gan import NoiseGAN
+    from enhsim_tf.noise.generator import build_generator
+
+    window = residuals.shape[1]
+    gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_unit(residuals), seed=seed)
+    gan.fit(residuals, num_iterations, verbose=False, on_iteration=progress.loop("noise GAN, iteration", num_iterations))
+    return gan
+
+
+def source_rows(
+    judge: Judge,
+    real: tuple[np.ndarray, np.ndarray],
+    generated: dict[str, Callable[[int], np.ndarray]],
+    settings: Settings,
+    tell: Callable[[str], None],
+) -> list[dict[str, Any]]:
+    """Trains every detector on all training data and judges it.
+
+    Training data that cannot be made, because a model of noise diverged or cannot be fitted, are left out, with a line that says why.
+
+    Args:
+        judge: The test part.
+        real: What `real_windows` returns. Thresholds of these training data are cross-fitted over blocks of time.
+        generated: What `generators` returns. Windows of another seed set the thresholds.
+        settings: All settings; `labelled` and `seed` are used.
+        tell: Called with a line about training data that are left out.
+
+    Returns:
+        A row for each detector and training data, and one for each control, which is trained on the real windows.
+    """
+    windows, starts = real
+    rows, seed = [], settings.seed
+    for name, make in (DETECTORS | CONTROLS).items():
+        past = cross_fitted_scores(functools.partial(make, seed), windows, starts, settings.labelled.num_folds)
+        found = judge.judge(make(seed).fit(windows).score(judge.windows), past, past)
+        rows.append({"training": REAL, "detector": name} | found)
+    for training, generate in generated.items():
+        try:
+            learnt, held_out = (check_finite(generate(seed + number)) for number in (1, 2))
+        except InputError as error:
+            tell(f"  {training} left out: {error}")
+            continue
+        for name, make in DETECTORS.items():
+            score = make(seed).fit(learnt).score
+            rows.append({"training": training, "detector": name} | judge.judge(score(judge.windows), score(held_out), score(windows)))
+    return rows

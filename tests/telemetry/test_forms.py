@@ -1,0 +1,436 @@
+"""Tables in the forms that people have: each is read with the right times and values, or refused in one line that says what to do."""
+
+import gzip
+import zipfile
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.datasets.inject import InjectOptions, inject_channel
+from enhsim_tf.datasets.label_columns import write_table, write_timeeval
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.sources import read_source
+
+N = 60
+VALUES = (20 + 5 * np.sin(np.arange(N) / 5)).round(2)
+START = pd.Timestamp("2024-03-01T00:00:00Z")
+TIMES = pd.date_range(START, periods=N, freq="min")
+SECONDS = 60 * np.arange(N)
+
+
+def table(header, *columns, separator=",", above="", below=""):
+    rows = [separator.join(map(str, cells)) for cells in zip(*columns, strict=True)]
+    return above + "\n".join([header, *rows]) + "\n" + below
+
+
+def stamps(form):
+    return TIMES.strftime(form)
+
+
+def commas(values):
+    return [str(value).replace(".", ",") for value in values]
+
+
+def only(channels):
+    (series,) = channels.values()
+    return series
+
+
+def check(series, values=VALUES, start=START, interval_s=60.0, options=None):
+    """Checks that a channel is one part with the expected times and values; returns its report."""
+    cleaned = clean(series, options)
+    (part,) = cleaned.parts
+    assert part.interval_s == pytest.approx(interval_s, rel=1e-6)
+    if start is None:
+        assert part.start is None
+    else:
+        assert abs(pd.Timestamp(part.start) - start) <= pd.Timedelta("2ms")
+    np.testing.assert_allclose(part.values, values, atol=1e-5)
+    return cleaned.report
+
+
+ZERO = pd.Timestamp(0, tz="UTC")
+# form: text, start of the series
+READ = {
+    "ISO 8601 with a comma": (table("time;v", stamps("%Y-%m-%d %H:%M:%S,500"), VALUES, separator=";"), START + pd.Timedelta("500ms")),
+    "UTC in words": (table("time,v", stamps("%Y-%m-%d %H:%M:%S UTC"), VALUES), START),
+    "day of year": (table("time,v", stamps("%Y-%jT%H:%M:%S"), VALUES), START),
+    "day of year with colons": (table("time,v", stamps("%Y:%j:%H:%M:%S.%f"), VALUES), START),
+    "day, month in letters": (table("Time,v", stamps("%d-%b-%Y %H:%M:%S"), VALUES), START),
+    "month in letters first": (table("Time;v", stamps("%b %d, %Y %H:%M:%S"), VALUES, separator=";"), START),
+    "a web server's": (table("time,v", stamps("%d/%b/%Y:%H:%M:%S +0000"), VALUES), START),
+    "points": (table("Zeit;U", stamps("%d.%m.%Y %H:%M:%S"), commas(VALUES), separator=";"), START),
+    "slashes, the year first": (table("t,v", stamps("%Y/%m/%d %H:%M"), VALUES), START),
+    "date and time of day": (table("date,clock,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), VALUES), START),
+    "year and day of year": (table("Year,DOY,Hour,Min,v", stamps("%Y"), stamps("%j"), stamps("%H"), stamps("%M"), VALUES), START),
+    "year, month and day": (table("YYYY,MM,DD,HH,mn,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES), START),
+    "seconds in brackets": (table("Time (s),v", SECONDS, VALUES), ZERO),
+    "milliseconds in the name": (table("timestamp_ms,v", 1000 * SECONDS, VALUES), ZERO),
+    "minutes elapsed": (table("elapsed [min],v", np.arange(N), VALUES), ZERO),
+    "capitals in the name": (table("SimTime,v", SECONDS, VALUES), ZERO),
+    "seconds written out": (table("Time,v", [f"{second} sec" for second in SECONDS], VALUES), ZERO),
+    "a temperature beside the time": (table("time,T", SECONDS, VALUES), ZERO),
+    "milliseconds since 1970": (table("timestamp,v", TIMES.as_unit("ms").asi8, VALUES), START),
+    "modified Julian dates": (table("MJD,v", [f"{60370 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
+    "MATLAB's days": (table("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
+    "the time once more": (table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), TIMES.as_unit("s").asi8, VALUES), START),
+    "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES), START),
+    "a spreadsheet's first line": (table("time;v", stamps("%Y-%m-%d %H:%M:%S"), VALUES, separator=";", above="\ufeffsep=;\n"), START),
+    "names and units": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES).replace("v\n", "v\n(UTC),V\n", 1), START),
+    "a logger's four lines": (
+        table('"TIMESTAMP","RECORD","v"', stamps('"%Y-%m-%d %H:%M:%S"'), range(N), VALUES, above='"TOA5","station","CR1000","7"\n').replace(
+            '"v"\n', '"v"\n"TS","RN","V"\n"","","Smp"\n', 1
+        ),
+        START,
+    ),
+    "lines about the measurement": (
+        table("X_Value\tv", SECONDS, commas(VALUES), separator="\t", above="Writer_Version\t2\nDecimal\t,\n***End***\t\n\n"),
+        ZERO,
+    ),
+    "NumPy's": ("# time v\n" + "\n".join(f"{second:.6e} {value:.6e}" for second, value in zip(SECONDS, VALUES, strict=True)), ZERO),
+    "NumPy's, with units": ("# t [s]  v\n" + "\n".join(f" {second} {value}" for second, value in zip(SECONDS, VALUES, strict=True)), ZERO),
+    "day of year in UTC": (table("UTC,v", [f"{text[:-3]}Z" for text in stamps("%Y-%jT%H:%M:%S.%f")], VALUES), START),
+    "a log cut by a power failure": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES, below="\x00" * 300), START),
+    "commas behind each line": (table("time,v,", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES, [""] * N), START),
+    "NaN of C": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES).replace(f",{VALUES[30]}\n", ",-nan(ind)\n"), START),
+}
+
+
+@pytest.mark.parametrize("form", READ)
+def test_a_form_is_read_with_its_times_and_values(tmp_path, form):
+    text, start = READ[form]
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    values = np.where(VALUES == VALUES[30], (VALUES[29] + VALUES[31]) / 2, VALUES) if form == "NaN of C" else VALUES
+    report = check(only(read_source(tmp_path / "a.csv")), values, start)
+    clock = report.findings[0]
+    assert clock.kind == "clock" and clock.details["last_ns"] - clock.details["first_ns"] == (N - 1) * 60 * 10**9
+
+
+def dates(form, days):
+    return pd.date_range(START, periods=N, freq=f"{days}D").strftime(form)
+
+
+# form: text, words of the refusal, options with which it is read, the interval then
+ASKED = {
+    "days or months first": (table("time,v", dates("%d/%m/%Y", 31)[:2].repeat(N // 2), VALUES), ["'%d/%m/%Y'", "'%m/%d/%Y'"], None, 0),
+    "a ramp": (table("counter,v", 5 * np.arange(N), VALUES), ["'counter'", "--time counter", "--time none"], {"time": "counter"}, 5),
+    "a name that is no clock's": (table("T,v", 5 * np.arange(N), VALUES), ["--time T"], {"time": "T"}, 5),
+    "days of a spreadsheet": (
+        table("Date,v", [f"{45352 + second / 86400:.8f}" for second in SECONDS], VALUES),
+        ["excel (from 2024-03-01"],
+        {"options": Cleaning(time_format="excel")},
+        60,
+    ),
+    "year and day in one number": (table("date,v", dates("%Y%j", 1), VALUES), ["%Y%j"], {"options": Cleaning(time_format="%Y%j")}, 86_400),
+    "the time first": (
+        table("time,v", stamps("%H:%M:%S %d-%m-%Y"), VALUES),
+        ["at line 2", "--time-format"],
+        {"options": Cleaning(time_format="%H:%M:%S %d-%m-%Y")},
+        60,
+    ),
+    "no names": (table("0.0,20.0", SECONDS[1:] + 0.5, VALUES[1:]), ["--no-header"], None, 0),
+    "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), ["digits"], None, 0),
+    "minutes where there are seconds": (
+        table("time,v", ["2024-03-01 00:00"] * 30 + ["2024-03-01 00:01"] * 30, VALUES),
+        ["2 different"],
+        None,
+        0,
+    ),
+    "thousands or decimals": (table("time;v", stamps("%Y-%m-%d %H:%M"), ["1,500"] * N, separator=";"), ["--decimal"], None, 0),
+    "points and commas": (
+        table("time;v;w", stamps("%Y-%m-%d %H:%M"), commas(VALUES), VALUES, separator=";"),
+        ["a point in 'w'", "--decimal"],
+        None,
+        0,
+    ),
+    "a longer line": (
+        table("time,v", stamps("%Y-%m-%d %H:%M"), VALUES).replace(f",{VALUES[5]}\n", ",1,2,3\n", 1),
+        ["line 7 has 4"],
+        None,
+        0,
+    ),
+    "a sum at the end": (table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES, below="Average,20.1\n"), ["'Average' at line 62"], None, 0),
+    "a time of day": (table("time,v", stamps("%H:%M:%S"), VALUES), ["'00:00:00'", "column of dates"], None, 0),
+    "units behind all numbers": (table("time,v", SECONDS, [f"{value} V" for value in VALUES]), [f"v ('{VALUES[0]} V')"], None, 0),
+    "equal names": (table("time,v,v", SECONDS, VALUES, VALUES), ["'v' more than once"], None, 0),
+    "numbered sensors": (
+        table(
+            "time,sensor_id,v,w", stamps("%Y-%m-%dT%H:%M:%SZ").repeat(2), [7, 8] * N, range(2 * N), VALUES.repeat(2) + np.tile([0, 9], N)
+        ),
+        ["--series-column sensor_id"],
+        None,
+        0,
+    ),
+}
+
+
+@pytest.mark.parametrize("form", ASKED)
+def test_a_form_with_two_meanings_is_refused_and_read_as_the_message_says(tmp_path, refused, form):
+    text, words, how, interval_s = ASKED[form]
+    (tmp_path / "a.csv").write_text(text)
+    with refused(*words):
+        for series in read_source(tmp_path / "a.csv").values():
+            clean(series)
+    if how is not None:
+        cleaned = clean(only(read_source(tmp_path / "a.csv", **how)))
+        assert cleaned.longest.interval_s == pytest.approx(interval_s)
+        np.testing.assert_allclose(cleaned.longest.values, VALUES, atol=1e-5)
+
+
+def test_a_column_that_does_not_increase_is_no_clock(tmp_path):
+    (tmp_path / "a.csv").write_text(table("T,p", VALUES, VALUES**2))
+    channels = read_source(tmp_path / "a.csv")
+    assert list(channels) == ["T", "p"] and check(channels["T"], start=None, interval_s=1.0).find("clock").details["column"] is None
+
+
+@pytest.mark.parametrize("offset", ["+05", "+0530", "+05:30", "Z"])
+def test_a_stated_offset_goes_before_the_option(tmp_path, offset):
+    (tmp_path / "a.csv").write_text(table("time,v", stamps(f"%Y-%m-%d %H:%M:%S{offset}"), VALUES))
+    hours = {"+05": 5, "Z": 0}.get(offset, 5.5)
+    report = check(only(read_source(tmp_path / "a.csv")), start=START - pd.Timedelta(hours=hours), options=Cleaning(timezone="Asia/Tokyo"))
+    assert "stated" in report.find("clock").text and "Asia/Tokyo" in report.find("clock").text
+
+
+def test_a_year_at_the_end_is_no_offset(tmp_path):
+    (tmp_path / "a.csv").write_text(table("time,v", stamps("%H:%M:%S %d-%m-%Y"), VALUES))
+    options = Cleaning(time_format="%H:%M:%S %d-%m-%Y", timezone="America/New_York")
+    check(only(read_source(tmp_path / "a.csv", options=options)), start=START + pd.Timedelta(hours=5), options=options)
+
+
+@pytest.mark.parametrize("shift_s", [0, 7])
+@pytest.mark.parametrize(
+    "begin", ["2024-10-26T22:00Z", "2024-10-27T00:10Z", "2024-10-27T01:10Z"], ids=["both", "both, from the first", "second"]
+)
+def test_an_hour_that_a_clock_repeats_is_two_hours(tmp_path, begin, shift_s):
+    utc = pd.date_range(begin, periods=200, freq="10min") + pd.to_timedelta(shift_s * (np.arange(200) % 2), unit="s")
+    (tmp_path / "a.csv").write_text(table("time,v", utc.tz_convert("Europe/Berlin").strftime("%Y-%m-%d %H:%M:%S"), np.arange(200) % 7))
+    options = Cleaning(timezone="Europe/Berlin")
+    cleaned = clean(only(read_source(tmp_path / "a.csv", options=options)), options)
+    assert (cleaned.report.rows_used, len(cleaned.parts)) == (200, 1) and abs(pd.Timestamp(cleaned.parts[0].start) - utc[0]) < pd.Timedelta(
+        "10s"
+    )
+
+
+def long(**keys):
+    """Two series at the same times, told apart by columns of words; the second is 9 higher."""
+    frame = pd.DataFrame({"time": TIMES.repeat(2), **{name: list(words) * N for name, words in keys.items()}})
+    return frame.assign(v=VALUES.repeat(2) + np.tile([0, 9], N))
+
+
+# table, names of the series
+SERIES = {
+    "rows in turn": (long(host=("a", "b")), ["a", "b"]),
+    "one after the other": (long(host=("a", "b")).sort_values("host", kind="stable"), ["a", "b"]),
+    "a column of another name": (long(which=("a", "b")), ["a", "b"]),
+    "two columns that say the same": (long(sensor=("a", "b"), place=("north", "south")), ["a", "b"]),
+    "other times": (
+        long(host=("a", "b")).assign(time=lambda frame: frame["time"] + pd.to_timedelta(np.tile([0, 30], N), unit="s")),
+        ["a", "b"],
+    ),
+}
+
+
+@pytest.mark.parametrize("form", SERIES)
+def test_several_series_in_one_table_are_told_apart(tmp_path, form):
+    frame, names = SERIES[form]
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    channels = read_source(tmp_path / "a.csv")
+    assert list(channels) == names
+    shift = pd.Timedelta("30s" if form == "other times" else "0s")
+    check(channels[names[0]])
+    assert "series" in {finding["kind"] for finding in channels[names[1]].attrs["findings"]}
+    check(channels[names[1]], VALUES + 9, START + shift)
+
+
+def test_a_named_column_of_several_series_is_told_apart_too(tmp_path):
+    long(host=("a", "b")).assign(other=2.0).to_csv(tmp_path / "a.csv", index=False)
+    assert list(read_source(tmp_path / "a.csv", ["v"])) == ["a", "b"]
+    assert list(read_source(tmp_path / "a.csv", ["a.v"])) == ["a.v"] and len(read_source(tmp_path / "a.csv")) == 4
+
+
+def test_a_state_is_no_key_of_series(tmp_path):
+    frame = pd.DataFrame({"time": TIMES, "mode": np.where(np.arange(N) % 20 < 10, "sun", "eclipse"), "v": VALUES})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    check(only(read_source(tmp_path / "a.csv")))
+
+
+def test_the_columns_of_series_and_values_can_be_named(tmp_path):
+    long(number=(7, 8)).assign(other=1.0).to_csv(tmp_path / "a.csv", index=False)
+    options = Cleaning(series_column="number", value_column="v")
+    channels = read_source(tmp_path / "a.csv", options=options)
+    assert list(channels) == ["7", "8"] and list(read_source(tmp_path / "a.csv", ["8"], options=options)) == ["8"]
+    check(channels["8"], VALUES + 9)
+
+
+def annotated(field, values, result="_result"):
+    head = f"#group,false,false,true,false,true\n#datatype,string,long,dateTime:RFC3339,double,string\n#default,{result},,,,\n"
+    rows = [f",,0,{time:%Y-%m-%dT%H:%M:%SZ},{value},{field}" for time, value in zip(TIMES, values, strict=True)]
+    return head + ",result,table,_time,_value,_field\n" + "\n".join(rows) + "\n\n"
+
+
+def test_tables_of_annotated_csv_are_series(tmp_path):
+    (tmp_path / "a.csv").write_text(annotated("volts", VALUES) + annotated("amps", 2 * VALUES))
+    channels = read_source(tmp_path / "a.csv")
+    assert list(channels) == ["volts", "amps"]
+    check(channels["volts"])
+    check(channels["amps"], 2 * VALUES)
+    assert channels["amps"].attrs["places"].of(0) == "line 70 of a.csv"  # 3 annotations, names, 60 rows, a blank line, and 4 more
+    (tmp_path / "b.csv").write_text(annotated("volts", VALUES, "mean") + annotated("volts", 2 * VALUES, "max"))
+    assert list(read_source(tmp_path / "b.csv")) == ["mean", "max"]
+
+
+LABELS = {
+    "zeros and ones": (np.arange(N) % 20 == 3).astype(int),
+    "true and false": np.arange(N) % 20 == 3,
+    "words": np.where(np.arange(N) % 20 == 3, "Attack", "Normal"),
+    "minus one": np.where(np.arange(N) % 20 == 3, -1, 1),
+}
+
+
+@pytest.mark.parametrize("form", LABELS)
+@pytest.mark.parametrize("name", ["is_anomaly", "label", "Normal/Attack"])
+def test_labels_are_no_channel_and_mark_rows(tmp_path, name, form):
+    pd.DataFrame({"timestamp": TIMES, "v": VALUES, name: LABELS[form]}).to_csv(tmp_path / "a.csv", index=False)
+    kept = check(only(read_source(tmp_path / "a.csv")))
+    assert kept.find("labels").count == 3 and f"'{name}'" in kept.find("labels").text
+    missing = clean(only(read_source(tmp_path / "a.csv", options=Cleaning(labelled="missing")))).report
+    assert (missing.find("missing values").rows_left_out, missing.samples) == (3, N)
+
+
+def test_a_label_may_be_named_or_refused_and_may_concern_one_channel(tmp_path):
+    marks = LABELS["zeros and ones"]
+    frame = pd.DataFrame({"time": TIMES, "ch1": VALUES, "ch2": -VALUES, "is_anomaly_ch1": marks, "state": marks})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    channels = read_source(tmp_path / "a.csv", ["ch1", "ch2"])
+    assert [clean(series).report.find("labels") is None for series in channels.values()] == [False, True]
+    named = read_source(tmp_path / "a.csv", options=Cleaning(label_column="state"))
+    assert list(named) == ["ch1", "ch2", "is_anomaly_ch1"] and clean(named["ch2"]).report.find("labels").count == 3
+    assert "state" in read_source(tmp_path / "a.csv", options=Cleaning(label_column="none"))
+
+
+def test_quality_flags_and_counts_beside_a_clock_are_named_and_left_out(tmp_path):
+    pd.DataFrame({"time": TIMES, "v": VALUES, "v_quality": 192, "number": range(N)}).to_csv(tmp_path / "a.csv", index=False)
+    report = check(only(read_source(tmp_path / "a.csv")))
+    assert "v_quality" in report.find("quality flags").text and "number" in report.find("row numbers").text
+
+
+@pytest.mark.parametrize("fill", [9999.0, -999.9, 1e20])
+def test_fill_values_are_reported_and_left_out_when_named(tmp_path, fill):
+    values = np.where(np.arange(N) % 20 == 5, fill, VALUES)
+    pd.DataFrame({"time": TIMES, "v": values}).to_csv(tmp_path / "a.csv", index=False)
+    series = only(read_source(tmp_path / "a.csv"))
+    found = clean(series).report.find("fill values")
+    assert found.details["values"] == [fill] and f"--missing-values={fill:g}" in found.text
+    cleaned = clean(series, Cleaning(missing_values=[fill]))
+    assert cleaned.report.rows_left_out == 3 and cleaned.parts[0].values.max() < 26
+
+
+@pytest.mark.parametrize("values", [VALUES, np.where(np.arange(N) % 20 == 5, 100.0, 0.0), np.where(np.arange(N) == 5, 9999.0, VALUES)])
+def test_states_and_single_spikes_are_no_fill_values(values):
+    assert clean(pd.Series(values, index=TIMES)).report.find("fill values") is None
+
+
+def test_one_decimal_sign_holds_for_all_columns(tmp_path):
+    watts = 950 + np.arange(N)
+    written = [f"{watt // 1000}.{watt % 1000:03d}" if watt >= 1000 else str(watt) for watt in watts]
+    (tmp_path / "a.csv").write_text(table("time;watts;celsius", stamps("%Y-%m-%d %H:%M"), written, commas(VALUES), separator=";"))
+    channels = read_source(tmp_path / "a.csv")
+    check(channels["watts"], watts)
+    check(channels["celsius"])
+    shown = [f'"{watt // 1000},{watt % 1000:03d}.5"' if watt >= 1000 else f"{watt}.5" for watt in watts]
+    (tmp_path / "b.csv").write_text(table("time,watts", stamps("%Y-%m-%d %H:%M"), shown))
+    check(only(read_source(tmp_path / "b.csv")), watts + 0.5)
+
+
+def test_steps_are_measured_before_gaps_are_filled():
+    values = VALUES.round(1)
+    values = pd.Series(np.tile(values, 20), index=pd.date_range(START, periods=20 * N, freq="s")).drop(
+        pd.date_range(START, periods=60, freq="20s")
+    )
+    assert clean(values).report.find("quantised").details["step"] == pytest.approx(0.1)
+
+
+PLAIN = table("time,v", stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES)
+
+
+def days(folder):
+    lines = PLAIN.splitlines(keepends=True)
+    for name, part in (("day1.csv", lines[1:31]), ("day2.csv", lines[31:50]), ("day10.csv", lines[50:])):
+        (folder / name).write_text("".join([lines[0], *part]))
+    return folder
+
+
+def test_files_of_several_days_are_one_table(tmp_path, refused):
+    (tmp_path / "days").mkdir()
+    folder = days(tmp_path / "days")
+    (folder / "notes.txt").write_text("not read")
+    report = check(only(read_source(folder)))
+    assert "day1.csv to day10.csv" in report.find("files").text
+    series = only(read_source([folder / "day1.csv", folder / "day2.csv", folder / "day10.csv"]))
+    assert series.attrs["places"].of(30) == "line 2 of day2.csv"
+    (folder / "day2.csv").write_text("time,w\n2024-03-02,1\n")
+    with refused("'v' not exactly once in day1.csv and day2.csv"):
+        read_source(folder)
+
+
+def test_packed_files_are_read(tmp_path, refused):
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(PLAIN.encode()))
+    check(only(read_source(tmp_path / "a.csv.gz")))
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("inside.CSV", PLAIN)
+    check(only(read_source(tmp_path / "a.zip")))
+    with zipfile.ZipFile(tmp_path / "a.zip", "a") as archive:
+        archive.writestr("second.csv", PLAIN)
+    with refused("inside.CSV, second.csv"):
+        read_source(tmp_path / "a.zip")
+    (tmp_path / "bomb.csv.gz").write_bytes(gzip.compress(bytes(300_000_000)))
+    with refused("when unpacked"):
+        read_source(tmp_path / "bomb.csv.gz")
+
+
+def test_a_workbook_is_read_with_its_dates(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Station 7"], [], ["Zeit", "Spannung"], *zip(TIMES.tz_localize(None), VALUES, strict=True)):
+        book.active.append(list(row))
+    book.save(tmp_path / "a.xlsx")
+    series = only(read_source(tmp_path / "a.xlsx"))
+    check(series)
+    assert (series.name, series.attrs["places"].of(0)) == ("Spannung", "line 4")
+
+
+def test_pandas_objects_are_sources():
+    frame = pd.DataFrame({"time": TIMES, "v": VALUES})
+    check(only(read_source(frame)))
+    check(only(read_source(frame.set_index("time")["v"])))
+
+
+@pytest.mark.parametrize("form", ["labelled.csv", "labelled.parquet", "timeeval.csv"])
+def test_the_files_of_this_tool_are_read_back(tmp_path, form):
+    cleaned = clean(pd.Series(VALUES, index=TIMES, name="value"))
+    frame = inject_channel(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0))
+    frame.attrs = {}  # which Parquet would store
+    (write_timeeval if form == "timeeval.csv" else write_table)(tmp_path / form, {"value": frame} if form == "timeeval.csv" else frame)
+    series = only(read_source(tmp_path / form))
+    report = check(series, frame["value"])
+    assert series.name == "value" and report.find("labels").count == 10
+
+
+def test_scores_of_this_tool_are_no_channels(tmp_path):
+    pd.DataFrame({"time": TIMES, "value": VALUES, "score": VALUES / 30, "flag": VALUES > 24}).to_csv(tmp_path / "a.csv", index=False)
+    assert list(read_source(tmp_path / "a.csv")) == ["value"]
+
+
+def test_copies_of_a_run_are_series(tmp_path):
+    long(copy=(0, 1)).rename(columns={"v": "value"}).assign(out_of_range=0.5).to_parquet(tmp_path / "a.parquet")
+    channels = read_source(tmp_path / "a.parquet")
+    assert list(channels) == ["copy 0", "copy 1"]
+    check(channels["copy 1"], VALUES + 9)
+
+
+def test_names_may_be_missing(tmp_path):
+    (tmp_path / "a.txt").write_text("\n".join(f"  {value:.7e}" for value in VALUES))
+    series = only(read_source(tmp_path / "a.txt", options=Cleaning(no_header=True)))
+    check(series, start=None, interval_s=1.0)
+    assert series.name == "column 0"
