@@ -94,7 +94,7 @@ def enhancement(pipeline: Pipeline) -> Measured:
     """Errors of the enhancer and of simple baselines that learn from the same windows, on all disjoint test windows."""
     train, test = pipeline.windows("train", pipeline.settings.num_windows, "training windows"), pipeline.windows("test")
     order, blocks = np.argsort(train["start"]), KFold(5)  # neighbours in time stay in one block
-    source, target = train["coarse"][order], train["target"][order]
+    source, target = train["coarse"][order].astype(np.float64), train["target"][order]
     ridge = GridSearchCV(Ridge(), {"alpha": np.logspace(-2, 5, 8)}, cv=blocks, scoring="neg_mean_squared_error")
     neighbours = [number for number in (1, 3, 10, 30, 100, 300) if number <= 0.8 * len(source)]
     nearest = GridSearchCV(KNeighborsRegressor(), {"n_neighbors": neighbours}, cv=blocks, scoring="neg_mean_squared_error")
