@@ -25,7 +25,7 @@ def run_generate(options: argparse.Namespace) -> int:
         from enhsim_tf.cli.runs import generate_copies
 
         return generate_copies(options)
-    refuse_without_coarse(options, "coarse_time", "copies", "timezone")
+    refuse_without_coarse(options, "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values")
     if options.nominal_share is not None and not options.scenarios and (options.continuous is not None or not options.scenario):
         raise InputError(
             "Expected --nominal-share only together with --windows and --scenario. Received: --nominal-share without them. Leave it out."

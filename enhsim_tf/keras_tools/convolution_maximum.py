@@ -65,6 +65,43 @@ def convolution_maximum(
     return tf.concat(highest, axis=0) / (1 - rate)
 
 
+class ConvolutionMaximum(keras.layers.Layer):
+    """Conv1D with relu, optionally Dropout, and GlobalMaxPooling1D as one layer, which holds the weights of the convolution.
+
+    Args:
+        convolution: The built Conv1D.
+        dropout: The Dropout after it, or None.
+    """
+
+    def __init__(self, convolution: keras.layers.Conv1D, dropout: keras.layers.Dropout | None = None):
+        super().__init__()
+        self.convolution, self.dropout = convolution, dropout
+
+    def compute_output_shape(self, input_shape: tuple[int | None, ...]) -> tuple[int | None, int]:
+        """Returns `(rows, filters)`."""
+        return input_shape[0], self.convolution.filters
+
+    def call(self, rows: tf.Tensor, training: bool = False) -> tf.Tensor:
+        """Applies `convolution_maximum` to rows of shape `(rows, samples, 1)`, whose number is static."""
+        kernel, bias = (tf.convert_to_tensor(weight) for weight in (self.convolution.kernel, self.convolution.bias))
+        drops = {"rate": self.dropout.rate, "seed": self.dropout.seed_generator.next()} if self.dropout and training else {}
+        return convolution_maximum(tf.squeeze(rows, 2), tf.squeeze(kernel, 1), bias, self.convolution.strides[0], **drops)
+
+
+def with_fast_convolution(network: keras.Sequential) -> keras.Sequential:
+    """Returns a network of the same layers and weights, whose first layers are computed as one where that is possible.
+
+    Args:
+        network: A network that begins with Conv1D, optionally Dropout, and GlobalMaxPooling1D.
+    """
+    number = num_layers_computed(network.layers)
+    if not number:
+        return network
+    first, *between = network.layers[: number - 1]
+    fast = ConvolutionMaximum(first, *between)
+    return keras.Sequential([keras.Input(network.input_shape[1:]), fast, *network.layers[number:]], name=network.name)
+
+
 def _block(rows: tf.Tensor, kernel: tf.Tensor, bias: tf.Tensor, stride: int, rate: float, seed: tf.Tensor | None) -> tf.Tensor:
     (width, filters), (num_rows, samples) = kernel.shape, rows.shape
     num_frames = (samples - width) // stride + 1

@@ -22,7 +22,7 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
     families = sorted(found["families"].items(), key=lambda item: not item[1]["looked_at"])
     figure, down = new_sheet(
         DOUBLE,
-        1.5 + 0.22 * len(families),
+        max(2.6, 1.5 + 0.22 * len(families)),
         "Matched residual windows stay near real windows on all families",
         "Means over seven detectors, trained on waves with noise of each model and judged on real windows. Left: nominal windows that are "
         "flagged; the line is the target of 1 %; the scale is linear below 1 % and logarithmic above. Right: by how much fewer injected "

@@ -365,8 +365,7 @@ def test_fit_to_short_telemetry_end_to_end():
 
 
 def test_noise_is_the_residual_of_the_enhancer():
-    simulator = fitted(num_windows=300, epochs=8, decay=True, held_out=0.25, coarse=COARSE)
-    assert simulator.coarse is COARSE
+    simulator = fitted(num_windows=300, epochs=8, decay=True, held_out=0.25)
     # the residual is white noise of 4 plus the error of the enhancer: at least 4, and far below the 35 of the sine itself
     assert 3.9 < simulator.noise.standard_deviation < 10
 

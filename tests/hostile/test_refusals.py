@@ -115,7 +115,7 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
         (["--budget", "tiny"], "'tiny'"),
         (["--seed"], "--seed"),
         (["--sed", "3"], "--sed 3"),
-        (["--experiment", "fame"], "'fame'"),
+        (["--experiment", "robustness"], "--experiment"),
         (["--telemetry"], "--telemetry"),
     ],
 )

@@ -17,14 +17,14 @@ WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_ad
     enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting enhanced_simulator.choosing
     enhanced_simulator.updating
     enhanced_simulator.runs.model enhanced_simulator.runs.fitting enhanced_simulator.runs.residuals""".split()
-NOT_TRIED = ("reproduce", "__main__")  # the reproduction's own modules may be slow to import; its settings may not
+NOT_TRIED = ("reproduce", "paper", "__main__")  # the reproduction's own modules may be slow to import; its settings may not
 
 
 def modules_without_networks():
     paths = (path.relative_to(PACKAGE).with_suffix("") for path in sorted(PACKAGE.rglob("*.py")))
     names = [".".join(path.parts).removesuffix(".__init__") for path in paths]
     found = [name for name in names if name.split(".")[0] not in NOT_TRIED and name not in (*WITH_NETWORKS, "__init__")]
-    return [*found, "reproduce.settings"]
+    return [*found, "reproduce.settings", "paper.settings", "paper.command", "paper.telemetry", "paper.square_wave"]
 
 
 def test_modules_without_networks_import_no_tensorflow():

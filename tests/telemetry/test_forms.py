@@ -434,3 +434,10 @@ def test_names_may_be_missing(tmp_path):
     series = only(read_source(tmp_path / "a.txt", options=Cleaning(no_header=True)))
     check(series, start=None, interval_s=1.0)
     assert series.name == "column 0"
+
+
+def test_whole_and_fractional_seconds_are_read_in_one_column(tmp_path):
+    times = [time.strftime("%d.%m.%Y %H:%M:%S") + ("" if row % 2 else ",250") for row, time in enumerate(TIMES)]
+    (tmp_path / "a.csv").write_text(table("time;v", times, VALUES, separator=";"))
+    index = only(read_source(tmp_path / "a.csv")).index
+    assert (index[0] - START.tz_localize(None), index[1] - index[0]) == (pd.Timedelta("250ms"), pd.Timedelta("59.75s"))

@@ -96,10 +96,23 @@ def parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
     left = (dates.isna() & text.notna()).to_numpy()
     if left.any():
         rest = _plain(text[left].astype(str))
-        for other in dict.fromkeys((form, form.replace(".%f", ""), form.replace("%S", "%S.%f"))):
-            dates = dates.fillna(pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None))
+        whole = form.replace(".%f", "")
+        for other in dict.fromkeys((form, whole, whole.replace("%S", "%S.%f"))):
+            found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
+            dates = fill_dates(dates, found)
         zoned[left] = _has_zone(rest, form)
     return dates, zoned
+
+
+def fill_dates(dates: pd.Series, found: pd.Series) -> pd.Series:
+    """Fills missing dates with others. Whole seconds and fractions have different units, of which the finer is taken.
+
+    Args:
+        dates: Dates without a zone.
+        found: Others, by the labels of the rows.
+    """
+    unit = np.promote_types(dates.dtype, found.dtype)
+    return dates.astype(unit).fillna(found.astype(unit))
 
 
 def _has_zone(text: pd.Series, form: str) -> np.ndarray:

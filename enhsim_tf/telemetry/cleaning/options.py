@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import DAYS, UNITS_NS, check_time_format
+from enhsim_tf.telemetry.cleaning.times import check_time_format
 
 _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
@@ -102,7 +102,3 @@ class Cleaning:
         """
         own = {"time_format": None, "label_column": None, "labelled": "keep", "series_column": None, "value_column": None}
         return dataclasses.replace(self, **own | {"no_header": False} | changes)
-
-
-TIME_FORMATS = f"a format such as %d.%m.%Y %H:%M:%S, or for numbers {', '.join(UNITS_NS)} (since 1970 or any zero), {', '.join(DAYS)}"
-"""What `time_format` may be, as text."""

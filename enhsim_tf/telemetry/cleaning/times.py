@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, parse_dates
+from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, fill_dates, parse_dates
 from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Places
 
@@ -24,7 +24,8 @@ DAYS = {"excel": 25_569.0, "mjd": 40_587.0, "jd": 2_440_587.5, "datenum": 719_52
 _DAY_NAMES = {"excel": "days of spreadsheets", "mjd": "modified Julian dates", "jd": "Julian dates", "datenum": "MATLAB's day numbers"}
 _YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
-_DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
+DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
+"""Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,7 +119,7 @@ def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: 
             values, bad = numbers
             _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
             return _mark(_from_numbers(values, what, drop, unit, places), bad)
-        if given.iloc[:20].astype(str).str.strip().str.fullmatch(_DURATION).all():
+        if given.iloc[:20].astype(str).str.strip().str.fullmatch(DURATION).all():
             spans = pd.to_timedelta(cells.where(~missing), errors="coerce")
             bad = spans.isna().to_numpy() & ~missing
             _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
@@ -284,7 +285,7 @@ def _from_dates_as_text(
         leap[left] = text[left].astype(str).str.contains(r":\d\d:60").to_numpy()
         if leap.any():
             earlier, zoned[leap] = parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
-            dates = dates.fillna(earlier + pd.Timedelta(seconds=1))
+            dates = fill_dates(dates, earlier + pd.Timedelta(seconds=1))
             leap &= dates.notna().to_numpy()
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None

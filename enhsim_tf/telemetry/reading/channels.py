@@ -30,13 +30,7 @@ def read_table_channels(
     source: Path | Sequence[Path] | pd.DataFrame | pd.Series, columns: list[str] | None, time: str | None, options: Cleaning
 ) -> dict[str, pd.Series]:
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
-    what = (
-        source.name
-        if isinstance(source, Path)
-        else "the table"
-        if isinstance(source, pd.DataFrame | pd.Series)
-        else f"{source[0].name} ..."
-    )
+    what = _name_of(source)
     table = _without_repeats(read_table(source, options), columns, time, options, what)
     named = _wanted(table, columns)
     layout = lay_out(table, named, time, options, what)
@@ -62,6 +56,13 @@ def read_table_channels(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
         )
     return {name: _channel(table, layout, name, *place, findings, options) for name, place in chosen.items()}
+
+
+def _name_of(source: Path | Sequence[Path] | pd.DataFrame | pd.Series) -> str:
+    """Returns the name of a source for messages."""
+    if isinstance(source, Path):
+        return source.name
+    return "the table" if isinstance(source, pd.DataFrame | pd.Series) else f"{source[0].name} ..."
 
 
 def _with_cell(table: Table, name: str) -> str:

@@ -12,7 +12,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.dates import LOOK, date_forms
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.cleaning.times import Times, parse_times
+from enhsim_tf.telemetry.cleaning.times import DURATION, Times, parse_times
 from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, is_epoch, is_same_clock, may_be_clock, named_clock
 from enhsim_tf.telemetry.reading.table import Table
 
@@ -27,7 +27,6 @@ _OWN = {  # what the commands write beside the values: the columns that give it 
     "copies of a run": (("copy", "value", "out_of_range"), ("out_of_range",), None),
 }
 _MAX_STATES = 10  # a label or flag has at most this many different values
-_DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|days?(?: [\d:.+-]+)?)"
 _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
 
 
@@ -151,7 +150,7 @@ def kind_of(cells: pd.Series) -> str:
         return "objects"
     if has_commas(text):  # which are refused where they can be read in two ways
         return "numbers"
-    if text.str.fullmatch(_DURATION).mean() > 0.5:
+    if text.str.fullmatch(DURATION).mean() > 0.5:
         return "spans"
     if text.str.fullmatch(_TIME_OF_DAY).mean() > 0.5:
         return "times of day"

@@ -121,6 +121,11 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
     except ImportError:
         raise InputError(f"Expected the package openpyxl for {name}. Received: none. Install it, or save the sheet as CSV.") from None
     findings = []
+    with zipfile.ZipFile(stream) as archive:
+        limit = max(_SMALL_BYTES, _MAX_RATIO * stream.getbuffer().nbytes)
+        if sum(member.file_size for member in archive.infolist()) > limit:
+            raise ValueError(f"more than {limit:,} bytes when unpacked; save the sheet as CSV")
+    stream.seek(0)
     try:
         book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
         rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]

@@ -1,0 +1,124 @@
+"""Section 2.2: the first network, which maps the output of the simple simulator to the waveform of the telemetry.
+
+"We developed a wide, shallow Multi-Layer Perceptron (MLP) network."
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from enhsim_tf.keras_tools.backend import keras
+from enhsim_tf.keras_tools.blockwise_training import BlockwiseTraining, is_wide_dense_stack
+from enhsim_tf.keras_tools.fused_adam import fused_adam
+from enhsim_tf.paper.settings import Settings
+
+
+def initialiser(settings: Settings, of_author: str, number: int) -> keras.initializers.Initializer:
+    """The seeded initialiser of one layer.
+
+    Args:
+        settings: `initialisers` says whether each layer has the one that the author gives it, or all have he_uniform.
+        of_author: The author's initialiser of the layer.
+        number: A number that no other layer has.
+    """
+    name = of_author if settings.initialisers == "by layer" else settings.initialisers
+    return type(keras.initializers.get(name))(seed=1_000 * settings.seed + number)
+
+
+def build_enhancer(settings: Settings) -> keras.Sequential:
+    """Figure 3: Dense 500, two hidden layers of 3,200, and Dense 500: 13,697,400 parameters.
+
+    "The input and output layers are the size of the time series. The inner layers are wider, at 3,200 neurons."
+
+    Returns:
+        An uncompiled network from `(windows, window)` to `(windows, window)`.
+    """
+    names = ["Input", *(f"Hidden_{number + 1}" for number in range(settings.num_hidden)), "Output"]
+    units = [settings.window, *[settings.hidden_units] * settings.num_hidden, settings.window]
+    network = keras.Sequential([keras.Input((settings.window,))], name="enhancer")
+    for number, (name, width) in enumerate(zip(names, units, strict=True)):
+        activation = "linear" if name == "Output" else "relu"
+        kernel = initialiser(settings, "glorot_uniform", number)
+        network.add(keras.layers.Dense(width, activation, kernel_initializer=kernel, name=name))
+    return network
+
+
+class Pairs(keras.utils.PyDataset):
+    """Batches of source and target windows, which a generator of its own shuffles before each epoch.
+
+    Args:
+        source: Source windows, float32 of shape `(windows, samples)`.
+        target: Target windows of the same shape.
+        batch_size: Windows in a batch.
+        rng: Random generator.
+    """
+
+    def __init__(self, source: np.ndarray, target: np.ndarray, batch_size: int, rng: np.random.Generator):
+        super().__init__()
+        self.source, self.target, self.batch_size, self.rng = source, target, batch_size, rng
+        self.order = rng.permutation(len(source))
+
+    def __len__(self) -> int:
+        return -(-len(self.source) // self.batch_size)
+
+    def __getitem__(self, index: int) -> tuple[np.ndarray, np.ndarray]:
+        rows = self.order[self.batch_size * index : self.batch_size * (index + 1)]
+        return self.source[rows], self.target[rows]
+
+    def on_epoch_end(self) -> None:
+        """Shuffles the windows for the next epoch."""
+        self.order = self.rng.permutation(len(self.source))
+
+
+def train_enhancer(
+    network: keras.Sequential,
+    source: np.ndarray,
+    target: np.ndarray,
+    settings: Settings,
+    validation: tuple[np.ndarray, np.ndarray] | None = None,
+    callbacks: Sequence[keras.callbacks.Callback] = (),
+) -> dict[str, list[float]]:
+    """Step 3: trains the network "to map low-fidelity to high-fidelity data".
+
+    "The model is trained by matching a large number of source time series with a corresponding set of high-fidelity target time
+    series": 40 epochs with a batch size of 15. The target is the telemetry with its noise, which least squares averages out.
+
+    Args:
+        network: The network of `build_enhancer`.
+        source: Coarse windows, float32 of shape `(windows, window)`.
+        target: Telemetry windows of the same times.
+        settings: All settings.
+        validation: Held-out `(source, target)`, or None.
+        callbacks: Keras callbacks.
+
+    Returns:
+        The history of Keras.
+    """
+    is_fast = settings.fast and is_wide_dense_stack(network)
+    trained = BlockwiseTraining(network) if is_fast else network  # the same mathematics, one block of a kernel at a time
+    adam = (fused_adam if is_fast else keras.optimizers.Adam)(settings.learning_rate)
+    trained.compile(adam, settings.loss, jit_compile=False)
+    pairs = Pairs(source, target, settings.batch_size, np.random.default_rng(settings.seed))
+    history = trained.fit(pairs, epochs=settings.epochs, validation_data=validation, callbacks=list(callbacks), shuffle=False, verbose=0)
+    if is_fast:
+        trained.write_back()
+    return history.history
+
+
+def enhance(network: keras.Sequential, coarse: np.ndarray) -> np.ndarray:
+    """Step 5: converts "simulation to accurate, clean data".
+
+    Args:
+        network: The trained enhancer.
+        coarse: Coarse windows, shape `(windows, window)`.
+
+    Returns:
+        float32 array of the same shape.
+    """
+    return predict(network, np.asarray(coarse, np.float32))
+
+
+def predict(network: keras.Model, inputs: np.ndarray, batch_size: int = 1_024) -> np.ndarray:
+    """`network.predict` without the seconds that its data pipeline costs, batch by batch."""
+    batches = [network.predict_on_batch(inputs[first : first + batch_size]) for first in range(0, len(inputs), batch_size)]
+    return np.concatenate(batches)

@@ -1,0 +1,397 @@
+"""Figures 1 to 14 of the paper; the fourteenth is commented out in its source.
+
+Each function draws one figure from a pipeline, which trains what the figure needs. Figures 1 and 11 are drawings that are kept beside
+this file. Figures 5 to 7, faces of another system's making in the paper, have counterparts: real and generated windows in random order.
+"""
+
+import dataclasses
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib.dates
+import matplotlib.figure
+import numpy as np
+
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.figure import Figure, save
+from enhsim_tf.common.plot_style import (
+    AVERAGE,
+    COARSE,
+    DASHED,
+    DOUBLE,
+    EDGE,
+    ENHANCED,
+    FOOT,
+    GENERATED,
+    LINE,
+    QUIET,
+    REAL,
+    SINGLE,
+    beside,
+    label_ends,
+    name_axes,
+    new_sheet,
+    panels,
+    title_words,
+)
+from enhsim_tf.keras_tools.backend import keras
+from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.enhancer import build_enhancer
+from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise
+from enhsim_tf.paper.pipeline import Pipeline
+
+DRAWINGS = Path(__file__).with_name("drawings")
+KINDS = ("png", "svg")
+LETTERS = "abcdefgh"
+COUNTERPART = "A counterpart of a face in the paper, which another system made."
+FACTS = {"time_unit": "min", "unit": "dimensionless"}  # of all axes that show windows
+
+
+def sample(pipeline: Pipeline, part: str, number: int, purpose: str) -> dict[str, np.ndarray]:
+    """Some windows of a part, and the minutes since the beginning of each as `minutes`."""
+    drawn = pipeline.windows(part, number, purpose)
+    return drawn | {"minutes": pipeline.telemetry.interval / 60 * np.arange(pipeline.settings.window)}
+
+
+def training_pairs(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 2."""
+    pairs = sample(pipeline, "train", 3, "figure 2")
+    figure, down = new_sheet(DOUBLE, 3.1, "Training source and target of the same times", "Windows begin at random times.")
+    axes = panels(figure, down + 0.2, 2, 3, sharex=True, sharey=True)
+    begins = pipeline.parts["train"].time[pairs["start"]]
+    for column, begin in enumerate(begins):
+        axes[0, column].set_title(f"from day {begin / 86_400:.2f}", loc="right", color=QUIET, size=7)
+        axes[0, column].plot(pairs["minutes"], pairs["coarse"][column], color=COARSE, linewidth=1.2)
+        axes[1, column].plot(pairs["minutes"], pairs["target"][column], color=REAL, linewidth=0.6)
+    for row, name in enumerate(("Source", "Target")):
+        axes[row, 0].set_title(name, weight="bold")
+    name_axes(axes, FACTS)
+    return figure
+
+
+def enhanced_simulation(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 4."""
+    window = sample(pipeline, "test", 1, "figure 4")
+    enhanced, truth = pipeline.enhance(window["coarse"])[0], window["truth"][0]
+    errors = measured("enhancement", pipeline)
+    words = ", ".join(f"{name} {errors[f'{key}nrmse']:.3f}" for name, key in (("coarse", "coarse_"), ("enhanced", ""), ("ridge", "ridge_")))
+    figure, down = new_sheet(
+        DOUBLE,
+        3.5,
+        "Enhanced simulation of a held-out window",
+        f"Error on all test windows, in standard deviations of the signal: {words}.",
+    )
+    above, below = panels(figure, down + 0.1, 2, 1, right=0.85, height_ratios=(3, 1), sharex=True)[:, 0]
+    above.plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
+    above.plot(window["minutes"], enhanced, color=ENHANCED, linewidth=1.4)
+    above.plot(window["minutes"], truth, color=REAL, linewidth=0.8, linestyle=DASHED)
+    name = "true signal" if pipeline.truth else "telemetry"
+    label_ends(above, {"coarse": (window["coarse"][0], COARSE), "enhanced": (enhanced, ENHANCED), name: (truth, REAL)})
+    below.axhline(0, color=LINE, linewidth=0.6)
+    below.plot(window["minutes"], enhanced - truth, color=ENHANCED, linewidth=0.8)
+    beside(below, 0.5, f"enhanced\n− {name}", ENHANCED)
+    name_axes(np.array([[above], [below]]), FACTS)
+    return figure
+
+
+def guess(
+    title: str, minutes: np.ndarray, real: np.ndarray, generated: np.ndarray, rng: np.random.Generator, hint: str = "", columns: int = 4
+) -> matplotlib.figure.Figure:
+    """Real and generated rows in random order; which are generated is printed upside down, with a hint that would tell."""
+    is_generated = np.repeat([False, True], [len(real), len(generated)])
+    order = rng.permutation(len(is_generated))
+    rows = -(-len(order) // columns)
+    figure, down = new_sheet(DOUBLE, (1.24 if columns > 1 else 1.3) + (0.95 if columns > 1 else 0.72) * rows, title, COUNTERPART)
+    axes = panels(figure, down + 0.2, rows, columns, sharex=True, sharey=True)
+    for panel, row, letter in zip(axes.flat, np.concatenate([real, generated])[order], LETTERS, strict=False):
+        panel.plot(minutes, row, color=REAL, linewidth=0.5)
+        panel.set_title(letter, weight="bold")
+    name_axes(axes, FACTS)
+    answer = ", ".join(letter for letter, made in zip(LETTERS, is_generated[order], strict=False) if made)
+    width, height = figure.get_size_inches()
+    for text, y in ((f"generated: {answer}", FOOT + 0.04), (hint, EDGE)):
+        figure.text(1 - EDGE / width, y / height, text, size=7, color=QUIET, rotation=180, ha="right")
+    return figure
+
+
+def guess_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 5, a counterpart."""
+    rng, real = pipeline.draw("figure 5"), sample(pipeline, "test", 4, "figure 5, real")
+    generated = pipeline.combine(pipeline.windows("test", 4, "figure 5, generated")["coarse"], rng)
+    return guess("Which windows of telemetry are generated?", real["minutes"], real["target"], generated, rng)
+
+
+def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 6, a counterpart."""
+    rng, found = pipeline.draw("figure 6"), measured("noise resemblance", pipeline)
+    real, minutes = pipeline.noise_windows("test", 4, "figure 6, real"), sample(pipeline, "test", 1, "figure 6")["minutes"]
+    hint = f"effective rank: generated {found['rank']:.0f}, real {found['real_rank']:.0f}"
+    return guess("Which windows of noise are generated?", minutes, real, pipeline.generate_noise(4, rng), rng, hint)
+
+
+def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 7, a counterpart: four windows in a row, so that repetition shows."""
+    rng, size = pipeline.draw("figure 7"), pipeline.settings.window
+    series = pipeline.parts["test"]
+    starts = rng.integers(0, len(series.values) - 4 * size + 1, 4)[:, None] + np.arange(4 * size)
+    noise = pipeline.generate_noise(8, rng).reshape(2, -1)
+    clean = pipeline.enhance(pipeline.simulator(series.time[starts[2:]]).astype(np.float32).reshape(-1, size)).reshape(2, -1)
+    minutes = series.interval / 60 * np.arange(4 * size)
+    return guess("Which longer series are generated?", minutes, series.values[starts[:2]], clean + noise, rng, columns=1)
+
+
+def source_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 8."""
+    settings, window = pipeline.settings, sample(pipeline, "test", 1, "figure 8")
+    series, start = pipeline.parts["test"].values, int(window["start"][0])
+    before = settings.moving_average // (2 if settings.average == "centred" else 1)
+    begin = min(max(start, before), len(series) - settings.window - before)
+    noise, average = extract_noise(series[begin - before : begin + settings.window + before], settings.moving_average, settings.average)
+    noise, average, shown = noise[: settings.window], average[: settings.window], series[begin : begin + settings.window]
+    figure, down = new_sheet(
+        DOUBLE,
+        3.0,
+        "Extracted source noise",
+        f"Telemetry minus its {settings.average} moving average over {settings.moving_average} samples. "
+        f"Standard deviation of the noise in this window: {np.std(noise):.3f}.",
+    )
+    above, below = panels(figure, down + 0.2, 2, 1, sharex=True)[:, 0]
+    above.plot(window["minutes"][: len(shown)], shown, color=COARSE, linewidth=0.5)
+    above.plot(window["minutes"][: len(average)], average, color=AVERAGE, linewidth=1.4)
+    title_words(above, (("telemetry", COARSE), ("moving average", AVERAGE)))
+    below.plot(window["minutes"][: len(noise)], noise, color=REAL, linewidth=0.5)
+    title_words(below, (("noise", REAL),))
+    name_axes(np.array([[above], [below]]), FACTS)
+    return figure
+
+
+def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 12."""
+    history, last = pipeline.history, pipeline.settings.iterations
+    chosen = history["iteration"] <= last
+    figure, down = new_sheet(
+        DOUBLE, 2.7, "Accuracy and loss for real and generated rows", "Of the discriminator, on new rows. Dotted: chance."
+    )
+    axes = panels(figure, down + 0.2, 1, 2, right=0.8, gap=(0.24, 1.25))[0]
+    for panel, key, chance, words in (
+        (axes[0], "accuracy", 0.5, "share classified correctly"),
+        (axes[1], "loss", np.log(2), "binary cross-entropy (nats)"),
+    ):
+        panel.axhline(chance, color=LINE, linestyle=":", linewidth=1)
+        lines = {name: history[f"{key}_{name}"][chosen] for name in ("real", "generated")}
+        panel.plot(history["iteration"][chosen], lines["real"], color=REAL, marker="o", markersize=3.5)
+        style = {"linestyle": DASHED, "marker": "s", "markersize": 3.5, "markerfacecolor": "white"}
+        panel.plot(history["iteration"][chosen], lines["generated"], color=GENERATED, **style)
+        panel.set_ylim(0, 1.02 if key == "accuracy" else None)
+        panel.margins(x=0.03)
+        panel.set(xlabel="iteration", ylabel=words)
+        panel.xaxis.set_major_formatter("{x:,.0f}")
+        label_ends(panel, {"real": (lines["real"], REAL), "generated": (lines["generated"], GENERATED)})
+    return figure
+
+
+def combined(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 13."""
+    window, rng = sample(pipeline, "test", 1, "figure 13"), pipeline.draw("figure 13, noise")
+    enhanced = pipeline.enhance(window["coarse"])
+    noisy = enhanced + pipeline.generate_noise(1, rng)
+    rough = [np.std(np.diff(values[0])) for values in (enhanced, noisy, window["target"])]
+    figure, down = new_sheet(
+        DOUBLE,
+        4.1,
+        "Simulator output, enhanced, with generated noise added",
+        "Standard deviation of first differences: enhanced {:.3f}, with noise {:.3f}, real {:.3f}.".format(*rough),
+    )
+    axes = panels(figure, down + 0.2, 3, 1, sharex=True, sharey=True)
+    axes[0, 0].plot(window["minutes"], window["coarse"][0], color=COARSE, linewidth=1.2)
+    axes[0, 0].plot(window["minutes"], enhanced[0], color=ENHANCED, linewidth=1.4)
+    title_words(axes[0, 0], (("simulator output", COARSE), ("enhanced", ENHANCED)))
+    axes[1, 0].plot(window["minutes"], noisy[0], color=GENERATED, linewidth=0.6)
+    title_words(axes[1, 0], (("enhanced, with noise", GENERATED),))
+    axes[2, 0].plot(window["minutes"], window["target"][0], color=REAL, linewidth=0.6)
+    title_words(axes[2, 0], (("real telemetry of the same time, held out", REAL),))
+    name_axes(axes, FACTS)
+    return figure
+
+
+def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
+    """Figure 14."""
+    telemetry = pipeline.telemetry
+    shown = telemetry.part(0, min(4 * pipeline.settings.window, len(telemetry.values)))
+    start = np.datetime64(telemetry.start.removesuffix("Z"), "ms")
+    figure, down = new_sheet(
+        DOUBLE,
+        2.4,
+        "Example telemetry in the store",
+        f"“{telemetry.name}”: {len(telemetry.values):,} samples, one every {telemetry.interval:g} s; the first {len(shown.values):,}.",
+    )
+    panel = panels(figure, down + 0.1, 1, 1)[0, 0]
+    panel.plot(start + np.round(1e3 * shown.time).astype("timedelta64[ms]"), shown.values, color=REAL, linewidth=0.4)
+    locator = matplotlib.dates.AutoDateLocator()
+    panel.xaxis.set_major_locator(locator)
+    panel.xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(locator, show_offset=False))
+    name_axes(np.array([[panel]]), FACTS | {"time_unit": f"UTC, from {str(start)[:10]}"})
+    return figure
+
+
+def layer_table(network: keras.Sequential, title: str) -> matplotlib.figure.Figure:
+    """Figures 3, 9 and 10: the layers of a network with their output shapes and numbers of parameters."""
+    height = 0.84 + 0.3 * (len(network.layers) + 1) + FOOT
+    figure, down = new_sheet(SINGLE, height, title)
+    axes = figure.add_axes((0, 0, 1, 1), xlim=(0, SINGLE), ylim=(0, height))
+    axes.axis("off")
+    y = height - down - 0.2
+
+    def row(y: float, cells: Sequence[str], **style: object) -> None:
+        for x, cell, side in zip((EDGE, 1.72, SINGLE - EDGE), cells, ("left", "left", "right"), strict=True):
+            axes.text(x, y, cell, ha=side, **style)
+
+    def rule(y: float, linewidth: float) -> None:
+        axes.plot((EDGE, SINGLE - EDGE), (y, y), color=REAL, linewidth=linewidth)
+
+    rule(y + 0.17, 1.0)
+    row(y, ("Layer", "Output shape", "Parameters"), size=7.5, color=QUIET)
+    rule(y - 0.08, 0.5)
+    for layer in network.layers:
+        y -= 0.3 if layer is not network.layers[0] else 0.24
+        kind = type(layer).__name__
+        is_named = layer.name.startswith(("Input", "Hidden", "Output"))
+        row(y, (f"{layer.name} ({kind})" if is_named else kind, str(tuple(layer.output.shape)), f"{layer.count_params():,}"), size=8)
+        axes.text(EDGE, y - 0.125, layer_details(layer), size=7, color=QUIET)
+    y -= 0.3
+    rule(y + 0.12, 0.5)
+    row(y - 0.04, (f"Total, input {network.input_shape}", "", f"{network.count_params():,}"), size=8, weight="bold")
+    rule(y - 0.14, 1.0)
+    return figure
+
+
+def layer_details(layer: keras.layers.Layer) -> str:
+    """The settings of a layer that the paper mentions."""
+    config = layer.get_config()
+    names = {"filters": "filters", "kernel_size": "window", "strides": "stride", "rate": "rate"}
+    words = [
+        f"{word} {config[key][0] if isinstance(config[key], tuple | list) else config[key]}" for key, word in names.items() if key in config
+    ]
+    return ", ".join([*words, *([config["activation"]] if config.get("activation") else [])])
+
+
+@dataclasses.dataclass(frozen=True)
+class PaperFigure(Figure):
+    """A figure of the paper, which `drawn_by` draws from a pipeline; None for a drawing that is kept.
+
+    Args:
+        needs_training: Whether it shows a trained network.
+    """
+
+    needs_training: bool = True
+
+
+FIGURES = {
+    "fig01_pipeline": PaperFigure(
+        1,
+        "Enhanced simulation pipeline",
+        "Diagram: a square-wave simulation goes through the enhancer to clean data, a latent vector through the generator to noise; their "
+        "sum is the final output beside real telemetry. Telemetry trains the enhancer, and its noise trains the GAN.",
+        None,
+        needs_training=False,
+    ),
+    "fig02_source_target": PaperFigure(
+        2,
+        "Training source and target time series",
+        "Three training windows: above the coarse simulation, a sum of square waves, below the telemetry of the same time.",
+        training_pairs,
+        needs_training=False,
+    ),
+    "fig03_enhancer": PaperFigure(
+        3,
+        "Enhancing MLP neural network",
+        "Table of the enhancer's layers with their output shapes and numbers of parameters.",
+        lambda pipeline: layer_table(build_enhancer(pipeline.settings), "Layers of the enhancer"),
+        needs_training=False,
+    ),
+    "fig04_enhanced_simulation": PaperFigure(
+        4,
+        "Enhanced simulation",
+        "A held-out window: the stepped simulation, the enhanced signal and the true signal; below, the difference of the last two.",
+        enhanced_simulation,
+    ),
+    "fig05_real_or_generated": PaperFigure(
+        5,
+        "Real or generated: windows of telemetry (a counterpart)",
+        "Eight windows of telemetry in random order; four are generated.",
+        guess_telemetry,
+    ),
+    "fig06_real_or_generated_noise": PaperFigure(
+        6, "Real or generated: windows of noise (a counterpart)", "Eight windows of noise in random order; four are generated.", guess_noise
+    ),
+    "fig07_real_or_generated_series": PaperFigure(
+        7, "Real or generated: longer series (a counterpart)", "Four longer series in random order; two are generated.", guess_series
+    ),
+    "fig08_source_noise": PaperFigure(
+        8,
+        "Extracted source noise",
+        "Above a window of telemetry with its moving average, below the noise that remains.",
+        source_noise,
+        needs_training=False,
+    ),
+    "fig09_generator": PaperFigure(
+        9,
+        "Generator construction",
+        "Table of the generator's layers with their output shapes and numbers of parameters.",
+        lambda pipeline: layer_table(build_generator(pipeline.settings), "Layers of the generator"),
+        needs_training=False,
+    ),
+    "fig10_discriminator": PaperFigure(
+        10,
+        "Discriminator construction",
+        "Table of the discriminator's layers with their output shapes and numbers of parameters.",
+        lambda pipeline: layer_table(build_discriminator(pipeline.settings), "Layers of the discriminator"),
+        needs_training=False,
+    ),
+    "fig11_gan_training": PaperFigure(
+        11,
+        "GAN training",
+        "Diagram of an iteration. First the discriminator learns from real rows, labelled 1, and generated rows, labelled 0. Then the "
+        "generator learns through the frozen discriminator, with the label reversed to 1.",
+        None,
+        needs_training=False,
+    ),
+    "fig12_accuracy_loss": PaperFigure(
+        12,
+        "Accuracy and loss for real and fake classifications",
+        "Accuracy and loss of the discriminator on real and on generated rows over the iterations, beside chance.",
+        accuracy_and_loss,
+    ),
+    "fig13_combined": PaperFigure(
+        13,
+        "Simulator output, enhanced, with noise added",
+        "The stepped simulation with the enhanced signal, the enhanced signal with generated noise, and real telemetry of the same time.",
+        combined,
+    ),
+    "fig14_telemetry_store": PaperFigure(
+        14,
+        "Example telemetry signals in the store",
+        "The first samples of the stored telemetry over time.",
+        stored_telemetry,
+        needs_training=False,
+    ),
+}
+
+
+def save_figure(name: str, pipeline: Pipeline, folder: Path, caption: str, is_smoke: bool = False) -> None:
+    """Writes a figure as PNG and SVG. The same results give the same bytes.
+
+    Args:
+        name: One of `FIGURES`.
+        pipeline: What it shows.
+        folder: An existing folder.
+        caption: A line at the foot: what was run.
+        is_smoke: Whether to mark it as the result of a smoke run.
+    """
+    if FIGURES[name].drawn_by is not None:
+        save(name, pipeline, folder, caption, is_smoke, figures=FIGURES)
+        return
+    for kind in KINDS:
+        with replace_file(folder / f"{name}.{kind}") as temporary:
+            shutil.copyfile(DRAWINGS / f"{name}.{kind}", temporary)

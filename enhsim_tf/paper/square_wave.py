@@ -1,0 +1,84 @@
+"""Section 2.1: the simple, fast simulation, and the degraded configurations that it can run in (sections 1 and 3).
+
+"This simulation can be quite coarse - for example a square wave can be used for nearly any periodic waveform."
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from enhsim_tf.paper.settings import Settings
+
+Signal = Callable[[np.ndarray], np.ndarray]
+
+MODES = ("stuck", "drift", "gain_loss", "friction", "dropout", "period_change")
+"""Degraded modes: the mechanism stands still, the sensor drifts or loses gain, motion lags, samples are lost, periods grow."""
+ONSET = 0.25  # share of a window before the degradation begins
+RUN = 10  # samples that `dropout` loses at a time
+
+
+def square_wave(time: np.ndarray, period: float, amplitude: float) -> np.ndarray:
+    """A square wave, `amplitude` in the first half of each period and `-amplitude` in the second.
+
+    Args:
+        time: Times in seconds, any shape.
+        period: The period in seconds.
+        amplitude: Half the difference of the two levels.
+    """
+    return np.where(np.mod(time / period, 1.0) < 0.5, amplitude, -amplitude)
+
+
+def simulator(settings: Settings) -> Signal:
+    """Step 1: the simulator of the example, a square wave in place of each sine, as a function of the time in seconds."""
+
+    def simulate(time: np.ndarray) -> np.ndarray:
+        orbit = square_wave(time, settings.orbit_period, settings.orbit_amplitude)
+        return orbit + square_wave(time, settings.rotation_period, settings.rotation_amplitude)
+
+    return simulate
+
+
+def degrade(signal: Signal, time: np.ndarray, mode: str, severity: float, settings: Settings, rng: np.random.Generator) -> np.ndarray:
+    """A signal in a degraded mode.
+
+    The signal is a function of time, so that the true signal and the simulation are degraded alike by the same state of `rng`.
+
+    Args:
+        signal: The nominal signal.
+        time: Times in seconds, shape `(windows, samples)`.
+        mode: One of `MODES`, or `nominal`.
+        severity: Severity from 0 to 1.
+        settings: Amplitudes and periods.
+        rng: Draws the lags of `friction` and the losses of `dropout`.
+
+    Returns:
+        float64 array of shape `(windows, samples)`.
+    """
+    onset = int(round(ONSET * time.shape[1], 6))
+    time, late = time.copy(), time[:, onset:]
+    begin = late[:, :1]
+
+    # what ails the mechanism changes when the signal happens
+    if mode == "stuck":
+        until = begin + severity * (late[:, -1:] - begin)
+        time[:, onset:] = np.where(late <= until, begin, late)
+    elif mode == "period_change":
+        time[:, onset:] = begin + (late - begin) / (1 + severity)
+    elif mode == "friction":
+        quarter, elapsed = settings.rotation_period / 4, late[0] - late[0, 0]
+        knots = np.arange(0, elapsed[-1] + 4 * quarter, quarter)
+        lags = rng.uniform(0, severity * quarter, (len(time), len(knots)))
+        lags[:, 0] = 0
+        time[:, onset:] = late - np.stack([np.interp(elapsed, knots, lag) for lag in lags])
+    values = signal(time)
+
+    # what ails the sensor changes its values
+    after, size = values[:, onset:], settings.orbit_amplitude + settings.rotation_amplitude
+    if mode == "drift":
+        after += severity * 2 * size * np.linspace(0, 1, after.shape[1])
+    elif mode == "gain_loss":
+        after *= 1 - severity
+    elif mode == "dropout":
+        lost = rng.random((len(time), -(-after.shape[1] // RUN))) < severity / 2
+        after[np.repeat(lost, RUN, axis=1)[:, : after.shape[1]]] = -size
+    return values

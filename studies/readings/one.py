@@ -1,0 +1,32 @@
+"""One run of the paper in a process of its own: `python -m studies.readings.one READING ROUNDING SEED BUDGET CACHE TABLE`."""
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+
+from enhsim_tf.common.console import tell
+from enhsim_tf.common.stages import Stages
+from enhsim_tf.paper.claims import CLAIMS
+from enhsim_tf.paper.pipeline import Pipeline
+from enhsim_tf.paper.settings import make_settings
+from studies.readings.run import KEYS, READINGS, Run
+
+
+def measure(run: Run, budget: str, cache: Path) -> pd.DataFrame:
+    """The measurements of all claims in one run; training goes on beyond the paper's iterations for the reference alone.
+
+    Args:
+        run: The run.
+        budget: `smoke` or `full`.
+        cache: Folder of cached stages.
+    """
+    rounds = {} if run.reading == "reference" else {"rounds": 1}
+    pipeline = Pipeline(make_settings(budget, seed=run.seed, **rounds, **READINGS[run.reading]), Stages(cache, tell=tell))
+    rows = [(*run, claim.id, name, value) for claim in CLAIMS for name, value in claim.measure(pipeline).items()]
+    return pd.DataFrame(rows, columns=[*KEYS, "claim", "name", "value"])
+
+
+if __name__ == "__main__":
+    reading, rounding, seed, budget, cache, table = sys.argv[1:]
+    measure(Run(reading, rounding, int(seed)), budget, Path(cache)).to_parquet(table, index=False)

@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from enhsim_tf.paper.claims import CLAIMS, NOT_MEASURED, judge_all, outside
+from enhsim_tf.paper.noise import NoiseGAN
+from enhsim_tf.paper.square_wave import simulator
+from enhsim_tf.paper.telemetry import Telemetry, make_telemetry
+from tests.paper.conftest import TINY, tiny_pipeline, tiny_settings
+
+
+@pytest.fixture(scope="module")
+def records(pipeline):
+    return judge_all(pipeline)
+
+
+def test_windows_of_simulation_telemetry_and_truth_are_of_the_same_times(pipeline):
+    found = pipeline.windows("test", 4, "a purpose")
+    time = pipeline.parts["test"].time[found["start"][:, None] + np.arange(TINY["window"])]
+    np.testing.assert_allclose(found["coarse"], simulator(pipeline.settings)(time), atol=1e-6)
+    np.testing.assert_allclose(found["truth"], pipeline.truth(time), atol=1e-6)
+    assert np.std(found["target"] - found["truth"]) == pytest.approx(0.1, rel=0.2)
+
+
+def test_the_whole_paper_runs_and_every_claim_is_judged(records):
+    assert [record["id"] for record in records] == [f"C{number}" for number in range(1, 10)]
+    assert all(record["verdict"] != NOT_MEASURED and record["deciding"] for record in records)
+    assert all(np.isfinite(list(record["measured"].values())).all() for record in records)
+
+
+def test_the_sum_is_the_enhanced_signal_plus_generated_noise(pipeline):
+    coarse = pipeline.windows("test", 3, "sum")["coarse"]
+    noise = pipeline.generate_noise(3, np.random.default_rng(5))
+    np.testing.assert_array_equal(pipeline.combine(coarse, np.random.default_rng(5)), pipeline.enhance(coarse) + noise)
+
+
+def test_a_second_run_takes_every_stage_from_the_cache_and_finds_the_same(records, cache):
+    again = tiny_pipeline(cache)
+    assert judge_all(again) == records
+    assert all(again.stages.cached.values())
+
+
+def test_a_run_from_nothing_finds_the_same_and_another_reading_trains_only_what_it_touches(pipeline, cache, tmp_path):
+    fresh = tiny_pipeline(tmp_path)
+    np.testing.assert_array_equal(fresh.history["sd"], pipeline.history["sd"])
+    other = tiny_pipeline(tmp_path, latent_scale=4)
+    assert other.history["sd"][0] != fresh.history["sd"][0]
+    assert (other.stages.cached["telemetry"], other.stages.cached["noise GAN"]) == (True, False)
+    other = tiny_pipeline(cache, latent_scale=4)
+    assert other.enhancer_folder == pipeline.enhancer_folder
+
+
+def test_a_training_that_learnt_nothing_is_named(records, cache, tmp_path, monkeypatch):
+    ranges = {
+        record["id"]: {"ranges": {name: [value, value] for name, value in record["measured"].items() if record["id"] != "C2"}}
+        for record in records
+    }
+    assert outside(records, {"claims": ranges}) == []
+    monkeypatch.setattr(NoiseGAN, "train_discriminator", lambda gan, rows, tags: None)
+    broken = tiny_pipeline(tmp_path)
+    broken_records = [{"id": claim.id, "measured": claim.measure(broken)} for claim in CLAIMS if claim.id in ("C5", "C6")]
+    of_gan = {name: ranges[name] for name in ("C5", "C6")}
+    named = outside(broken_records, {"claims": of_gan})
+    assert any(line.startswith("C5: late_") for line in named)
+    assert any(line.startswith("C6: ") for line in named)
+
+
+def test_telemetry_of_ones_own_runs_without_a_known_truth(tmp_path):
+    settings = tiny_settings()
+    example = make_telemetry(settings, np.random.default_rng(9))
+    own = Telemetry(example.values[:8_000], 1.0, name="my channel")
+    found = tiny_pipeline(tmp_path)
+    found = type(found)(settings, found.stages, own=own, own_simulator=simulator(settings))
+    verdicts = {record["id"]: record["verdict"] for record in judge_all(found)}
+    assert {name for name, verdict in verdicts.items() if verdict == NOT_MEASURED} == {"C3", "C8", "C9"}
+    assert np.std(found.noise_windows("train")) / found.noise_unit == pytest.approx(0.1)
