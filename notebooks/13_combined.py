@@ -236,7 +236,7 @@ def draw(scale):
         panel.hist(of_real, bins, histtype="step", color=REAL, label="real nominal")
         panel.axvline(limit, color=REAL, linestyle=DASHED, linewidth=0.8, label="threshold")
         panel.set(xlabel="score (dimensionless)", ylabel="windows")
-        panel.legend(frameon=False)
+        panel.legend(frameon=False, loc="upper right")
 
 
 slider(draw, "noise's scale", [0.25, 0.5, 0.75, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0], shown=(1.0, 0.9, 1.25))
