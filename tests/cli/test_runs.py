@@ -86,7 +86,7 @@ def run_command(arguments, capsys):
 def test_the_fit_reports_the_pairing_and_the_ladder(world):
     said = (world / "said.txt").read_text()
     assert "delay: none found" in said and "Enhancers, error on held-out blocks" in said and "Chosen: ridge" in said
-    assert {path.name for path in (world / "models" / "celsius").iterdir()} >= {"manifest.json", "report.json", "report.png", "nominal.npz"}
+    assert {path.name for path in (world / "models" / "celsius").iterdir()} >= {"manifest.json", "report.json", "report.png", "arrays.npz"}
 
 
 def test_fit_as_a_command(world, tmp_path, capsys):

@@ -85,7 +85,7 @@ def load_run_model(folder: str | os.PathLike) -> dict[str, Any]:
 
 
 def _arguments_from(arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> dict[str, Any]:
-    scaling, window, trained = Scaling.from_config(settings["scaling"]), int(settings["window"]), dict(settings["trained"])
+    scaling, window, trained = Scaling.from_config(settings["scaling"]), int(settings["window"]), settings["trained"]
     noise = model_from(settings["noise"], arrays["noise"])
     parts = tuple(Run(arrays["nominal"][f"part_{number}"], float(each)) for number, each in enumerate(settings["nominal"]["offsets_s"]))
     nominal = Recording(parts, tuple(settings["columns"]), float(settings["interval_s"]), settings["nominal"]["start"], "the nominal run")
