@@ -260,6 +260,8 @@ def _joined(frame: pd.DataFrame, kinds: Mapping[str, str], dates: list[str]) -> 
 
 
 def _has_no_time(cells: pd.Series) -> bool:
+    if isinstance(cells.dtype, pd.DatetimeTZDtype):  # who keeps a zone keeps times
+        return False
     head = cells.dropna().iloc[:200]
     if pd.api.types.is_datetime64_any_dtype(cells.dtype):
         return bool((head == head.dt.normalize()).all())
