@@ -137,7 +137,7 @@ def test_training_data_with_fewer_seeds_are_compared_with_the_real_windows_of_th
 
 def test_beside_classifiers_stands_the_detector_that_finds_most(near):
     second = table({REAL: {5: 0.01, 20: 0.01}}).assign(detector="b", recall_at_real_rate=0.7)
-    rows = pd.concat([table(RATES), second, table({CLASSIFIER: {20: 0.01}})], ignore_index=True)
+    rows = pd.concat([table(RATES), second, table({CLASSIFIER: {20: 0.01}, CLASSIFIER_ON_REAL: {20: 0.01}})], ignore_index=True)
     found = summary.summarise({"rows": rows})["environments"]["white"]
     assert found["best_detector"] == {"20": {"name": "b", "recall_at_real_rate": near(0.7)}}
 
