@@ -77,7 +77,7 @@ def test_nothing_is_written_if_a_run_cannot_be_used(refused, tmp_path):
     with refused("without 'volts'"):
         write_copies(tmp_path / "out.parquet", model(), Recording((Run(np.zeros((20, 1), np.float32)),), ("amps",), 10.0, START), 2)
     broken = model()
-    broken.noise = SimpleNamespace(generate_series=lambda num_samples, rng: np.zeros(10**15))
+    broken.noise = SimpleNamespace(generate_series=lambda num_samples, rng, signal: np.zeros(10**15))
     with pytest.raises(MemoryError):
         write_copies(tmp_path / "out.parquet", broken, run(), 2)
     assert not list(tmp_path.iterdir())
