@@ -16,7 +16,7 @@ WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_ad
     enhancer.network enhancer.ladder enhancer.rung_networks noise.generator noise.discriminator noise.gan noise.latent
     enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting enhanced_simulator.choosing
     enhanced_simulator.updating
-    enhanced_simulator.runs.model enhanced_simulator.runs.fitting enhanced_simulator.runs.residuals""".split()
+    enhanced_simulator.runs.model enhanced_simulator.runs.fitting enhanced_simulator.runs.residuals enhanced_simulator.runs.saving""".split()
 NOT_TRIED = ("reproduce", "paper", "__main__")  # the reproduction's own modules may be slow to import; its settings may not
 
 
