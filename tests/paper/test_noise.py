@@ -133,7 +133,7 @@ def test_the_same_seed_gives_the_same_training_and_another_seed_another():
 
 
 def test_the_gan_approaches_the_standard_deviation_of_white_noise():
-    gan = make_gan(window=40, rows=64, record_every=100, dropout=0, seed=3, update="mixed 200 + 200")
+    gan = make_gan(window=40, rows=64, iterations=600, record_every=100, dropout=0, seed=3, update="mixed 200 + 200")
     rows, sds = (0.1 * np.random.default_rng(0).standard_normal((2_000, 40))).astype(np.float32), []
 
     def follow(iteration):
