@@ -1,8 +1,12 @@
 """The kinds of noise that studies run with, by name, without slow imports."""
 
 import argparse
+import importlib
+from pathlib import Path
+from typing import Any
 
-from studies.common.command import Option
+from enhsim_tf.common.console import tell
+from studies.common.command import Command, Option
 
 NOISES = ("white", "autoregressive", "heteroscedastic", "shot")
 FAMILIES = (
@@ -19,3 +23,18 @@ def environment_option(names: tuple[str, ...]) -> Option:
 def environments(options: argparse.Namespace, names: tuple[str, ...]) -> tuple[str, ...]:
     """The kinds of noise that `--environment` asks for."""
     return names if options.environment is None else (options.environment,)
+
+
+def noise_command(study: str, description: str) -> Command:
+    """The command of a study that runs with each of `NOISES` and has no further options; its function is `run` of `studies.STUDY.run`.
+
+    Args:
+        study: Name of the study, of its folder and of its group of settings.
+        description: What the study does, in a sentence.
+    """
+
+    def run(options: argparse.Namespace, settings: Any, out: Path) -> None:
+        module = importlib.import_module(f"studies.{study}.run")
+        module.run(settings, options.cache, out, environments(options, NOISES), options.fresh, tell)
+
+    return Command(study, description, study, run, [environment_option(NOISES)])
