@@ -193,27 +193,6 @@ def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_s
     return np.append(total / number, np.full(num_samples - end, scores[-1]))
 
 
-def mix_real_and_simulated(simulated: np.ndarray, real: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
-    """Mixes simulated and real windows, for the arms of the mixing curve (Jaufmann et al.).
-
-    Args:
-        simulated: Simulated windows.
-        real: The same number of real windows.
-        share: Share of real windows in the mixture, from 0 to 1.
-        rng: Random number generator for the order of the windows.
-
-    Returns:
-        The mixture, of the same shape, in random order.
-
-    Raises:
-        InputError: If the share is not between 0 and 1, or if the numbers of windows differ.
-    """
-    if not 0 <= share <= 1 or len(simulated) != len(real):
-        raise InputError(f"Expected a share from 0 to 1 and equal numbers of windows. Received: {share}, {len(simulated)} and {len(real)}.")
-    num_real = round(share * len(real))
-    return rng.permutation(np.concatenate([real[:num_real], simulated[num_real:]]))
-
-
 def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
     """Computes the false-alarm rate of each detector.
 

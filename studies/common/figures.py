@@ -24,14 +24,3 @@ def save_all(
         The paths of the files.
     """
     return [path for name in names or figures for path in save(name, found, folder, command, found["budget"] == "smoke", figures=figures)]
-
-
-def in_seeds(seeds: Sequence[int]) -> str:
-    """The number of seeds as text."""
-    return "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-
-
-def in_list(names: Sequence[str]) -> str:
-    """Joins names with commas, and the last one with "and"."""
-    names = list(names)
-    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

@@ -11,7 +11,6 @@ from enhsim_tf.detection.evaluation import (
     false_alarm_rates,
     make_trial,
     mean_over_windows,
-    mix_real_and_simulated,
     score_trace,
 )
 
@@ -123,16 +122,3 @@ def test_samples_behind_the_last_window_take_its_score():
 def test_a_trace_shorter_than_a_window_is_refused(refused):
     with refused("9 samples"):
         score_trace(Largest(), np.zeros(9, np.float32), window=10, stride=4)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.05, 0.25, 1.0])
-def test_a_mixture_holds_its_share_of_real_windows(share):
-    made = mix_real_and_simulated(np.zeros((40, 3)), np.ones((40, 3)), share, np.random.default_rng(0))
-    assert made.shape == (40, 3) and made[:, 0].sum() == round(40 * share)
-
-
-def test_a_mixture_of_unequal_numbers_is_refused(refused):
-    with refused("40 and 39"):
-        mix_real_and_simulated(np.zeros((40, 3)), np.ones((39, 3)), 0.5, np.random.default_rng(0))
-    with refused("1.5"):
-        mix_real_and_simulated(np.zeros((4, 3)), np.ones((4, 3)), 1.5, np.random.default_rng(0))
