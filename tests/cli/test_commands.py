@@ -15,7 +15,7 @@ import pytest
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
-from enhsim_tf.cli.options import cleaning_options, matching_channels
+from enhsim_tf.cli.options import cleaning_options, model_names
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
@@ -291,10 +291,10 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
 
 
 def test_columns_without_a_simulator_are_left_out_and_none_is_refused(refused, capsys):
-    series, models = {"volts": 1, "note": 2}, {"volts": Path("a"), "amps": Path("b")}
-    assert matching_channels(series, models) == {"volts": 1} and "left out: note" in capsys.readouterr().out
+    assert model_names(["volts", "note"], ["volts", "amps"]) == {"volts": "volts"}
+    assert "left out: note" in capsys.readouterr().out
     with refused("volts, amps", "note"):
-        matching_channels({"note": 2}, models)
+        model_names(["note", "other"], ["volts", "amps"])
 
 
 def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):

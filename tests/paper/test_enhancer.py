@@ -39,8 +39,8 @@ def training(settings, num_windows=300):
 
 
 def test_the_network_learns_a_map_from_noisy_targets():
-    settings = tiny_settings(window=8, hidden_units=64, epochs=20, learning_rate=0.01)
-    source, target = training(settings)
+    settings = tiny_settings(window=8, filter_width=8, hidden_units=64, epochs=20, learning_rate=0.01)
+    source, target = training(settings, 900)
     network = build_enhancer(settings)
     history = train_enhancer(network, source, target, settings, (source[:50], target[:50]))
     assert len(history["loss"]) == len(history["val_loss"]) == 20
@@ -51,7 +51,7 @@ def test_the_network_learns_a_map_from_noisy_targets():
 def test_fast_training_gives_the_weights_of_plain_keras():
     trained = []
     for fast in (False, True):
-        settings = tiny_settings(window=10, hidden_units=1_200, epochs=2, fast=fast)  # a kernel of 5.8 MB is trained by blocks
+        settings = tiny_settings(window=10, filter_width=10, hidden_units=1_200, epochs=2, fast=fast)  # a kernel of 5.8 MB is trained by blocks
         source, target = training(settings, 45)
         network = build_enhancer(settings)
         assert is_wide_dense_stack(network)
