@@ -26,18 +26,21 @@ class Ridge:
         weights: Change of each output for a change of each input, float64 of shape `(samples * columns, outputs)`.
         input_mean: Mean training window, float64 of shape `(samples, columns)`.
         target_mean: Mean training target, float64 of shape `(outputs,)`.
-        penalty: The chosen penalty.
+        penalty: The chosen penalty; of several channels, the smallest.
         penalties: The penalties that were tried, shape `(penalties,)`.
         errors: Cross-validated error of each penalty: root-mean-square error divided by the standard deviation of the
-            targets about their mean window, shape `(penalties,)`. NaN if there was a single window.
+            targets about their mean window, shape `(penalties,)`; of several channels, shape `(penalties, channels)`. NaN if there was
+            a single window.
+        factors: For few windows with many columns, two matrices whose product is `weights`, with fewer numbers; otherwise None.
     """
 
-    weights: np.ndarray
+    weights: np.ndarray | None
     input_mean: np.ndarray
     target_mean: np.ndarray
     penalty: float
     penalties: np.ndarray
     errors: np.ndarray
+    factors: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def is_at_edge(self) -> bool:
@@ -62,7 +65,9 @@ class Ridge:
                 f"Expected windows of (samples, columns) {self.input_mean.shape}, as in training. Received: {windows.shape[1:]}. "
                 "Cut windows of the same length with the same columns."
             )
-        return (self.target_mean + _flat(windows - self.input_mean) @ self.weights).astype(np.float32)
+        rows = _flat(windows - self.input_mean)
+        mapped = rows @ self.weights if self.factors is None else rows @ self.factors[0] @ self.factors[1]
+        return (self.target_mean + mapped).astype(np.float32)
 
 
 def fit_ridge(
@@ -72,8 +77,9 @@ def fit_ridge(
     *,
     penalties: Sequence[float] = PENALTIES,
     num_blocks: int = 5,
+    num_channels: int = 1,
 ) -> Ridge:
-    """Fits ridge regression, with the penalty chosen by cross-validation over blocks of time.
+    """Fits ridge regression, with a penalty for each channel chosen by cross-validation over blocks of time.
 
     Inputs are centred per sample and divided by one standard deviation per column, so that the result does not depend on
     units. Samples are not scaled one by one, because that would blow up the rounding errors of constant ones. Among penalties
@@ -87,6 +93,7 @@ def fit_ridge(
         penalties: Penalties to choose from. The sum of squared weights of the standardised inputs is multiplied by them and
             added to the sum of squared errors.
         num_blocks: Number of blocks of time.
+        num_channels: Number of channels of the targets. Output `o` belongs to channel `o % num_channels`.
 
     Returns:
         The regression, fitted to all windows.
@@ -98,19 +105,33 @@ def fit_ridge(
     penalties = np.asarray(penalties, np.float64)
     if penalties.ndim != 1 or not len(penalties) or not (np.isfinite(penalties) & (penalties > 0)).all():
         raise InputError(f"Expected penalties above 0. Received: {penalties.tolist()}. Leave `penalties` at its default.")
-    squares, power = np.zeros(len(penalties)), 0.0
+    squares, power = np.zeros((len(penalties), num_channels)), np.zeros(num_channels)
     for training, held_out in time_blocks(starts, num_blocks, windows.shape[1]):
         solution = _Solution(windows[training], targets[training])
         inner, centred = solution.project(windows[held_out]), targets[held_out] - solution.target_mean
-        power += float(np.sum((targets[held_out] - targets.mean(axis=0)) ** 2))
+        power += _by_channel((targets[held_out] - targets.mean(axis=0)) ** 2, num_channels)
         for number, penalty in enumerate(penalties):
-            squares[number] += np.sum((centred - inner @ solution.coefficients(penalty)) ** 2)
+            squares[number] += _by_channel((centred - inner @ solution.coefficients(penalty)) ** 2, num_channels)
     is_known = len(windows) > 1
-    errors = np.sqrt(squares / (power or 1.0)) if is_known else np.full(len(penalties), np.nan)
-    best = errors == errors.min() if is_known else np.ones(len(penalties), bool)
-    penalty = float(penalties[best].max())
-    solution = _Solution(windows, targets)
-    return Ridge(solution.weights(penalty), solution.input_mean, solution.target_mean, penalty, penalties, errors)
+    errors = np.sqrt(squares / np.where(power > 0, power, 1.0)) if is_known else np.full(squares.shape, np.nan)
+    chosen = [penalties[found == found.min()].max() if is_known else penalties.max() for found in errors.T]
+    solution, each = _Solution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
+    left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
+    is_low_rank = left.size + right.size < len(left) * right.shape[1]
+    return Ridge(
+        None if is_low_rank else left @ right,
+        solution.input_mean,
+        solution.target_mean,
+        float(min(chosen)),
+        penalties,
+        errors[:, 0] if num_channels == 1 else errors,
+        (left, right) if is_low_rank else None,
+    )
+
+
+def _by_channel(squares: np.ndarray, num_channels: int) -> np.ndarray:
+    """Sums squares of outputs, shape `(windows, outputs)`, over windows and samples; returns shape `(channels,)`."""
+    return squares.sum(axis=0).reshape(-1, num_channels).sum(axis=0)
 
 
 def nearest_windows(train_inputs: np.ndarray, train_targets: np.ndarray, inputs: np.ndarray, num_neighbours: int = 30) -> np.ndarray:
@@ -203,11 +224,8 @@ class _Solution:
     def project(self, windows: np.ndarray) -> np.ndarray:
         return self._standardised(windows) @ self.basis
 
-    def coefficients(self, penalty: float) -> np.ndarray:
-        return self.moments / (np.maximum(self.values, 0.0) + penalty)[:, None]
-
-    def weights(self, penalty: float) -> np.ndarray:
-        return self.basis @ self.coefficients(penalty) / self.scale[:, None]
+    def coefficients(self, penalty: float | np.ndarray) -> np.ndarray:
+        return self.moments / (np.maximum(self.values, 0.0)[:, None] + penalty)
 
 
 def _neighbours(train: np.ndarray, windows: np.ndarray, number: int) -> Iterator[tuple[slice, np.ndarray]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.noise.names import CANDIDATES
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 
 _MOST_ORDER = 200  # of the autoregression
@@ -27,7 +27,7 @@ def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.n
 
     Args:
         name: One of `names.CANDIDATES`.
-        noise: Windows of noise of shape `(windows, samples)`, in the unit of the telemetry.
+        noise: Windows of noise of shape `(windows, samples, channels)`, or without the last axis, in the unit of the telemetry.
         signal: The enhanced signal below them, of the same shape.
         starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
 
@@ -37,11 +37,12 @@ def fit_candidate(name: str, noise: np.ndarray, signal: np.ndarray, starts: np.n
     window = noise.shape[1]
     match name:
         case "none":
-            return GaussianNoise(0.0, window)
+            return GaussianNoise(0.0 if noise.ndim == 2 else np.zeros((noise.shape[2],) * 2), window)
         case "gaussian":
             return GaussianNoise.fit(noise)
         case "autoregression":
-            return GaussianAutoregression.fit(noise, min(_MOST_ORDER, window - 1))
+            kind = GaussianAutoregression if noise.ndim == 2 else JointAutoregression
+            return kind.fit(noise, min(_MOST_ORDER, window - 1))
         case "residual windows":
             return WindowBootstrap.fit(noise, starts)
         case "matched residual windows":

@@ -8,7 +8,7 @@ import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.noise.candidates import NoiseModel
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 
 
@@ -36,11 +36,12 @@ def state_of(model: NoiseModel) -> NoiseState:
     """
     match model:
         case GaussianNoise():
-            kind = "gaussian" if model.standard_deviation else "none"
-            return NoiseState({"kind": kind, "window": model.window}, {"standard_deviation": np.array(model.standard_deviation)})
-        case GaussianAutoregression():
-            settings = {"kind": "autoregression", "window": model.window, "innovation_sd": model.innovation_sd}
-            return NoiseState(settings, {"coefficients": model.coefficients})
+            return NoiseState({"kind": "gaussian" if model.root.any() else "none", "window": model.window}, {"root": model.root})
+        case JointAutoregression():
+            settings = {"kind": "autoregression", "window": model.channels[0].window}
+            settings["innovation_sd"] = [each.innovation_sd for each in model.channels]
+            arrays = {f"coefficients_{number}": each.coefficients for number, each in enumerate(model.channels)}
+            return NoiseState(settings, arrays | {"correlation": model.correlation})
         case WindowBootstrap() | MatchedWindowBootstrap():
             kind = "residual windows" if isinstance(model, WindowBootstrap) else "matched residual windows"
             arrays = {name: getattr(model, name, None) for name in ("windows", "signals", "starts")}
@@ -62,9 +63,12 @@ def model_from(settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) ->
         raise ValueError("noise that is not finite")
     match settings["kind"]:
         case "none" | "gaussian":
-            return GaussianNoise(abs(float(arrays["standard_deviation"])), settings["window"])
+            return GaussianNoise(arrays["root"], settings["window"])
         case "autoregression":
-            return GaussianAutoregression(arrays["coefficients"], _positive(settings["innovation_sd"]), settings["window"])
+            scales = [_positive(each) for each in settings["innovation_sd"]]
+            orders = (arrays[f"coefficients_{number}"] for number in range(len(scales)))
+            channels = [GaussianAutoregression(each, scale, settings["window"]) for each, scale in zip(orders, scales, strict=True)]
+            return JointAutoregression(channels, arrays["correlation"])
         case "residual windows":
             return WindowBootstrap(arrays["windows"], arrays.get("starts"))
         case "matched residual windows":

@@ -8,31 +8,78 @@ from enhsim_tf.common.errors import InputError
 
 
 class GaussianNoise:
-    """White Gaussian noise with the standard deviation of the real noise, the simplest baseline.
+    """White Gaussian noise with the standard deviations of the real noise and its correlation between channels, the simplest baseline.
 
     Args:
-        standard_deviation: Standard deviation, in the unit of the telemetry.
+        root: A root of the covariance of the channels, `root @ root.T`, shape `(channels, channels)`; or the standard deviation of
+            a single channel.
         window: Number of samples in a window.
     """
 
-    def __init__(self, standard_deviation: float, window: int):
-        self.standard_deviation, self.window = float(standard_deviation), int(window)
+    def __init__(self, root: np.ndarray | float, window: int):
+        self.root, self.window = np.asarray(root, np.float64), int(window)
 
     @classmethod
     def fit(cls, windows: np.ndarray) -> "GaussianNoise":
-        """Fits to noise windows of shape `(windows, samples)`."""
-        return cls(np.std(windows, dtype=np.float64), windows.shape[1])
+        """Fits to windows of noise of shape `(windows, samples, channels)`, or without the last axis."""
+        if windows.ndim == 2:
+            return cls(np.std(windows, dtype=np.float64), windows.shape[1])
+        rows = windows.reshape(-1, windows.shape[2])
+        return cls(_root(np.cov(rows, rowvar=False, bias=True).reshape(rows.shape[1], -1)), windows.shape[1])
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples)`. The signal has no effect."""
+        """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no effect."""
         return self._draw((number, self.window), rng)
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples,)`."""
+        """Draws one series of any length, float32 of shape `(num_samples, channels)`."""
         return self._draw((1, num_samples), rng)[0]
 
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-        return (self.standard_deviation * rng.standard_normal(shape)).astype(np.float32)
+        if self.root.ndim == 0:
+            return (self.root * rng.standard_normal(shape)).astype(np.float32)
+        return (rng.standard_normal((*shape, len(self.root))) @ self.root.T).astype(np.float32)
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """Returns the symmetric root of a covariance, which may be singular."""
+    values, vectors = np.linalg.eigh(covariance)
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+
+class JointAutoregression:
+    """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with correlated innovations.
+
+    Args:
+        channels: The autoregression of each channel.
+        correlation: Correlation of their innovations, shape `(channels, channels)`.
+    """
+
+    def __init__(self, channels: "Sequence[GaussianAutoregression]", correlation: np.ndarray):
+        self.channels, self.correlation = tuple(channels), np.asarray(correlation, np.float64)
+        self._root = _root(self.correlation)
+
+    @classmethod
+    def fit(cls, windows: np.ndarray, max_order: int = 40) -> "JointAutoregression":
+        """Fits to windows of noise of shape `(windows, samples, channels)`; see `GaussianAutoregression.fit`."""
+        from scipy.signal import lfilter
+
+        found = [GaussianAutoregression.fit(windows[:, :, channel], max_order) for channel in range(windows.shape[2])]
+        most = max(len(each.coefficients) for each in found)
+        left = [lfilter([1.0, *-each.coefficients], [1.0], windows[:, :, k], axis=1)[:, most:].ravel() for k, each in enumerate(found)]
+        return cls(found, np.corrcoef(left).reshape(len(found), -1))
+
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no effect."""
+        return self._draw((number, self.channels[0].window), rng)
+
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws one series of any length, float32 of shape `(num_samples, channels)`."""
+        return self._draw((1, num_samples), rng)[0]
+
+    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
+        draws = rng.standard_normal((*shape, len(self.channels))) @ self._root.T
+        return np.stack([each.filtered(draws[:, :, channel]) for channel, each in enumerate(self.channels)], axis=2)
 
 
 class GaussianAutoregression:
@@ -100,9 +147,13 @@ class GaussianAutoregression:
         return self._draw((1, num_samples), rng)[0]
 
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
+        return self.filtered(rng.standard_normal(shape))
+
+    def filtered(self, draws: np.ndarray) -> np.ndarray:
+        """Returns the noise whose innovations are `draws`, standard normal of shape `(windows, samples)`; float32 of that shape."""
         from scipy.signal import lfilter
 
-        draws = rng.standard_normal(shape)
+        shape = draws.shape
         innovations, whitening = self.innovation_sd * draws, np.concatenate([[1.0], -self.coefficients])
         start = np.zeros((shape[0], min(len(self.coefficients), shape[1])))
         for place in range(start.shape[1]):  # each of the first samples is predicted from all earlier ones

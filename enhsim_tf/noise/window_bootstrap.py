@@ -23,9 +23,10 @@ class WindowBootstrap:
     Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
     and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
     because two windows that are drawn at random are uncorrelated, or nearly so if there are few. The mean of all windows is not faded.
+    All channels are drawn together, so their cross-correlation is that of the real noise.
 
     Args:
-        windows: Windows of real noise, float32 of shape `(windows, samples)`.
+        windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
         starts: First sample of each window, shape `(windows,)`. None: no two windows overlap.
 
     Raises:
@@ -37,17 +38,16 @@ class WindowBootstrap:
 
     @classmethod
     def fit(cls, windows: np.ndarray, starts: np.ndarray | None = None) -> "WindowBootstrap":
-        """Stores noise windows of shape `(windows, samples)`, and where they start."""
+        """Stores windows of noise, and where they start."""
         return cls(windows, starts)
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows, float32 of shape `(number, samples)`. The signal has no effect."""
-        draws, everything = _SparingDraws(self, rng), np.arange(len(self.windows))
-        return self.windows[[draws.draw(everything) for _ in range(number)]]
+        """Draws windows, float32 of shape `(number, samples, channels)`. The signal has no effect."""
+        return self.windows[_draw_sparingly(_Sparing(self.starts, *self.windows.shape[:2]), number, rng)]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws a series of any length without seams, float32 of shape `(num_samples,)`. The signal has no effect."""
-        mean = float(np.mean(self.windows, dtype=np.float64))
+        """Draws a series of any length without seams, float32 of shape `(num_samples, channels)`. The signal has no effect."""
+        mean = np.mean(self.windows, axis=(0, 1), dtype=np.float64)
         return _cross_faded(self.windows.shape[1], num_samples, rng, lambda starts: (self.generate(len(starts), rng), mean))
 
 
@@ -65,7 +65,7 @@ class MatchedWindowBootstrap:
     up to one, and the rest as by `WindowBootstrap`.
 
     Args:
-        windows: Windows of real noise, float32 of shape `(windows, samples)`.
+        windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
         signals: Means of the signal below each window over segments, shape `(windows, segments)`; see `fit`.
         starts: First sample of each window, shape `(windows,)`; see `WindowBootstrap`.
 
@@ -75,13 +75,13 @@ class MatchedWindowBootstrap:
 
     def __init__(self, windows: np.ndarray, signals: np.ndarray, starts: np.ndarray | None = None):
         (self.windows, self.starts), self.signals = _checked(windows, starts), np.asarray(signals, np.float32)
-        expected = (len(self.windows), min(_NUM_SEGMENTS, self.windows.shape[1]))
+        expected = (len(self.windows), min(_NUM_SEGMENTS, self.windows.shape[1]) * math.prod(self.windows.shape[2:]))
         if self.signals.shape != expected or not np.isfinite(self.signals).all():
             raise InputError(f"Expected the finite signal of each window, shape {expected}. Received: shape {self.signals.shape}.")
 
     @classmethod
     def fit(cls, windows: np.ndarray, signal: np.ndarray, starts: np.ndarray | None = None) -> "MatchedWindowBootstrap":
-        """Stores noise windows, the signal below them, both of shape `(windows, samples)`, and where they start."""
+        """Stores windows of noise, the signal below them, of the same shape, and where they start."""
         return cls(windows, _segment_means(signal, np.shape(windows)), starts)
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
@@ -90,10 +90,10 @@ class MatchedWindowBootstrap:
         Args:
             number: Number of windows.
             rng: Random number generator.
-            signal: The signal that the noise is added to, shape `(number, samples)`, in the unit of the fit.
+            signal: The signal that the noise is added to, shape `(number, samples, channels)`, in the unit of the fit.
 
         Returns:
-            float32 array of shape `(number, samples)`.
+            float32 array of shape `(number, samples, channels)`.
 
         Raises:
             InputError: If there is no finite signal of this shape.
@@ -107,14 +107,14 @@ class MatchedWindowBootstrap:
         Args:
             num_samples: Length of the series.
             rng: Random number generator.
-            signal: The signal that the noise is added to, shape `(num_samples,)`, in the unit of the fit.
+            signal: The signal that the noise is added to, shape `(num_samples, channels)`, in the unit of the fit.
 
         Returns:
-            float32 array of shape `(num_samples,)`.
+            float32 array of shape `(num_samples, channels)`.
         """
         window, signal = self.windows.shape[1], np.asarray(signal, np.float32)
-        if signal.shape != (num_samples,):
-            raise InputError(f"Expected the enhanced signal of shape {(num_samples,)}, which this noise follows. Received: {signal.shape}.")
+        if signal.shape != (num_samples, *self.windows.shape[2:]):
+            raise InputError(f"Expected the enhanced signal of shape {(num_samples, *self.windows.shape[2:])}, which this noise follows. Received: {signal.shape}.")
 
         def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)]
@@ -126,55 +126,79 @@ class MatchedWindowBootstrap:
         self, signal: np.ndarray | None, number: int, rng: np.random.Generator, with_mean: bool
     ) -> tuple[np.ndarray, np.ndarray | float]:
         """Draws windows, and computes the mean of the windows that each was drawn from."""
-        from sklearn.metrics.pairwise import euclidean_distances
-
-        window, draws = self.windows.shape[1], _SparingDraws(self, rng)
-        wanted = _segment_means(signal, (number, window)).astype(np.float64)
+        shape, sparing = self.windows.shape[1:], _Sparing(self.starts, *self.windows.shape[:2])
+        wanted = _segment_means(signal, (number, *shape)).astype(np.float64)
         centre = self.signals.mean(axis=0, dtype=np.float64)
         known, wanted = self.signals - centre, wanted - centre  # smaller numbers, smaller rounding errors
+        if len(shape) == 2:  # each channel in its own unit
+            spread = np.std(known.reshape(-1, shape[1]), axis=0)
+            unit = np.tile(np.where(spread > 0, spread, 1.0), known.shape[1] // shape[1])
+            known, wanted = known / unit, wanted / unit
         nearest = math.ceil(math.sqrt(len(known)))
-        equal = _EQUAL**2 * known.shape[1] * np.var(self.signals, dtype=np.float64)
-        drawn, means = np.empty((number, window), np.float32), np.empty((number if with_mean else 0, window), np.float32)
+        equal = _EQUAL**2 * known.shape[1] * np.var(self.signals, dtype=np.float64) if len(shape) == 1 else _EQUAL**2 * known.shape[1]
+        length, flat = np.einsum("ij,ij->i", known, known), self.windows.reshape(len(known), -1)
+        drawn, means = np.empty((number, *shape), np.float32), np.empty((number if with_mean else 0, *shape), np.float32)
         for begin in range(0, number, max(1, _BATCH // len(known))):
             rows = slice(begin, begin + max(1, _BATCH // len(known)))
-            apart = euclidean_distances(wanted[rows], known, squared=True)
+            apart = np.maximum(length - 2 * wanted[rows] @ known.T + np.einsum("ij,ij->i", wanted[rows], wanted[rows])[:, None], 0.0)
             reach = np.maximum(np.partition(apart, nearest - 1, axis=1)[:, nearest - 1], equal)
             is_near = apart <= reach[:, None]
-            drawn[rows] = self.windows[[draws.draw(np.flatnonzero(near)) for near in is_near]]
+            drawn[rows] = self.windows[_draw_near(is_near, sparing, rng)]
             if with_mean:
-                means[rows] = (is_near.astype(np.float32) @ self.windows) / is_near.sum(axis=1, keepdims=True)
+                means[rows] = ((is_near.astype(np.float32) @ flat) / is_near.sum(axis=1, keepdims=True)).reshape(-1, *shape)
         return drawn, means if with_mean else 0.0
 
 
-class _SparingDraws:
-    """Draws windows that share no sample with those drawn before, as long as there are any.
+def _draw_near(is_near: np.ndarray, sparing: "_Sparing", rng: np.random.Generator) -> np.ndarray:
+    """Draws one of the windows that are marked in each row, one that shares no sample with those drawn before if there is one."""
+    order = rng.random(is_near.shape, np.float32)
+    chosen = np.argmax(np.where(is_near, order, -1), axis=1)
+    for row in range(len(chosen)):
+        if not sparing.is_free.any():
+            break
+        free = is_near[row] & sparing.is_free
+        if free.any():
+            chosen[row] = np.argmax(np.where(free, order[row], -1))
+            sparing.take(chosen[row])
+    return chosen
+
+
+class _Sparing:
+    """Which windows share no sample with those that were drawn before.
 
     Args:
-        noise: Its `windows` and `starts` are used.
-        rng: Draws among equals.
+        starts: First sample of each window, shape `(windows,)`; None: no two windows overlap.
+        number: Number of windows.
+        window: Length of a window in samples.
     """
 
-    def __init__(self, noise: WindowBootstrap | MatchedWindowBootstrap, rng: np.random.Generator):
-        number, window = noise.windows.shape
-        self._rng, self._is_free = rng, np.ones(number, bool)
-        starts = window * np.arange(number) if noise.starts is None else noise.starts
-        self._order = np.argsort(starts, kind="stable")
+    def __init__(self, starts: np.ndarray | None, number: int, window: int):
+        starts = window * np.arange(number) if starts is None else starts
+        self.is_free, self._order = np.ones(number, bool), np.argsort(starts, kind="stable")
         apart = ((starts - window, "right"), (starts + window, "left"))
         self._first, self._last = (np.searchsorted(starts[self._order], edge, side) for edge, side in apart)
 
-    def draw(self, candidates: np.ndarray) -> int:
-        """Draws one of the given windows, and returns its number."""
-        free = candidates[self._is_free[candidates]]
-        drawn_from = free if len(free) else candidates
-        chosen = int(drawn_from[self._rng.integers(len(drawn_from))])
-        self._is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
-        return chosen
+    def take(self, chosen: int) -> None:
+        """Notes that a window was drawn."""
+        self.is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
+
+
+def _draw_sparingly(sparing: _Sparing, number: int, rng: np.random.Generator) -> np.ndarray:
+    """Draws windows that share no sample, in random order, as long as there are any, and the others with replacement."""
+    drawn = []
+    for candidate in rng.permutation(len(sparing.is_free)).tolist():
+        if len(drawn) == number:
+            break
+        if sparing.is_free[candidate]:
+            sparing.take(candidate)
+            drawn.append(candidate)
+    return np.concatenate([np.array(drawn, np.int64), rng.integers(0, len(sparing.is_free), number - len(drawn))])
 
 
 def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
     """Returns windows of noise as float32, and where they start as integers."""
     windows = np.asarray(windows, np.float32)
-    if windows.ndim != 2 or windows.shape[0] < 1 or windows.shape[1] < 4 or not np.isfinite(windows).all():
+    if windows.ndim not in (2, 3) or windows.shape[0] < 1 or windows.shape[1] < 4 or not np.isfinite(windows).all():
         raise InputError(f"Expected finite windows of noise of at least 4 samples. Received: shape {windows.shape}. Extract noise first.")
     if starts is None:
         return windows, None
@@ -195,7 +219,8 @@ def _segment_means(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndar
     if not np.isfinite(signal).all():
         raise InputError("Expected a finite enhanced signal, which this noise follows. Received: values that are not finite.")
     edges = np.linspace(0, shape[1], min(_NUM_SEGMENTS, shape[1]) + 1).astype(int)
-    return np.add.reduceat(np.asarray(signal, np.float64), edges[:-1], axis=1).astype(np.float32) / np.diff(edges).astype(np.float32)
+    sums = np.add.reduceat(np.asarray(signal, np.float64).reshape(*shape[:2], -1), edges[:-1], axis=1)
+    return (sums / np.diff(edges)[:, None]).reshape(shape[0], -1).astype(np.float32)
 
 
 def _cross_faded(
@@ -210,7 +235,7 @@ def _cross_faded(
         draw: Draws windows, given where they begin in the series, and what neighbouring windows have in common.
 
     Returns:
-        float32 array of shape `(num_samples,)`.
+        float32 array of shape `(num_samples, channels)`.
     """
     fade = window // 4
     hop = window - fade
@@ -220,8 +245,9 @@ def _cross_faded(
     weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]])
     begin = fade + lead
     drawn, common = draw(hop * np.arange(num_windows) - begin)
+    weights = weights.reshape(-1, *[1] * (drawn.ndim - 2))
     pieces = weights * (drawn - common) + weights**2 * common  # the squares of the weights of two neighbours add up to one
-    series = np.zeros(num_windows * hop + fade)
+    series = np.zeros((num_windows * hop + fade, *drawn.shape[2:]))
     for number, piece in enumerate(pieces):
         series[number * hop : number * hop + window] += piece
     return series[begin : begin + num_samples].astype(np.float32)

@@ -1,0 +1,279 @@
+"""The candidates for the enhancer, from the coarse simulator itself to the paper's network, and the choice among them (section 2.2).
+
+The paper's network is one of several maps from coarse to realistic windows. Each is judged on blocks of time that it was not fitted to,
+from cheap to dear. The simplest one whose error is within one standard error of the best is used. A network is trained only if random
+features, which take a second, show that something beyond a linear map can be learnt, or if it is asked for.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
+from enhsim_tf.enhancer.ridge import fit_ridge
+
+_SMALL_UNITS = 256  # units of each hidden layer of the network on what ridge regression leaves
+_SMALL_RATE, _PAPER_RATE = 5e-4, 1e-3  # initial learning rates, which fall to zero along a cosine
+_BATCH_SIZE = 15  # of both networks, as in the paper
+_CLEAR = 2.0  # standard errors by which they have to be better
+_NUM_FEATURES = 300  # random rectified features that show whether a network can learn more than ridge regression
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """The error of one candidate on held-out time.
+
+    Args:
+        name: One of `CANDIDATES`.
+        error: Root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all channels.
+        standard_error: Standard error of `error`, from its variation between disjoint stretches of one window each.
+        behind: Mean squared error minus that of the best candidate, divided by the targets' variance.
+        behind_standard_error: Standard error of `behind`, from the same stretches.
+    """
+
+    name: str
+    error: float
+    standard_error: float
+    behind: float
+    behind_standard_error: float
+
+    @property
+    def is_within(self) -> bool:
+        """Whether the candidate is within one standard error of the best one."""
+        return self.behind <= self.behind_standard_error
+
+
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """The chosen enhancer.
+
+    Args:
+        enhancer: The candidate, fitted to all windows.
+        judged: The held-out error of each candidate that was tried.
+        edges: Edges of the blocks of time; the blocks of fold 0 were held out.
+        without_fold: The chosen candidate as it was judged, fitted without the held-out blocks.
+        note: Why no network was tried; empty if one was.
+    """
+
+    enhancer: Enhancer
+    judged: tuple[Judged, ...]
+    edges: np.ndarray
+    without_fold: Enhancer
+    note: str
+
+
+def choose_enhancer(
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    starts: np.ndarray,
+    wanted: str = BEST,
+    seed: int = 0,
+    epochs: int = 6,
+    on_candidate: Callable[[str], None] = lambda name: None,
+) -> Choice:
+    """Judges candidates on held-out time and fits the chosen one to all windows.
+
+    Args:
+        inputs: Coarse windows, shape `(windows, samples, columns)`.
+        targets: Telemetry windows, shape `(windows, samples, channels)`.
+        starts: First sample of each window on a common clock, shape `(windows,)`.
+        wanted: Name of a candidate to use whatever the errors are, or `best`.
+        seed: Random seed of the networks and the random features.
+        epochs: Passes of the networks over the windows.
+        on_candidate: Called with the name of each candidate before it is fitted.
+
+    Raises:
+        InputError: If the name is unknown, shapes do not match, a value is not finite, or there is too little time.
+    """
+    inputs, targets, starts = check_windows(inputs, targets, starts)
+    if wanted not in (BEST, *CANDIDATES):
+        raise InputError(f"Expected an enhancer, one of: {BEST}, {', '.join(CANDIDATES)}. Received: {wanted!r}.")
+    window = inputs.shape[1]
+    edges = block_edges(int(starts.min()), int(starts.max()) + window, window)
+    learnt, held_out = split_fold(starts, window, edges, fold=0)
+    if len(learnt) < 2 or len(held_out) < 2:
+        raise InputError(
+            f"Expected at least two training windows and two held-out windows. Received: {len(learnt)} and {len(held_out)} of {len(starts)}. "
+            "Give more windows, or longer telemetry."
+        )
+    stretches = np.unique(starts[held_out] // window, return_inverse=True)[1]
+    variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
+    variance = np.where(variance > 0, variance, 1.0)
+    fitted: dict[str, Enhancer] = {}
+    squared: dict[str, np.ndarray] = {}
+
+    def by_stretch(predicted: np.ndarray) -> np.ndarray:
+        errors = np.mean((predicted - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
+        return np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
+
+    def try_candidate(name: str) -> None:
+        on_candidate(name)
+        fitted[name] = fit_enhancer(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs)
+        squared[name] = by_stretch(fitted[name].predict(inputs[held_out]))
+
+    note = ""
+    for name in (COARSE, LEVEL_AND_GAIN, RIDGE) if wanted == BEST else [*dict.fromkeys([COARSE, RIDGE, wanted])]:
+        try_candidate(name)
+    if wanted == BEST:
+        ridge = fitted[RIDGE]
+        rest = _random_features(ridge, inputs[learnt], targets[learnt], inputs[held_out], starts[learnt], seed)
+        gain = squared[RIDGE] - by_stretch(ridge.predict(inputs[held_out]) + rest)
+        if np.mean(gain) > _CLEAR * _standard_error(gain):
+            try_candidate(RIDGE_AND_NETWORK)
+        else:
+            note = (
+                "no network was trained, because random features learn no more than ridge regression on held-out time "
+                f"(gain {np.mean(gain):.2g} ± {_standard_error(gain):.2g} of the variance)"
+            )
+    judged = judge(squared)
+    chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
+    return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs), judged, edges, fitted[chosen], note)
+
+
+def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
+    """Compares candidates by their errors on the same held-out stretches of time.
+
+    Args:
+        squared: For each candidate, the mean squared error on each stretch, divided by the targets' variance, shape `(stretches,)`.
+
+    Returns:
+        The comparison of each candidate, in the given order.
+    """
+    best = min(squared, key=lambda name: np.mean(squared[name]))
+    judged = []
+    for name, errors in squared.items():
+        error, apart = float(np.sqrt(np.mean(errors))), errors - squared[best]
+        spread = _standard_error(errors) / (2 * error) if error else 0.0  # the derivative of the root
+        judged.append(Judged(name, error, spread, float(np.mean(apart)), _standard_error(apart)))
+    return tuple(judged)
+
+
+def _standard_error(values: np.ndarray) -> float:
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+
+
+def fit_enhancer(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray, seed: int = 0, epochs: int = 6) -> Enhancer:
+    """Fits one candidate to all of the given windows.
+
+    Args:
+        name: One of `CANDIDATES`.
+        inputs: Coarse windows, shape `(windows, samples, columns)`.
+        targets: Telemetry windows, shape `(windows, samples, channels)`.
+        starts: First sample of each window, shape `(windows,)`.
+        seed: Random seed of the networks.
+        epochs: Passes of the networks over the windows.
+
+    Raises:
+        InputError: If the name is unknown, shapes do not match, or a value is not finite.
+    """
+    inputs, targets, starts = check_windows(inputs, targets, starts)
+    (_, window, columns), channels = inputs.shape, targets.shape[2]
+    centre, size = inputs.mean(axis=(0, 1), dtype=np.float64), (window, columns, channels)
+    if name in (COARSE, LEVEL_AND_GAIN):
+        return _keeping_the_shape(name, inputs, targets, centre, size)
+    if name not in CANDIDATES:
+        raise InputError(f"Expected an enhancer, one of: {', '.join(CANDIDATES)}. Received: {name!r}.")
+    scale, unit = (_deviations(each) for each in (inputs, targets))
+    middle = targets.mean(axis=(0, 1), dtype=np.float64)
+    rows, wanted = ((inputs - centre) / scale).astype(np.float32), ((targets - middle) / unit).astype(np.float32)
+    flat, outputs = rows.reshape(len(rows), -1), wanted.reshape(len(wanted), -1)
+    column_scale, output_unit = np.tile(scale, window), np.tile(unit, window)
+    linear, factors, layers = np.zeros(outputs.shape[1]), (), ()
+    left = outputs
+    if name != NETWORK:
+        ridge = fit_ridge(rows, outputs, starts, num_channels=channels)
+        maps = [ridge.weights] if ridge.factors is None else list(ridge.factors)
+        moved = ridge.input_mean.ravel()
+        for each in maps:
+            moved = moved @ each
+        linear = ridge.target_mean - moved
+        left = outputs - ridge.predict(rows)
+        maps[0] = maps[0] / column_scale[:, None]
+        maps[-1] = maps[-1] * output_unit
+        factors = tuple(each.astype(np.float32) for each in maps)
+    if name != RIDGE:
+        spread = float(np.std(left, dtype=np.float64)) or 1.0
+        layers = _train(name, flat, (left / spread).astype(np.float32), window * channels, seed, epochs)
+        kernel, bias = layers[-1]
+        layers[-1] = (kernel * (spread * output_unit), bias * (spread * output_unit))
+        layers[0] = (layers[0][0] / column_scale[:, None], layers[0][1])
+        layers = tuple((kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers)
+        if not all(np.isfinite(each).all() for layer in layers for each in layer):
+            raise InputError(
+                "Expected telemetry from which the enhancer can learn. Received: a training that diverged. "
+                "Look for values far from all others, or use --enhancer ridge."
+            )
+    bias = (np.tile(middle, window) + output_unit * linear).astype(np.float32)
+    return Enhancer(name, *size, centre.astype(np.float32), bias, factors, layers)
+
+
+def _keeping_the_shape(name: str, inputs: np.ndarray, targets: np.ndarray, centre: np.ndarray, size: tuple[int, int, int]) -> Enhancer:
+    """Returns the two simplest candidates: the most similar coarse column of each channel, unchanged or with a level and a gain."""
+    centred, middle = inputs - centre, targets.mean(axis=(0, 1), dtype=np.float64)
+    covariance = np.einsum("wsk,wsc->ck", centred, targets - middle)
+    power = np.einsum("wsk,wsk->k", centred, centred)
+    safe = np.where(power > 0, power, 1.0)
+    column = np.argmax(covariance**2 / safe, axis=1)
+    gain = covariance[np.arange(len(column)), column] / safe[column] if name == LEVEL_AND_GAIN else np.ones(len(column))
+    level = middle if name == LEVEL_AND_GAIN else centre[column]
+    return Enhancer(
+        name, *size, centre.astype(np.float32), np.tile(level, size[0]).astype(np.float32), main=(column, gain.astype(np.float32))
+    )
+
+
+def _train(name: str, rows: np.ndarray, wanted: np.ndarray, outputs: int, seed: int, epochs: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Trains the paper's network, or a small one on what ridge regression leaves; returns kernel and bias of each layer."""
+    from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.keras_tools.training import dense_stack, fit_windows
+
+    units = (outputs, 3_200, 3_200, outputs) if name == NETWORK else (_SMALL_UNITS, _SMALL_UNITS, outputs)
+    network = dense_stack(rows.shape[1], units, seed, "enhancer")
+    rate = _PAPER_RATE if name == NETWORK else _SMALL_RATE
+    falling = keras.optimizers.schedules.CosineDecay(rate, epochs * -(-len(rows) // _BATCH_SIZE))
+    fit_windows(network, rows, wanted, epochs, _BATCH_SIZE, seed, falling, verbose=0)
+    return [tuple(layer.get_weights()) for layer in network.layers]
+
+
+def _random_features(
+    ridge: Enhancer, inputs: np.ndarray, targets: np.ndarray, held_out: np.ndarray, starts: np.ndarray, seed: int
+) -> np.ndarray:
+    """Predicts on held-out windows, by ridge regression on random rectified features, what the first regression leaves."""
+    rng = np.random.default_rng([seed, 11])
+    scale = _deviations(inputs)
+    flat, other = (((each - ridge.centre) / scale).reshape(len(each), -1) for each in (inputs, held_out))
+    kernel = rng.standard_normal((flat.shape[1], _NUM_FEATURES)) / np.sqrt(flat.shape[1])
+    shift = rng.uniform(-1, 1, _NUM_FEATURES)
+    left = targets - ridge.predict(inputs)
+    fitted = fit_ridge(
+        np.maximum(flat @ kernel + shift, 0)[:, None, :], left.reshape(len(left), -1), starts, num_channels=targets.shape[2]
+    )
+    return fitted.predict(np.maximum(other @ kernel + shift, 0)[:, None, :]).reshape(len(held_out), *targets.shape[1:])
+
+
+def _deviations(windows: np.ndarray) -> np.ndarray:
+    """Standard deviation of each column, 1 where it is only rounding, shape `(columns,)`."""
+    deviation = np.std(windows, axis=(0, 1), dtype=np.float64)
+    return np.where(deviation > 1e-6 * np.abs(windows).max(axis=(0, 1), initial=0), deviation, 1.0)
+
+
+def check_windows(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Checks training windows and adds the axis of columns or channels if it is missing.
+
+    Raises:
+        InputError: If the shapes do not match, there is no window, or a value is not finite.
+    """
+    inputs, targets, starts = (np.asarray(each) for each in (inputs, targets, starts))
+    inputs, targets = (each[:, :, None] if each.ndim == 2 else each for each in (inputs, targets))
+    shapes = inputs.ndim == targets.ndim == 3 and inputs.shape[:2] == targets.shape[:2] and starts.shape == inputs.shape[:1]
+    if not (shapes and inputs.size and targets.size):
+        raise InputError(
+            "Expected inputs of shape (windows, samples, columns), targets (windows, samples, channels) and starts (windows,). "
+            f"Received: {inputs.shape}, {targets.shape}, {starts.shape}."
+        )
+    if not (np.isfinite(inputs).all() and np.isfinite(targets).all()):
+        raise InputError("Expected finite windows. Received: NaN or infinite values. Fill or cut them.")
+    return inputs, targets, starts
