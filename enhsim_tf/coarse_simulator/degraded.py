@@ -31,6 +31,7 @@ class Degraded:
         mode: One of `MODES`: stuck, drift, gain_loss, friction, dropout, period_change.
         severity: Severity from 0 to 1. At 0 the signal is bit-identical to the nominal one.
         onset: Start of the degradation, as a fraction of the window or series: at least 0 and less than 1.
+        channel: The only channel that is degraded; None for all.
 
     Raises:
         InputError: If the mode is unknown or a number is out of range.
@@ -39,6 +40,7 @@ class Degraded:
     mode: str
     severity: float = 0.5
     onset: float = 0.25
+    channel: str | None = None
 
     def __post_init__(self):
         if self.mode not in MODES:

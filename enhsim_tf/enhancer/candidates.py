@@ -248,9 +248,7 @@ def _random_features(
     kernel = rng.standard_normal((flat.shape[1], _NUM_FEATURES)) / np.sqrt(flat.shape[1])
     shift = rng.uniform(-1, 1, _NUM_FEATURES)
     left = targets - ridge.predict(inputs)
-    fitted = fit_ridge(
-        np.maximum(flat @ kernel + shift, 0)[:, None, :], left.reshape(len(left), -1), starts, num_channels=targets.shape[2]
-    )
+    fitted = fit_ridge(np.maximum(flat @ kernel + shift, 0)[:, None, :], left.reshape(len(left), -1), starts, num_channels=targets.shape[2])
     return fitted.predict(np.maximum(other @ kernel + shift, 0)[:, None, :]).reshape(len(held_out), *targets.shape[1:])
 
 

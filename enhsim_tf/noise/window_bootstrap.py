@@ -114,7 +114,9 @@ class MatchedWindowBootstrap:
         """
         window, signal = self.windows.shape[1], np.asarray(signal, np.float32)
         if signal.shape != (num_samples, *self.windows.shape[2:]):
-            raise InputError(f"Expected the enhanced signal of shape {(num_samples, *self.windows.shape[2:])}, which this noise follows. Received: {signal.shape}.")
+            raise InputError(
+                f"Expected the enhanced signal of shape {(num_samples, *self.windows.shape[2:])}, which this noise follows. Received: {signal.shape}."
+            )
 
         def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)]

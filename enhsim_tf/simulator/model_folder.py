@@ -7,7 +7,7 @@ from pathlib import Path
 
 from enhsim_tf.common.atomic_files import encode_name
 from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.enhanced_simulator.saving import MANIFEST, is_foreign
+from enhsim_tf.simulator.saving import MANIFEST, is_foreign
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:

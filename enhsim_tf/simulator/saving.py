@@ -1,8 +1,6 @@
 """Saves and loads trained models: `arrays.npz`, `settings.json`, and `manifest.json` with the format and the checksums of both.
 
-There are two kinds of model: simulators of square waves, and models of recorded runs (`runs`). Of both, everything with more than a
-few numbers is an array: the weights of the enhancer, the noise and, of a run, its values and its range. No code is saved: networks
-are built again from the shapes of their weights.
+Everything with more than a few numbers is an array. No code is saved.
 """
 
 import os
@@ -18,26 +16,18 @@ from enhsim_tf.common.size_limits import READ_ERRORS, load_npz, read_json
 
 MANIFEST, SETTINGS, _ARRAYS = "manifest.json", "settings.json", "arrays.npz"
 MOST_SETTINGS = 50_000_000  # maximum bytes of a JSON file; a usual one has about 10,000
-_MOST_BYTES = 2**28  # maximum size of all arrays; the weights of the paper's enhancer are 55 MB
-_NUMBER = "2"  # of the format
+_MOST_BYTES = 2**28  # maximum size of all arrays; the weights of the paper's network are 55 MB
+_NUMBER = "3"  # of the format
 _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whatever its format
-WAVES_FORMAT, RUNS_FORMAT = _FAMILY + _NUMBER, f"{_FAMILY}runs-{_NUMBER}"
-_KINDS = {
-    WAVES_FORMAT: "a simulator of square waves, for --windows or --continuous",
-    RUNS_FORMAT: "a model of recorded runs, for --coarse",
-}
 
 
-def write_saved(
-    folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any], form: str = WAVES_FORMAT
-) -> None:
+def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> None:
     """Writes a model to a folder atomically: if a step fails, the folder is left unchanged.
 
     Args:
         folder: The folder. A model that was saved there before is replaced.
         arrays: For each part of the model, such as `enhancer`, its arrays by name.
         settings: All other settings, in plain JSON types.
-        form: The format.
 
     Raises:
         InputError: If the folder contains something other than a saved model, or if a number is not finite; it is left unchanged.
@@ -56,7 +46,9 @@ def write_saved(
                 f"Expected a simulator whose numbers are finite. Received: {', '.join(bad)} with NaN or infinity. It was not saved. Fit it again."
             )
         np.savez(temporary / _ARRAYS, **{f"{part}/{name}": each for part, named in arrays.items() for name, each in named.items()})
-        write_json(temporary / MANIFEST, {"format": form, "sha256": {name: sha256(temporary / name) for name in (_ARRAYS, SETTINGS)}})
+        write_json(
+            temporary / MANIFEST, {"format": _FAMILY + _NUMBER, "sha256": {name: sha256(temporary / name) for name in (_ARRAYS, SETTINGS)}}
+        )
 
 
 def is_foreign(folder: Path) -> bool:
@@ -72,17 +64,11 @@ def _beginning_of(path: Path) -> bytes:
         return file.read(1_000)
 
 
-def is_run_model(folder: str | os.PathLike) -> bool:
-    """Whether a folder holds a model of recorded runs, by the format in its manifest."""
-    return _json_of(Path(folder), MANIFEST).get("format") == RUNS_FORMAT
-
-
-def check_saved(folder: str | os.PathLike, form: str = WAVES_FORMAT) -> None:
+def check_saved(folder: str | os.PathLike) -> None:
     """Verifies the checksums of a saved model without loading it.
 
     Args:
         folder: The folder.
-        form: The expected format.
 
     Raises:
         InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
@@ -90,10 +76,8 @@ def check_saved(folder: str | os.PathLike, form: str = WAVES_FORMAT) -> None:
     folder = Path(folder)
     manifest = _json_of(folder, MANIFEST)
     found, checksums = str(manifest.get("format")), manifest.get("sha256")
-    if found in _KINDS and found != form:
-        raise InputError(f"Expected {_KINDS[form]}. Received: {folder}, which is {_KINDS[found]}. Give the other kind of model.")
-    if found != form:
-        number = found.removeprefix(_FAMILY).removeprefix("runs-")
+    if found != _FAMILY + _NUMBER:
+        number = found.removeprefix(_FAMILY)
         raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number[:80]} in {folder}. Fit it again.")
     if not isinstance(checksums, dict) or set(checksums) != {_ARRAYS, SETTINGS}:
         raise InputError(f"Expected the checksums of {_ARRAYS} and {SETTINGS}. Received: others in {folder / MANIFEST}. Fit it again.")
@@ -131,14 +115,12 @@ def _json_of(folder: Path, name: str) -> dict[str, Any]:
 def read_saved(
     folder: str | os.PathLike,
     make: Callable[[Mapping[str, Mapping[str, np.ndarray]], Mapping[str, Any]], Any],
-    form: str = WAVES_FORMAT,
 ) -> Any:
     """Loads a saved model.
 
     Args:
         folder: A folder written by `write_saved`.
         make: Function that creates the model from the arrays of each part and the settings.
-        form: The expected format.
 
     Returns:
         The model, as returned by `make`.
@@ -147,7 +129,7 @@ def read_saved(
         InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
     """
     folder = Path(folder)
-    check_saved(folder, form)
+    check_saved(folder)
     settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)
     try:
         arrays: dict[str, dict[str, np.ndarray]] = {}

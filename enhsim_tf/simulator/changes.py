@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from enhsim_tf.enhanced_simulator.checks import check_finite
+from enhsim_tf.simulator.checks import check_finite
 from enhsim_tf.telemetry.quantisation import Levels
 
 TOLERANCE = 0.1  # largest difference from the nominal run that does not count as a change, in standard deviations of the noise

@@ -1,0 +1,354 @@
+"""How a window of telemetry finds its coarse window: by the clock of a recorded run, or by phase, offset and gain of fitted square waves."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.constant_level import waves_or_level
+from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
+from enhsim_tf.coarse_simulator.pairing import pair_with_recording
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode, held_samples, simulate_schedule
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.joint import cut, telemetry_of
+
+MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
+_NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
+_SAME_RATE = 1e-3
+
+
+class Aligned(NamedTuple):
+    """Coarse windows of the same times as telemetry windows.
+
+    Args:
+        coarse: float32 of shape `(windows, samples, columns)`.
+        shift: Offset of each window and channel, shape `(windows, channels)`; None if the level is that of the enhancer.
+        gain: Factor of each window and channel, same shape; None likewise.
+    """
+
+    coarse: np.ndarray
+    shift: np.ndarray | None = None
+    gain: np.ndarray | None = None
+
+
+class Drawn(NamedTuple):
+    """Coarse windows for generated telemetry.
+
+    Args:
+        coarse: float32 of shape `(windows, samples, columns)`.
+        nominal: The same windows without a degraded mode.
+        held: Window, channel, first sample and end of each range of samples at which a mechanism is stuck.
+    """
+
+    coarse: np.ndarray
+    nominal: np.ndarray
+    held: list[tuple[int, int, int, int]]
+
+
+class Waves:
+    """One square wave or constant level for each channel, aligned with each window in phase, offset and gain.
+
+    Coarse windows are in units of the wave: -1 is its lowest level, 1 its highest.
+
+    Args:
+        simulators: The coarse simulator of each channel.
+        channels: Names of the channels.
+        interval_s: Sampling interval in seconds.
+        window: Length of a window in samples.
+        waveforms: For each channel its enhanced waveform in these units at `_NUM_PHASES` phases, shape `(phases, samples)`, or None for the
+            square wave itself. A square wave shows its phase only at its edges, the enhanced waveform at every sample.
+    """
+
+    kind = "waves"
+
+    def __init__(
+        self,
+        simulators: Sequence[SquareWaveSimulator],
+        channels: Sequence[str],
+        interval_s: float,
+        window: int,
+        waveforms: Sequence[np.ndarray | None] | None = None,
+    ):
+        self.simulators, self.channels = tuple(simulators), tuple(channels)
+        self.interval_s, self.window = float(interval_s), int(window)
+        self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the coarse columns: one for each channel."""
+        return tuple(f"{simulator.columns[0]} of {name}" for simulator, name in zip(self.simulators, self.channels, strict=True))
+
+    def phases(self, channel: int) -> np.ndarray:
+        """Coarse windows of a channel at all phases of its period, float32 of shape `(phases, samples)`."""
+        period_s = max(wave.period_s for wave in self.simulators[channel].waves)
+        starts = period_s * np.arange(_NUM_PHASES) / _NUM_PHASES
+        return self._in_unit(channel, self.simulators[channel].simulate(starts[:, None] + self.interval_s * np.arange(self.window)))
+
+    def align(self, targets: np.ndarray) -> Aligned:
+        """Finds phase, offset and gain of each window and channel.
+
+        Args:
+            targets: Telemetry windows, shape `(windows, samples, channels)`.
+        """
+        coarse = np.zeros(targets.shape, np.float32)
+        shift, gain = np.zeros((2, len(targets), targets.shape[2]))
+        for channel, simulator in enumerate(self.simulators):
+            target = targets[:, :, channel]
+            if simulator.is_constant:  # there is no shape to which a phase or a gain could be fitted
+                shift[:, channel], gain[:, channel] = target.mean(axis=1, dtype=np.float64), simulator.spread
+                continue
+            phases = self.phases(channel)
+            waveform = phases if self.waveforms[channel] is None else self.waveforms[channel]
+            centred = waveform - waveform.mean(axis=1, keepdims=True, dtype=np.float64)
+            length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
+            # the waveforms are centred, so the level of the telemetry has no effect
+            agreement = (target - target.mean(axis=1, keepdims=True)) @ (centred / np.where(length > 0, length, 1.0)).T.astype(np.float32)
+            best = np.argmax(agreement, axis=1)
+            coarse[:, :, channel] = phases[best]
+            shift[:, channel], gain[:, channel] = least_squares(waveform[best], target)
+        return Aligned(coarse, shift, gain)
+
+    def is_flat(self, gain: np.ndarray) -> np.ndarray:
+        """Whether a window shows no shape in some channel with a wave; `gain` is that of `align`, the result has shape `(windows,)`."""
+        waves = np.array([0.0 if each.is_constant else level_offset_and_scale(each)[1] for each in self.simulators])
+        return (gain < MIN_GAIN * waves).any(axis=1)
+
+    def draw(self, starts: np.ndarray, scenarios: Sequence[Degraded | None], rng: np.random.Generator) -> Drawn:
+        """Simulates coarse windows.
+
+        Args:
+            starts: First sample of each window on the clock of the waves, shape `(windows,)`.
+            scenarios: Degraded mode of each window, or None.
+            rng: Draws what is random in a degraded mode.
+        """
+        times = self.interval_s * (np.asarray(starts)[:, None] + np.arange(self.window))
+        nominal = np.stack([self._in_unit(channel, each.simulate(times)) for channel, each in enumerate(self.simulators)], axis=2)
+        if not any(scenarios):
+            return Drawn(nominal, nominal, [])
+        coarse, held = nominal.copy(), []
+        for scenario in dict.fromkeys(each for each in scenarios if each is not None):
+            rows = np.array([number for number, each in enumerate(scenarios) if each == scenario])
+            stuck = held_samples(scenario, self.window)
+            for channel in self._concerned(scenario):
+                coarse[rows, :, channel] = self._in_unit(channel, self.simulators[channel].simulate(times[rows], scenario, rng))
+                held += [(int(row), channel, *stuck) for row in rows] if stuck else []
+        return Drawn(coarse, nominal, held)
+
+    def draw_series(
+        self,
+        num_samples: int,
+        start_s: float,
+        scenario: Degraded | None,
+        schedule: Sequence[ScheduledMode],
+        length: int,
+        rng: np.random.Generator,
+    ) -> Drawn:
+        """Simulates one coarse series, as a single window of `num_samples` of which a scenario covers the first `length`."""
+        times = start_s + self.interval_s * np.arange(num_samples)
+        nominal = np.stack([self._in_unit(channel, each.simulate(times[None])[0]) for channel, each in enumerate(self.simulators)], axis=1)
+        coarse, held = nominal.copy(), []
+        for channel in self._concerned(scenario):
+            simulator = self.simulators[channel]
+            if scenario is not None:
+                changed = simulator.simulate(times[None, :length], scenario, rng)[0]
+                coarse[:length, channel] = self._in_unit(channel, changed)
+            elif schedule:
+                coarse[:, channel] = self._in_unit(channel, simulate_schedule(simulator, times, schedule, rng))
+            whole = [(scenario.mode, scenario.severity, 0, length, scenario.onset)] if scenario else []
+            for mode, severity, begin, end, onset in whole or [(e.mode, e.severity, e.begin, e.end, 0.0) for e in schedule]:
+                stuck = held_samples(Degraded(mode, severity, onset), end - begin)
+                held += [(0, channel, begin + stuck[0], begin + stuck[1])] if stuck else []
+        return Drawn(coarse[None], nominal[None], held)
+
+    def _concerned(self, scenario: Degraded | None) -> range | list[int]:
+        name = getattr(scenario, "channel", None)
+        if name is None:
+            return range(len(self.channels))
+        if name not in self.channels:
+            raise InputError(f"Expected a channel, one of: {', '.join(self.channels)[:200]}. Received: {name!r} in the scenario.")
+        return [self.channels.index(name)]
+
+    def _in_unit(self, channel: int, values: np.ndarray) -> np.ndarray:
+        offset, scale = level_offset_and_scale(self.simulators[channel])
+        return ((values - offset) / scale).astype(np.float32)
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The enhanced waveforms by name."""
+        return {f"waveform_{number}": each for number, each in enumerate(self.waveforms) if each is not None}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All else, in plain JSON types."""
+        return {"kind": self.kind, "simulators": [each.get_config() for each in self.simulators]}
+
+    @classmethod
+    def from_arrays(
+        cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray], channels: Sequence[str], interval_s: float, window: int
+    ) -> "Waves":
+        """Builds the alignment again; raises ValueError if it is none."""
+        simulators = [waves_or_level(each) for each in settings["simulators"]]
+        waveforms = [arrays.get(f"waveform_{number}") for number in range(len(simulators))]
+        if len(simulators) != len(channels) or any(each is not None and each.shape != (_NUM_PHASES, window) for each in waveforms):
+            raise ValueError("waves that do not fit to the channels")
+        return cls(simulators, channels, interval_s, window, waveforms)
+
+
+class Runs:
+    """Runs of the user's simulator on the clock of the telemetry.
+
+    Args:
+        nominal: The nominal run of the fit, whose columns are the inputs of the enhancer.
+        window: Length of a window in samples.
+        delay_s: How much later the telemetry is than the coarse run, in seconds.
+        coarse: The coarse simulator, or None if only a recorded run is known. Its code is not saved.
+        name: Name of the coarse simulator.
+        commands: Settings of `CommandTraces`, if the run are commands of the telemetry's own file.
+    """
+
+    kind = "runs"
+
+    def __init__(
+        self,
+        nominal: Recording,
+        window: int,
+        delay_s: float = 0.0,
+        coarse: CoarseSimulator | None = None,
+        name: str = "",
+        commands: Mapping[str, Any] | None = None,
+    ):
+        self.nominal, self.window, self.delay_s, self.coarse = nominal, int(window), float(delay_s), coarse
+        self.name, self.commands = name or (name_of(coarse) if coarse is not None else nominal.name), commands
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the coarse columns."""
+        return self.nominal.columns
+
+    def usable(self, run: Recording) -> Recording:
+        """Returns the parts and columns of a recording that can be enhanced.
+
+        Args:
+            run: A recording. Its columns may be in any order, and further columns are ignored.
+
+        Raises:
+            InputError: If a column is missing, the interval differs, or every part is shorter than a window.
+        """
+        run, interval_s = run.select(self.columns), self.nominal.interval_s
+        if abs(run.interval_s / interval_s - 1) > _SAME_RATE:
+            raise InputError(
+                f"Expected a coarse run with a sample every {interval_s:g} s, as in the fit. Received: every {run.interval_s:g} s in {run.name}. "
+                "Read it with read_recording(..., interval_s=model.interval_s)."
+            )
+        parts = tuple(part for part in run.parts if len(part) >= self.window)
+        if not parts:
+            raise InputError(
+                f"Expected a coarse run of at least one window of {self.window} samples without a gap. "
+                f"Received: {max(map(len, run.parts))} samples in {run.name}. Record a longer run."
+            )
+        return dataclasses.replace(run, parts=parts)
+
+    def pair(self, telemetry: Recording, run: Recording) -> tuple[Recording, Recording]:
+        """Cuts telemetry and a run to the stretches of at least a window that both cover.
+
+        Args:
+            telemetry: Telemetry.
+            run: A run of the same time.
+
+        Returns:
+            Both, with the same parts.
+
+        Raises:
+            InputError: If they share no window.
+        """
+        return pair_recordings(telemetry, self.usable(run), self.delay_s, self.window)
+
+    def draw(self, starts: np.ndarray, scenarios: Sequence[Any], rng: np.random.Generator) -> Drawn:
+        """Cuts coarse windows out of the nominal run; `starts` count its possible windows and begin again after the last.
+
+        Raises:
+            InputError: If a scenario is given, because a recorded run is nominal.
+        """
+        for scenario in scenarios:
+            self._refuse(scenario)
+        parts = [part.values for part in self.usable(self.nominal).parts]
+        number = sum(len(each) - self.window + 1 for each in parts)
+        windows = cut(parts, np.asarray(starts) % number, self.window)
+        return Drawn(windows, windows, [])
+
+    def _refuse(self, scenario: Any) -> None:
+        if scenario is not None:
+            raise InputError(
+                f"Expected a recorded run of the scenario for a model of recorded runs. Received: {str(scenario)[:80]}. "
+                "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
+            )
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The parts of the nominal run by name."""
+        return {f"part_{number}": part.values for number, part in enumerate(self.nominal.parts)}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All else, in plain JSON types."""
+        kept = {"columns": list(self.columns), "start": self.nominal.start, "offsets_s": [part.offset_s for part in self.nominal.parts]}
+        return {"kind": self.kind, "delay_s": self.delay_s, "name": self.name, "commands": self.commands} | kept
+
+    @classmethod
+    def from_arrays(
+        cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray], channels: Sequence[str], interval_s: float, window: int
+    ) -> "Runs":
+        """Builds the alignment again; raises ValueError if it is none."""
+        runs = tuple(Run(arrays[f"part_{number}"], float(offset)) for number, offset in enumerate(settings["offsets_s"]))
+        nominal = Recording(runs, tuple(settings["columns"]), interval_s, settings["start"], str(settings["name"]))
+        if not np.isfinite([settings["delay_s"], *settings["offsets_s"]]).all() or any(run.values.dtype != np.float32 for run in runs):
+            raise ValueError("a nominal run that is not finite, or of another type")
+        return cls(nominal, window, settings["delay_s"], None, str(settings["name"]), settings["commands"])
+
+
+Alignment = Waves | Runs
+
+
+def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_samples: int) -> tuple[Recording, Recording]:
+    """Cuts telemetry and a coarse run to the stretches that both cover; see `pairing.pair_with_recording`.
+
+    Args:
+        telemetry: Telemetry.
+        run: The coarse run.
+        delay_s: How much later the telemetry is than the run, in seconds.
+        least_samples: Shortest stretch that is kept.
+
+    Returns:
+        The telemetry and the run, with the same parts on the clock of the telemetry.
+
+    Raises:
+        InputError: If the two share no time, or no stretch is long enough.
+    """
+    values, coarse, interval_s = [], [], telemetry.interval_s
+    for pair in pair_with_recording(telemetry_of(telemetry), run, delay_s, least_samples):
+        low = pair.telemetry.offset_s
+        part = next(each for each in telemetry.parts if -1e-6 <= low - each.offset_s <= interval_s * (len(each) - 0.5))
+        first = round((low - part.offset_s) / interval_s)
+        values.append(Run(part.values[first : first + len(pair)], low))
+        coarse.append(Run(pair.coarse, low))
+    joined = dataclasses.replace(telemetry, parts=tuple(values))
+    return joined, dataclasses.replace(run, parts=tuple(coarse), interval_s=interval_s, start=telemetry.start)
+
+
+def least_squares(waveform: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the shift and the gain by which each waveform fits its target best. A constant waveform gets a gain of 0.
+
+    Args:
+        waveform: Shape `(windows, samples)`.
+        target: Same shape.
+    """
+    wave_mean, target_mean = (each.mean(axis=1, dtype=np.float64) for each in (waveform, target))
+    centred = waveform - wave_mean[:, None]
+    power = np.sum(centred**2, axis=1)
+    gain = np.sum(centred * (target - target_mean[:, None]), axis=1) / np.where(power > 0, power, 1.0)
+    gain = np.where(power > 0, gain, 0.0)
+    return target_mean - gain * wave_mean, gain

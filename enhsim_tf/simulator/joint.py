@@ -1,0 +1,155 @@
+"""Channels of one source on one clock: telemetry of several channels is a `Recording` whose columns are the channels."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
+
+_SAME_RATE = 1e-3  # largest relative difference of two intervals that count as one
+_LEAST_SHARED = 0.5  # channels that share a smaller part of their time do not become one model
+
+
+def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> list[Recording]:
+    """Brings channels onto one clock and cuts them to the time that all of them cover.
+
+    Channels with other sampling intervals, or that share less than half of their time with the others, get a recording of their own.
+
+    Args:
+        channels: For each channel, the contiguous parts of its telemetry.
+
+    Returns:
+        One recording for each group of channels, in the order of the channels.
+
+    Raises:
+        InputError: If there is no channel, or a part is not telemetry.
+    """
+    if not channels:
+        raise InputError("Expected at least one channel. Received: none. Give telemetry.")
+    parts = {name: [each] if isinstance(each, Telemetry) else list(each) for name, each in channels.items()}
+    groups: list[list[str]] = []
+    for name, each in parts.items():
+        for part in each:
+            check_telemetry(part)
+        alike = (group for group in groups if _is_alike(parts[group[0]][0], each[0]))
+        group = next(alike, None)
+        if group is None:
+            groups.append([name])
+        else:
+            group.append(name)
+    found = []
+    for group in groups:
+        joined = _joined({name: parts[name] for name in group})
+        most = max(sum(map(len, parts[name])) for name in group)
+        is_shared = joined is not None and len(joined) >= _LEAST_SHARED * most
+        found += [joined] if is_shared else [_joined({name: parts[name]}) for name in group]
+    return found
+
+
+def telemetry_of(recording: Recording, channel: int = 0) -> list[Telemetry]:
+    """Returns the parts of one channel.
+
+    Args:
+        recording: Telemetry of one or several channels.
+        channel: Number of the channel.
+    """
+    interval_s, start, name = recording.interval_s, recording.start, recording.columns[channel]
+    return [Telemetry(part.values[:, channel], interval_s, part.offset_s, start, name) for part in recording.parts]
+
+
+def _is_alike(first: Telemetry, second: Telemetry) -> bool:
+    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= _SAME_RATE
+
+
+def _joined(channels: Mapping[str, Sequence[Telemetry]]) -> Recording | None:
+    """Returns the stretches that all channels cover; None if there are none."""
+    first = next(iter(channels.values()))[0]
+    interval_s, zero = first.interval_s, nanoseconds(dataclasses.replace(first, offset_s=0.0), 0, 1)[0]
+    spans, placed = None, []
+    for parts in channels.values():
+        begins = [round(float(nanoseconds(part, 0, 1)[0] - zero) / 1e9 / interval_s) for part in parts]
+        own = [(begin, begin + len(part)) for begin, part in zip(begins, parts, strict=True)]
+        placed.append(list(zip(begins, parts, strict=True)))
+        spans = own if spans is None else _shared(spans, own)
+    if not spans:
+        return None
+    runs = []
+    for low, high in spans:
+        columns = []
+        for own in placed:
+            begin, part = next((begin, part) for begin, part in own if begin <= low and high <= begin + len(part))
+            columns.append(part.values[low - begin : high - begin])
+        runs.append(Run(np.stack(columns, axis=1).astype(np.float32), low * interval_s))
+    names = tuple(channels)
+    return Recording(tuple(runs), names, interval_s, first.start, ", ".join(names))
+
+
+def _shared(first: Sequence[tuple[int, int]], second: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Returns the intersections of two ascending lists of spans."""
+    found, place = [], 0
+    for low, high in first:
+        while place < len(second) and second[place][1] <= low:
+            place += 1
+        other = place
+        while other < len(second) and second[other][0] < high:
+            span = max(low, second[other][0]), min(high, second[other][1])
+            found += [span] if span[0] < span[1] else []
+            other += 1
+    return found
+
+
+def split_end(recording: Recording, share: float) -> tuple[Recording | None, Recording | None]:
+    """Splits telemetry into its beginning and its end.
+
+    Args:
+        recording: The telemetry.
+        share: Share of the samples that belong to the end, below 1. With 0 there is no end.
+    """
+    left = len(recording) - round(share * len(recording))
+    first, rest = [], []
+    for part in recording.parts:
+        cut = min(max(left, 0), len(part))
+        first += [Run(part.values[:cut], part.offset_s)] if cut else []
+        rest += [Run(part.values[cut:], part.offset_s + cut * recording.interval_s)] if cut < len(part) else []
+        left -= len(part)
+    return tuple(dataclasses.replace(recording, parts=tuple(some)) if some else None for some in (first, rest))
+
+
+def long_enough(recording: Recording | None, window: int) -> Recording | None:
+    """Returns the parts that are at least a window long; None if there are none."""
+    parts = () if recording is None else tuple(part for part in recording.parts if len(part) >= window)
+    return dataclasses.replace(recording, parts=parts) if parts else None
+
+
+def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.ndarray:
+    """Cuts windows out of contiguous series.
+
+    Args:
+        series: Arrays of shape `(samples, columns)`.
+        starts: Start of each window, counted over all possible starts as in `telemetry.windows`.
+        window: Length of a window in samples.
+
+    Returns:
+        float32 array of shape `(windows, samples, columns)`.
+    """
+    usable = [each for each in series if len(each) >= window]
+    firsts = np.cumsum([0] + [len(each) - window + 1 for each in usable])
+    which = np.searchsorted(firsts, starts, "right") - 1
+    windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)
+    for number in np.unique(which):
+        rows = which == number
+        view = np.lib.stride_tricks.sliding_window_view(usable[number], window, axis=0)
+        windows[rows] = view[np.asarray(starts)[rows] - firsts[number]].transpose(0, 2, 1)
+    return windows
+
+
+def times_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarray:
+    """Returns the first sample of each window on the clock of the recording, integers of shape `(windows,)`."""
+    usable = [part for part in recording.parts if len(part) >= window]
+    firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
+    which = np.searchsorted(firsts, starts, "right") - 1
+    offsets = np.array([round(part.offset_s / recording.interval_s) for part in usable])
+    return offsets[which] + np.asarray(starts) - firsts[which]

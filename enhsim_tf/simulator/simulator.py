@@ -1,0 +1,532 @@
+"""The enhanced simulator: coarse simulator, alignment, enhancer and noise (figure 1 of the paper, step 5 and "Combined").
+
+It knows nothing of how it is fitted; see `fitting.fit`.
+"""
+
+import dataclasses
+import functools
+import itertools
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
+from enhsim_tf.coarse_simulator.recording import Recording, Run, record
+from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.overlapping import average_windows, run_starts
+from enhsim_tf.noise.candidates import NoiseModel
+from enhsim_tf.noise.states import model_from, state_of
+from enhsim_tf.simulator.alignment import Alignment, Drawn, Runs, Waves
+from enhsim_tf.simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of
+from enhsim_tf.simulator.checks import check_counts, check_finite
+from enhsim_tf.simulator.joint import cut
+from enhsim_tf.simulator.saving import read_saved, write_saved
+from enhsim_tf.telemetry.quantisation import Levels
+
+_CHUNK_VALUES = 2_000_000  # values that are generated at a time
+_NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
+_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
+
+
+class EnhancedSimulator:
+    """Generates realistic telemetry of one or several channels.
+
+    Args:
+        alignment: The coarse simulator, and how it is aligned with telemetry.
+        enhancer: Maps coarse windows of all columns to windows of all channels.
+        noise: The noise model of all channels, see `noise.candidates`.
+        channels: Names of the channels.
+        interval_s: Sampling interval in seconds.
+        levels: For square waves: offset and gain of each channel at several times, in the order of time, shape `(times, channels, 2)`. Each
+            generated window uses those of one time. None for recorded runs.
+        quantisation: Levels to which each channel is rounded, or None.
+        nominal: Nominal telemetry of the fit, with which thresholds are set. None if there is none.
+        trained: Record of the fit, in plain JSON types.
+
+    Example:
+    >>> simulator, report = fit(telemetry)
+    >>> windows = simulator.generate(num_windows=1000, scenario=Degraded("stuck", severity=0.5), seed=1)
+    >>> simulator.save("model_dir")
+    >>> simulator = EnhancedSimulator.load("model_dir")
+    """
+
+    def __init__(
+        self,
+        alignment: Alignment,
+        enhancer: Enhancer,
+        noise: NoiseModel,
+        channels: Sequence[str] = ("telemetry",),
+        interval_s: float = 1.0,
+        levels: np.ndarray | None = None,
+        quantisation: Sequence[Levels | None] | None = None,
+        nominal: Recording | None = None,
+        trained: Mapping[str, Any] | None = None,
+    ):
+        self.alignment, self.enhancer, self.noise, self.nominal = alignment, enhancer, noise, nominal
+        self.channels, self.interval_s = tuple(channels), float(interval_s)
+        self.levels = None if levels is None else np.asarray(levels, np.float64).reshape(-1, len(self.channels), 2)
+        self.quantisation = tuple(quantisation) if quantisation is not None else (None,) * len(self.channels)
+        self.trained = dict(trained or {})
+
+    @property
+    def window(self) -> int:
+        """Length of a window in samples."""
+        return self.enhancer.window
+
+    @property
+    def is_run_model(self) -> bool:
+        """Whether the coarse simulator is recorded runs on the clock of the telemetry."""
+        return isinstance(self.alignment, Runs)
+
+    @functools.cached_property
+    def noise_sd(self) -> np.ndarray:
+        """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
+        noise = self.draw_noise(self.generate_clean(_NUM_NOISE), np.random.default_rng(0))
+        return np.std(noise, axis=(0, 1), dtype=np.float64)
+
+    @functools.cached_property
+    def scale(self) -> np.ndarray:
+        """Standard deviation of the generated telemetry of each channel, shape `(channels,)`; 1 for a constant one."""
+        deviation = np.std(self.generate_clean(_NUM_NOISE), axis=(0, 1), dtype=np.float64)
+        deviation = np.hypot(deviation, self.noise_sd)
+        return np.where(deviation > 0, deviation, 1.0)
+
+    # enhancement
+
+    def enhance(self, coarse: np.ndarray, shift: np.ndarray | None = None, gain: np.ndarray | None = None) -> np.ndarray:
+        """Enhances coarse windows; no noise is added (step 5 of the paper's pipeline).
+
+        Args:
+            coarse: Coarse windows of shape `(windows, samples, columns)`.
+            shift: Offset of each window and channel, shape `(windows, channels)`, or None.
+            gain: Factor of each window and channel, same shape, or None.
+
+        Returns:
+            float32 array of shape `(windows, samples, channels)`, in the telemetry's unit.
+
+        Raises:
+            InputError: If the shape is wrong, or a value is not finite.
+        """
+        expected = (self.window, self.enhancer.columns)
+        if np.ndim(coarse) != 3 or np.shape(coarse)[1:] != expected:
+            raise InputError(f"Expected coarse windows of shape (windows, {expected[0]}, {expected[1]}). Received: {np.shape(coarse)}.")
+        enhanced = self.enhancer.predict(coarse)
+        if shift is not None and gain is not None:
+            enhanced *= gain[:, None].astype(np.float32)
+            enhanced += shift[:, None].astype(np.float32)
+        return check_finite(enhanced)
+
+    def enhance_run(self, coarse: np.ndarray) -> np.ndarray:
+        """Enhances one run without gaps, in overlapping windows that are averaged; no noise is added.
+
+        Args:
+            coarse: Values of the coarse columns, shape `(samples, columns)`, with at least a window of samples.
+
+        Returns:
+            float32 array of shape `(samples, channels)`.
+        """
+        coarse = np.asarray(coarse, np.float32)
+        if coarse.ndim != 2 or coarse.shape[1] != self.enhancer.columns or len(coarse) < self.window:
+            raise InputError(
+                f"Expected a run of shape (samples, {self.enhancer.columns}) with at least {self.window} samples. Received: {coarse.shape}."
+            )
+        starts = run_starts(len(coarse), self.window)
+        return average_windows(lambda rows: self.enhance(cut([coarse], starts[rows], self.window)), starts, self.window, len(coarse))
+
+    def residuals(self, targets: np.ndarray) -> np.ndarray:
+        """Returns telemetry windows minus the square waves that are aligned with them, enhanced.
+
+        The gain may leave the range of the training by at most a factor of 2, so that a channel that stands still is not explained.
+
+        Args:
+            targets: Telemetry, shape `(windows, samples, channels)`.
+
+        Returns:
+            float32 array of the same shape.
+        """
+        coarse, _, gain = self.alignment.align(targets)
+        enhanced = self.enhance(coarse)
+        bounded = np.clip(gain, self.levels[:, :, 1].min(axis=0) / 2, self.levels[:, :, 1].max(axis=0) * 2)[:, None]
+        left = targets - bounded * enhanced
+        return (left - left.mean(axis=1, keepdims=True)).astype(np.float32)
+
+    # noise
+
+    def draw_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Generates noise for windows of shape `(windows, samples, channels)`, or for one series of shape `(samples, channels)`.
+
+        Args:
+            clean: The enhanced signal.
+            rng: Random number generator.
+        """
+        draw = self.noise.generate if np.ndim(clean) == 3 else self.noise.generate_series
+        return check_finite(draw(len(clean), rng, clean))
+
+    def add_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Adds noise to an enhanced signal and rounds quantised channels to their levels."""
+        return self._rounded(clean + self.draw_noise(clean, rng))
+
+    def _rounded(self, values: np.ndarray) -> np.ndarray:
+        for channel, levels in enumerate(self.quantisation):
+            if levels is not None:
+                values[..., channel] = levels.round(values[..., channel])
+        return values
+
+    # windows
+
+    def generate(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+        """Generates realistic telemetry windows: enhanced signal plus generated noise ("Combined").
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Random seed of start times, scenario and noise. The same seed gives the same windows.
+
+        Returns:
+            float32 array of shape `(num_windows, samples, channels)`, in the telemetry's unit.
+
+        Raises:
+            InputError: If `num_windows` is negative or not a whole number.
+        """
+        return self._join(num_windows, self.generate_chunks(num_windows, scenario, seed))
+
+    def generate_clean(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
+        """Returns the windows of `generate` before noise is added."""
+        return self._join(num_windows, (windows for windows, _ in self._chunks(num_windows, scenario, seed, None)))
+
+    def generate_chunks(self, num_windows: int, scenario: Degraded | None = None, seed: int = 0) -> Iterator[np.ndarray]:
+        """Yields the windows of `generate` in chunks, so that memory does not grow with their number."""
+        return (windows for windows, _ in self.generate_labelled_chunks(num_windows, scenario, seed))
+
+    def generate_labelled_chunks(
+        self, num_windows: int, scenario: Degraded | None = None, seed: int = 0
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yields the chunks of `generate_chunks`, each with a mask of the samples that the scenario has changed.
+
+        Args:
+            num_windows: Number of windows.
+            scenario: A degraded mode, or None for nominal telemetry.
+            seed: Random seed.
+
+        Yields:
+            float32 windows and boolean masks, both of shape `(chunk, samples, channels)`. A sample that is not marked equals that of the
+            same seed without a scenario.
+        """
+        return self._chunks(num_windows, scenario, seed, np.random.default_rng([seed, 1]))
+
+    def _chunks(
+        self, num_windows: int, scenario: Degraded | None, seed: int, noise_rng: np.random.Generator | None
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        check_counts(num_windows=(num_windows, 0))
+        rng = np.random.default_rng(seed)
+        starts = rng.integers(0, _START_RANGE, num_windows)
+        rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
+        chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
+        for first in range(0, num_windows, chunk):
+            some = slice(first, first + chunk)
+            drawn = self.alignment.draw(starts[some], [scenario] * len(starts[some]), rng)
+            yield self.complete(drawn, None if self.levels is None else self.levels[rows[some]], noise_rng)
+
+    def _join(self, num_windows: int, chunks: Iterator[np.ndarray]) -> np.ndarray:
+        check_counts(num_windows=(num_windows, 0))
+        windows, filled = np.empty((num_windows, self.window, len(self.channels)), np.float32), 0
+        for chunk in chunks:
+            windows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+        return windows
+
+    def complete(self, drawn: Drawn, levels: np.ndarray | None, noise_rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
+        """Completes coarse windows to telemetry, and marks the samples that a degraded mode has changed.
+
+        Args:
+            drawn: Coarse windows, nominal and degraded.
+            levels: Offset and gain of each window and channel, shape `(windows, channels, 2)`, or None.
+            noise_rng: Random generator of the noise, or None for windows without noise.
+
+        Returns:
+            `(windows, mask)`, float32 and boolean of shape `(windows, samples, channels)`. Noise that follows the signal follows the nominal
+            one, so all samples that are not marked equal the nominal ones to the bit.
+        """
+        shift, gain = (None, None) if levels is None else (levels[..., 0], levels[..., 1])
+        clean = self.enhance(drawn.nominal, shift, gain)
+        changed = drawn.coarse is not drawn.nominal and not np.array_equal(drawn.coarse, drawn.nominal)
+        windows, mask = clean, np.zeros(clean.shape, bool)
+        if changed or drawn.held:
+            degraded = self.enhance(drawn.coarse, shift, gain) if changed else clean
+            windows, mask = self._changed(clean, degraded, drawn, fade_length(self.window))
+        if noise_rng is None:
+            return check_finite(windows), mask
+        return self._with_noise(windows, clean, mask, self.draw_noise(clean, noise_rng))
+
+    def _changed(self, clean: np.ndarray, degraded: np.ndarray, drawn: Drawn, fade: int) -> tuple[np.ndarray, np.ndarray]:
+        """Puts the changes of degraded windows into nominal ones; a coarse column may change every channel."""
+        windows, mask = clean.copy(), np.zeros(clean.shape, bool)
+        differs = drawn.coarse != drawn.nominal
+        for row, channel, begin, end in drawn.held:
+            if differs.shape[2] == clean.shape[2]:
+                differs[row, begin:end, channel] = False
+        for channel in range(clean.shape[2]):
+            inside = differs[:, :, channel] if differs.shape[2] == clean.shape[2] else differs.any(axis=2)
+            held = [(row, begin, end) for row, concerned, begin, end in drawn.held if concerned == channel]
+            if not (inside.any() or held):
+                continue
+            tolerance = tolerance_of(float(self.noise_sd[channel]), float(self.scale[channel]))
+            if inside.any():
+                found = blend_changes(clean[:, :, channel], degraded[:, :, channel], spans(inside), fade, tolerance)
+                windows[:, :, channel], mask[:, :, channel] = found
+            hold_values(windows[:, :, channel], mask[:, :, channel], held, tolerance)
+        return windows, mask
+
+    def _with_noise(self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if not mask.any():
+            return self._rounded(windows + noise), mask
+        values = np.empty_like(windows)
+        for channel, levels in enumerate(self.quantisation):
+            of = (..., channel)
+            values[of], mask[of] = add_changed(windows[of], clean[of], noise[of], mask[of], levels)
+        return values, mask
+
+    # series
+
+    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
+        """Generates one continuous series of any length, without visible joins between windows.
+
+        Args:
+            num_samples: Length of the series in samples.
+            scenario: A degraded mode over the whole series, or None for nominal telemetry.
+            seed: Random seed of the scenario and the noise.
+            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
+
+        Returns:
+            float32 array of shape `(num_samples, channels)`.
+        """
+        return self.generate_labelled_series(num_samples, scenario, seed, start_s)[0]
+
+    def generate_labelled_series(
+        self,
+        num_samples: int,
+        scenario: Degraded | None = None,
+        seed: int = 0,
+        start_s: float = 0.0,
+        schedule: Sequence[ScheduledMode] = (),
+    ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
+        """Generates the series of `generate_series`, with a mask of the samples that a degraded mode has changed.
+
+        Args:
+            num_samples: Length of the series in samples.
+            scenario: A degraded mode over the whole series, or None.
+            seed: Random seed of the scenario and the noise.
+            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
+            schedule: Degraded modes at given places, instead of a scenario.
+
+        Returns:
+            `(values, mask, events)`: the float32 series, a boolean array that marks the samples that differ from the nominal series of the
+            same seed, both of shape `(samples, channels)`, and for each event that changed a sample its mode, its severity, its first
+            changed sample, and the first sample after its last changed one.
+
+        Raises:
+            InputError: If events overlap or lie outside the series, or if both a scenario and a schedule are given.
+        """
+        check_counts(num_samples=(num_samples, 1))
+        if scenario is not None and schedule:
+            raise InputError("Expected a scenario or a schedule. Received: both. Put the scenario into the schedule.")
+        schedule, noise_rng = check_schedule(schedule, num_samples), np.random.default_rng([seed, 1])
+        if self.is_run_model:
+            self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
+            clean = self._nominal_series(num_samples, start_s)
+            return self.add_noise(clean, noise_rng), np.zeros(clean.shape, bool), []
+        window, hop = self.window, self.window // 2
+        num_windows = 1 + max(0, -(-(num_samples - window) // hop))  # that overlap by half and cover the series
+        length = window + (num_windows - 1) * hop
+        drawn = self.alignment.draw_series(length, start_s, scenario, schedule, num_samples, np.random.default_rng(seed))
+        levels = self._following_levels(num_windows, seed)
+        clean = self._join_series(drawn.nominal[0], levels)[None, :num_samples]
+        windows, mask = clean, np.zeros(clean.shape, bool)
+        if scenario is not None or schedule:
+            degraded = self._join_series(drawn.coarse[0], levels)[None, :num_samples]
+            inside = Drawn(drawn.coarse[:, :num_samples].copy(), drawn.nominal[:, :num_samples], drawn.held)
+            windows, mask = self._changed_events(clean, degraded, inside, schedule, num_samples)
+        values, mask = self._with_noise(windows[0].copy(), clean[0], mask[0], self.draw_noise(clean[0], noise_rng))
+        return values, mask, self._events(mask.any(axis=1), scenario, schedule)
+
+    def _changed_events(
+        self, clean: np.ndarray, degraded: np.ndarray, drawn: Drawn, schedule: Sequence[ScheduledMode], num_samples: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Puts the changes of each event into the nominal series."""
+        windows, mask = clean.copy(), np.zeros(clean.shape, bool)
+        for begin, end in [(event.begin, event.end) for event in schedule] or [(0, num_samples)]:
+            coarse = drawn.nominal.copy()
+            coarse[:, begin:end] = drawn.coarse[:, begin:end]
+            held = [each for each in drawn.held if begin <= each[2] < end]
+            found, marked = self._changed(clean, degraded, Drawn(coarse, drawn.nominal, held), fade_length(self.window))
+            windows, mask = np.where(marked, found, windows), mask | marked
+        return windows, mask
+
+    @staticmethod
+    def _events(changed: np.ndarray, scenario: Degraded | None, schedule: Sequence[ScheduledMode]) -> list[tuple[str, float, int, int]]:
+        ranges = [(event.mode, event.severity, event.begin, event.end) for event in schedule]
+        if scenario is not None:
+            ranges = [(scenario.mode, scenario.severity, 0, len(changed))]
+        edges = [0, *((before[3] + after[2]) // 2 for before, after in itertools.pairwise(ranges)), len(changed)]
+        events = []
+        for (mode, severity, *_), (begin, end) in zip(ranges, itertools.pairwise(edges), strict=bool(ranges)):
+            places = np.flatnonzero(changed[begin:end])
+            events += [(mode, severity, begin + int(places[0]), begin + int(places[-1]) + 1)] if len(places) else []
+        return events
+
+    def _join_series(self, coarse: np.ndarray, levels: np.ndarray) -> np.ndarray:
+        """Enhances a coarse series in windows that overlap by half, and cross-fades them. The series has no noise."""
+        starts = np.arange(0, len(coarse) - self.window + 1, self.window // 2)
+
+        def windows_at(rows: slice) -> np.ndarray:
+            return self.enhance(cut([coarse], starts[rows], self.window), levels[rows, :, 0], levels[rows, :, 1])
+
+        return average_windows(windows_at, starts, self.window, len(coarse))
+
+    def _following_levels(self, num_windows: int, seed: int) -> np.ndarray:
+        """Returns offset and gain of consecutive windows: those seen in training, forwards and backwards from a random time."""
+        cycle = np.concatenate([self.levels, self.levels[-2:0:-1]])
+        begin = np.random.default_rng([seed, 2]).integers(0, len(cycle))
+        return cycle[(begin + np.arange(num_windows)) % len(cycle)]
+
+    def _nominal_series(self, num_samples: int, start_s: float) -> np.ndarray:
+        """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions are cross-faded."""
+        skipped, fade = round(start_s / self.interval_s), self.window // 2
+        clean = [self.enhance_run(part.values) for part in self.alignment.usable(self.alignment.nominal).parts]
+        rise = (np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade) ** 2)[:, None]
+        pieces, tail = [clean[0][:-fade]], clean[0][-fade:]
+        length, number = len(pieces[0]), 0
+        while length < skipped + num_samples:
+            number += 1
+            following = clean[number % len(clean)].copy()
+            following[:fade] = (1 - rise) * tail + rise * following[:fade]
+            pieces.append(following[:-fade])
+            length, tail = length + len(following) - fade, following[-fade:]
+        return np.concatenate(pieces)[skipped : skipped + num_samples].astype(np.float32)
+
+    # runs of the user's simulator
+
+    def generate_copies(self, run: Recording, num_copies: int, seed: int = 0) -> Iterator[list[np.ndarray]]:
+        """Yields copies of a run: the enhanced run plus another draw of noise in each copy.
+
+        Args:
+            run: A recording, for example of a fault.
+            num_copies: Number of copies.
+            seed: Random seed of the noise. The first copies do not depend on the number of copies.
+
+        Yields:
+            For each copy, one float32 array of shape `(samples, channels)` for each part of `alignment.usable(run)`.
+
+        Raises:
+            InputError: If the run cannot be enhanced.
+        """
+        check_counts(num_copies=(num_copies, 0))
+        clean = [self.enhance_run(part.values) for part in self._runs().usable(run).parts]
+        for number in range(num_copies):
+            rng = np.random.default_rng([seed, 1, number])
+            yield [self.add_noise(enhanced, rng) for enhanced in clean]
+
+    def simulate(self, time_s: np.ndarray, scenario: Any = None, seed: int = 0, labels: Mapping[str, Any] | None = None) -> Recording:
+        """Runs the coarse simulator.
+
+        Args:
+            time_s: Times in seconds at the interval of the simulator, shape `(samples,)`.
+            scenario: What differs from nominal operation, in the form that the coarse simulator understands.
+            seed: Random seed of the scenario.
+            labels: Values to carry to every sample, see `recording.record`.
+
+        Raises:
+            InputError: If there is no simulator, because this one was loaded and code is not saved.
+        """
+        runs = self._runs()
+        if runs.coarse is None:
+            raise InputError(
+                f"Expected the coarse simulator {runs.name}, which is not saved with the model. Received: none. "
+                "Give it again, as in EnhancedSimulator.load(folder, coarse=simulator), or give a recorded run."
+            )
+        return record(runs.coarse, time_s, scenario, np.random.default_rng(seed), labels=labels)
+
+    def _runs(self) -> Runs:
+        if not isinstance(self.alignment, Runs):
+            raise InputError(
+                "Expected a model of recorded runs. Received: one of square waves, which needs no run. Leave --coarse out, or fit with it."
+            )
+        return self.alignment
+
+    # files
+
+    def save(self, folder: str | os.PathLike) -> None:
+        """Saves the simulator to a folder: `arrays.npz`, `settings.json`, and `manifest.json` with their checksums.
+
+        Args:
+            folder: The folder. A simulator that was saved there before is replaced.
+
+        Raises:
+            InputError: If the folder contains something other than a saved simulator, or if a number is not finite; the folder is left
+                unchanged.
+        """
+        noise, nominal = state_of(self.noise), self.nominal
+        arrays = {"enhancer": self.enhancer.arrays, "noise": noise.arrays, "alignment": self.alignment.arrays}
+        arrays |= {} if self.levels is None else {"levels": {"rows": self.levels}}
+        arrays |= {} if nominal is None else {"nominal": {f"part_{number}": part.values for number, part in enumerate(nominal.parts)}}
+        settings = {
+            "alignment": self.alignment.settings,
+            "enhancer": self.enhancer.settings,
+            "noise": dict(noise.settings),
+            "window": self.window,
+            "channels": list(self.channels),
+            "interval_s": self.interval_s,
+            "quantisation": [None if each is None else dataclasses.asdict(each) for each in self.quantisation],
+            "nominal": None if nominal is None else {"start": nominal.start, "offsets_s": [part.offset_s for part in nominal.parts]},
+            "trained": self.trained,
+        }
+        write_saved(folder, arrays, settings)
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike, coarse: CoarseSimulator | None = None) -> "EnhancedSimulator":
+        """Loads a saved simulator.
+
+        Args:
+            folder: A folder written by `save`.
+            coarse: The coarse simulator, for a model of the user's own simulator, whose code is not saved.
+
+        Raises:
+            InputError: If the folder was not written by `save`, a file in it has changed since, or the coarse simulator has other columns.
+        """
+        simulator = read_saved(folder, cls._from_saved)
+        if coarse is not None:
+            runs = simulator._runs()
+            if set(runs.columns) - set(coarse.columns):
+                raise InputError(
+                    f"Expected a simulator with the columns {', '.join(runs.columns)[:120]}. Received: {name_of(coarse)} with "
+                    f"{', '.join(coarse.columns)[:120]}. Give the simulator of the fit."
+                )
+            runs.coarse = coarse
+        return simulator
+
+    @classmethod
+    def _from_saved(cls, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> "EnhancedSimulator":
+        channels, interval_s, window = tuple(map(str, settings["channels"])), float(settings["interval_s"]), settings["window"]
+        enhancer = Enhancer.from_arrays(settings["enhancer"], arrays["enhancer"])
+        kind = {"waves": Waves, "runs": Runs}[settings["alignment"]["kind"]]
+        alignment = kind.from_arrays(settings["alignment"], arrays.get("alignment", {}), channels, interval_s, window)
+        if enhancer.window != window or enhancer.channels != len(channels) or enhancer.columns != len(alignment.columns):
+            raise ValueError("an enhancer that does not fit to the settings")
+        if not (np.isfinite(interval_s) and interval_s > 0):
+            raise ValueError("a sampling interval that is not above 0")
+        levels, nominal = arrays.get("levels", {}).get("rows"), settings["nominal"]
+        if (levels is None) != (kind is Runs) or (levels is not None and not (np.isfinite(levels).all() and levels.size)):
+            raise ValueError("levels that do not fit to the alignment")
+        quantisation = [None if each is None else Levels(**each) for each in settings["quantisation"]]
+        if len(quantisation) != len(channels):
+            raise ValueError("quantisation of other channels")
+        if nominal is not None:
+            runs = [Run(arrays["nominal"][f"part_{number}"], float(offset)) for number, offset in enumerate(nominal["offsets_s"])]
+            nominal = Recording(tuple(runs), channels, interval_s, nominal["start"], ", ".join(channels))
+        noise = model_from(settings["noise"], arrays["noise"])
+        return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"])
