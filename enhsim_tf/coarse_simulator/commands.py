@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.common.errors import InputError
@@ -113,6 +112,8 @@ class CommandTraces:
 
 def _trace(command: np.ndarray, decay: float) -> np.ndarray:
     """Returns the trace of one command, float64: 1 where it is sent, and an exponential decay after it."""
+    from scipy.signal import lfilter  # takes a second to import
+
     command = np.asarray(command, np.float64)
     return lfilter([1.0], [1.0, -np.exp(-1 / decay)], command) if decay else command.copy()
 

@@ -74,6 +74,16 @@ class Progress:
     def __init__(self, tell: Callable[[str], None] | None = None, before: str = "", clock: Callable[[], float] = time.monotonic):
         self.tell, self.before, self.clock, self.last_line_s = tell, before, clock, clock()
 
+    def step(self, what: str) -> None:
+        """Says at once what begins.
+
+        Args:
+            what: The step, such as `noise`.
+        """
+        if self.tell is not None:
+            self.last_line_s = self.clock()
+            self.tell(f"{self.before}{what} ...")
+
     def loop(self, unit: str, total: int) -> "Loop":
         """Starts to report a loop.
 

@@ -5,6 +5,8 @@ Keras is imported only when a detector is trained.
 
 import numpy as np
 
+from enhsim_tf.detection.detectors import flat
+
 
 class DenseAutoencoder:
     """Anomaly detector that uses the mean squared reconstruction error of a dense autoencoder.
@@ -23,6 +25,7 @@ class DenseAutoencoder:
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
         from enhsim_tf.keras_tools.training import dense_stack, fit_windows
 
+        windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
         units, samples = (self.num_hidden, self.num_code, self.num_hidden), windows.shape[1]
         self._network = dense_stack(samples, (*units, samples), seed=self.seed, name="autoencoder")
@@ -32,7 +35,7 @@ class DenseAutoencoder:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
-        scaled = self._scaled(windows)
+        scaled = self._scaled(flat(windows))
         return np.mean((np.asarray(self._network(scaled)) - scaled) ** 2, axis=1)
 
     def _scaled(self, windows: np.ndarray) -> np.ndarray:
@@ -62,6 +65,7 @@ class ConvolutionalAutoencoder:
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
         from enhsim_tf.keras_tools.training import fit_windows
 
+        windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
         self._network = self._build(windows.shape[1])
         scaled = self._scaled(windows)
@@ -72,7 +76,7 @@ class ConvolutionalAutoencoder:
         """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
         from enhsim_tf.keras_tools.training import predict_windows
 
-        scaled = self._scaled(windows)
+        scaled = self._scaled(flat(windows))
         return np.mean((predict_windows(self._network, scaled, 1_024) - scaled) ** 2, axis=1)
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint

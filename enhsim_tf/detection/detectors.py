@@ -1,13 +1,26 @@
 """Anomaly detectors without neural networks, and trivial detectors as controls (title and abstract of the paper).
 
 All detectors have the interface `Detector`: `fit(windows)` takes nominal windows, and `score(windows)` returns one score for each
-window, where higher is more anomalous. `registry` lists all detectors by name.
+window, where higher is more anomalous. Windows have the shape `(windows, samples)` or `(windows, samples, channels)`; several channels are
+given in units of their standard deviations. `registry` lists all detectors by name.
 """
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.realism.window_features import window_features
+
+
+def flat(windows: np.ndarray) -> np.ndarray:
+    """Windows with the channels one after the other, shape `(windows, channels * samples)`."""
+    return windows if windows.ndim == 2 else windows.transpose(0, 2, 1).reshape(len(windows), -1)
+
+
+def features(windows: np.ndarray) -> np.ndarray:
+    """The features of `window_features` of each channel."""
+    if windows.ndim == 2:
+        return window_features(windows)
+    return np.concatenate([window_features(windows[:, :, channel]) for channel in range(windows.shape[2])], axis=1)
 
 
 class LimitCheck:
@@ -23,7 +36,7 @@ class LimitCheck:
 
     def fit(self, windows: np.ndarray) -> "LimitCheck":
         """Computes the limits from nominal windows."""
-        self._limits = np.quantile(windows, [self.low, self.high])
+        self._limits = np.quantile(windows, [self.low, self.high], axis=(0, 1))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -31,7 +44,8 @@ class LimitCheck:
 
         The score of a window within the limits is negative: its magnitude is the remaining margin.
         """
-        return np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
+        beyond = np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
+        return beyond if windows.ndim == 2 else beyond.max(axis=1)
 
 
 class PCAResidual:
@@ -49,12 +63,14 @@ class PCAResidual:
         """Computes the principal components of nominal windows."""
         from sklearn.decomposition import PCA
 
+        windows = flat(windows)
         with threadpool_limits(1), np.errstate(invalid="ignore"):  # the shares of variance of equal windows are not used
             self._pca = PCA(min(self.num_components, *windows.shape), svd_solver="randomized", random_state=self.seed).fit(windows)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean squared residual of each window."""
+        windows = flat(windows)
         with threadpool_limits(1):
             return np.mean((windows - self._pca.inverse_transform(self._pca.transform(windows))) ** 2, axis=1)
 
@@ -75,13 +91,13 @@ class NearestNeighbours:
 
         self._index = NearestNeighbors(n_neighbors=min(self.num_neighbours, len(windows)), algorithm="brute")
         self._mean = np.mean(windows, dtype=np.float64)  # subtracted, because a large offset would reduce the precision of the distances
-        self._index.fit(windows - self._mean)
+        self._index.fit(flat(windows) - self._mean)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean distance, in the unit of the telemetry times the square root of the number of samples."""
         with threadpool_limits(1):
-            return self._index.kneighbors(windows - self._mean)[0].mean(axis=1)
+            return self._index.kneighbors(flat(windows) - self._mean)[0].mean(axis=1)
 
 
 class IsolationForestOnFeatures:
@@ -99,12 +115,12 @@ class IsolationForestOnFeatures:
         """Fits the forest to nominal windows."""
         from sklearn.ensemble import IsolationForest
 
-        self._forest = IsolationForest(n_estimators=self.num_trees, random_state=self.seed).fit(window_features(windows))
+        self._forest = IsolationForest(n_estimators=self.num_trees, random_state=self.seed).fit(features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the anomaly score of the forest."""
-        return -self._forest.score_samples(window_features(windows))
+        return -self._forest.score_samples(features(windows))
 
 
 class OneClassSVMOnFeatures:
@@ -124,13 +140,13 @@ class OneClassSVMOnFeatures:
         from sklearn.svm import OneClassSVM
 
         with threadpool_limits(1):
-            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=self.nu)).fit(window_features(windows))
+            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=self.nu)).fit(features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the signed distance from the decision boundary, which is negative inside."""
         with threadpool_limits(1):
-            return -self._machine.decision_function(window_features(windows))
+            return -self._machine.decision_function(features(windows))
 
 
 class RandomScore:
@@ -161,7 +177,7 @@ class LargestStep:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest absolute first difference of each window, in the unit of the telemetry."""
-        return np.abs(np.diff(windows, axis=1)).max(axis=1)
+        return np.abs(np.diff(windows, axis=1)).reshape(len(windows), windows.shape[1] - 1, -1).max(axis=(1, 2))
 
 
 class MovingDeviation:
@@ -181,6 +197,59 @@ class MovingDeviation:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
         centred = np.asarray(windows, np.float64) - np.mean(windows, axis=1, keepdims=True, dtype=np.float64)
-        sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0))), axis=2)
-        mean, square = (sums[:, :, self.width :] - sums[:, :, : -self.width]) / self.width
-        return np.sqrt(np.maximum(square - mean**2, 0).max(axis=1))
+        centred, width = centred.reshape(*windows.shape[:2], -1), min(self.width, windows.shape[1])
+        sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0), (0, 0))), axis=2)
+        mean, square = (sums[:, :, width:] - sums[:, :, :-width]) / width
+        return np.sqrt(np.maximum(square - mean**2, 0).max(axis=(1, 2)))
+
+
+class Innovation:
+    """Size of what a linear prediction from the past of all channels, and from the other channels, does not explain.
+
+    The prediction is a vector autoregression, fitted by ridge regression; errors are weighed by the inverse of their covariance. A channel
+    that loses its relation to the others, or follows them with another delay, is found although its own values look as before.
+
+    Args:
+        order: Number of past samples of each channel; less in short windows.
+        most_rows: Number of samples from which it is fitted at most.
+    """
+
+    def __init__(self, order: int = 48, most_rows: int = 40_000):
+        self.order, self.most_rows = order, most_rows
+
+    def fit(self, windows: np.ndarray) -> "Innovation":
+        """Fits the prediction and the covariance of its errors to nominal windows."""
+        values = self._channels(windows)
+        self._mean, order = values.mean(axis=(0, 1)), max(1, min(self.order, values.shape[1] // 4))
+        number = max(1, self.most_rows // (values.shape[1] - order))
+        centred = (values - self._mean)[np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)]
+        view = np.lib.stride_tricks.sliding_window_view(centred, order + 1, axis=1)  # (windows, places, channels, order + 1)
+        past = view[..., :-1].reshape(-1, centred.shape[2] * order)
+        now = view[..., -1].reshape(-1, centred.shape[2])
+        gram = past.T @ past
+        gram[np.diag_indices_from(gram)] += 1e-3 * np.trace(gram) / len(gram) + 1e-12
+        self._weights = np.linalg.solve(gram, past.T @ now)
+        errors = now - past @ self._weights
+        covariance = errors.T @ errors / len(errors)
+        covariance[np.diag_indices_from(covariance)] += 1e-6 * np.trace(covariance) / len(covariance) + 1e-24
+        self._whiten = np.linalg.cholesky(np.linalg.inv(covariance))
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the mean square of the weighed errors of each window, about the number of channels for nominal ones."""
+        values = self._channels(windows) - self._mean
+        order, channels = len(self._weights) // values.shape[2], values.shape[2]
+        kernels = self._weights.reshape(channels, order, channels).astype(np.float32)  # input, lag from the oldest, output
+        scores = np.empty(len(values))
+        step = max(1, 2_000_000 // (values.shape[1] * channels))
+        for first in range(0, len(values), step):
+            some = values[first : first + step].astype(np.float32)
+            errors = some[:, order:].copy()
+            for lag in range(order):
+                errors -= some[:, lag : lag - order] @ kernels[:, lag]
+            scores[first : first + step] = np.mean(np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1)
+        return scores
+
+    @staticmethod
+    def _channels(windows: np.ndarray) -> np.ndarray:
+        return np.asarray(windows if windows.ndim == 3 else windows[:, :, None], np.float64)

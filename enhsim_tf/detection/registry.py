@@ -26,8 +26,6 @@ BUILT_IN = {
     "convolutional autoencoder": "enhsim_tf.detection.autoencoders:ConvolutionalAutoencoder",
 }
 """Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last.
-
-The stages of `enhsim_tf.reproduce` read these paths as imports, so that a stage runs again when a detector changes.
 """
 
 BUILT_IN_CONTROLS = {
@@ -50,11 +48,18 @@ DETECTORS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path)
 
 CONTROLS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path) for name, path in BUILT_IN_CONTROLS.items()}
 """The same for the controls."""
+FURTHER: dict[str, Callable[[int], "Detector"]] = {"innovation": partial(_build, "enhsim_tf.detection.detectors:Innovation")}
+"""Detectors that `score` offers besides `DETECTORS`, on which the studies' published tables are."""
 
 
 RESIDUAL = "residual"
 """Name of the detector that judges the difference between telemetry and a fitted simulator (`residual_size`, and
 `enhanced_simulator.residual_detector`). It needs a simulator, so it is no member of `DETECTORS`."""
+
+
+def all_detectors() -> dict[str, Callable[[int], "Detector"]]:
+    """All detectors that need no simulator, by name."""
+    return {**DETECTORS, **FURTHER, **{name: CONTROLS[name] for name in ("largest step", "moving deviation")}}
 
 
 def option_name(name: str) -> str:

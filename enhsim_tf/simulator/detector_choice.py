@@ -1,0 +1,145 @@
+"""Chooses the detector of a simulator by evidence: false alarms and recall of injected anomalies on held-out nominal time.
+
+The rule was fixed before it was tried on public data. A detector keeps its promise if it flags at most three times the share that it is set for,
+or one and a half of the disjoint held-out windows where these are few. Of those that do, the ones whose mean recall is within two points of the
+best are equal, and the first of them in the order of `CANDIDATES` is chosen. If none keeps its promise, the one with the fewest false alarms is
+taken, and the report says so in its first line.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.detection import metrics
+from enhsim_tf.simulator.joint import cut
+from enhsim_tf.simulator.noise_choice import anomalous_windows
+from enhsim_tf.simulator.options import ScoreOptions
+from enhsim_tf.simulator.scoring import Scorer
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.windows import evenly_spaced_starts
+
+CANDIDATES = ("residual", "PCA residual", "innovation", "largest step", "moving deviation")
+RATE = 0.01  # false-alarm rate for which thresholds are set
+SEVERITIES = (2.0, 4.0, 8.0)  # of injected anomalies, in standard deviations of the noise
+RELATIONS = ("another time", "a delay")
+"""Anomalies of one channel that leave all its values as they are."""
+_MOST_TIMES, _FEW = 3.0, 1.5  # multiples of the rate, and windows, that a detector may flag
+_EQUAL = 0.02  # recall within which detectors are equal
+_NUM_ANOMALOUS = 60  # windows of each kind and severity
+_NUM_GENERATED = 1_000  # windows from which candidates learn
+_DELAY = 0.25  # of a window, by which one channel is shifted against the others
+
+
+@dataclasses.dataclass(frozen=True)
+class JudgedDetector:
+    """A detector on held-out nominal time.
+
+    Args:
+        name: Its name.
+        false_alarms: Share of held-out nominal samples that it flags.
+        allowed: Largest share with which it keeps its promise.
+        recall: Mean recall over all kinds and severities of injected anomalies.
+        by_kind: Recall by kind, mean over severities.
+    """
+
+    name: str
+    false_alarms: float
+    allowed: float
+    recall: float
+    by_kind: dict[str, float]
+
+    @property
+    def keeps(self) -> bool:
+        """Whether it flags no more of held-out nominal time than it is allowed to."""
+        return self.false_alarms <= self.allowed
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fields in plain JSON types."""
+        return dataclasses.asdict(self) | {"keeps": bool(self.keeps)}
+
+
+def choose_detector(judged: Sequence[JudgedDetector]) -> JudgedDetector:
+    """Returns the detector that the rule chooses; see the module."""
+    keeping = [each for each in judged if each.keeps]
+    if not keeping:
+        return min(judged, key=lambda each: each.false_alarms)
+    best = max(each.recall for each in keeping)
+    return next(each for each in keeping if each.recall >= best - _EQUAL)
+
+
+def judge_detectors(
+    simulator: EnhancedSimulator,
+    learnt: Recording,
+    held_out: Recording,
+    runs: tuple[Recording | None, Recording | None] = (None, None),
+    seed: int = 0,
+    names: Sequence[str] = CANDIDATES,
+) -> list[JudgedDetector]:
+    """Judges detectors on held-out nominal time.
+
+    Args:
+        simulator: The simulator.
+        learnt: Nominal telemetry of the fit, which bounds the thresholds.
+        held_out: Nominal telemetry after it, in parts of at least a window.
+        runs: The coarse runs of both, for recorded runs.
+        seed: Random seed of the detectors and the anomalies.
+        names: Names of the detectors.
+    """
+    clean = None if runs[1] is None else [simulator.enhance_run(part.values) for part in runs[1].parts]
+    series = [part.values for part in held_out.parts]
+    seen = series if clean is None else [own - under for own, under in zip(series, clean, strict=True)]
+    starts = evenly_spaced_starts(series, simulator.window, 3 * _NUM_ANOMALOUS)
+    windows = cut(series, starts, simulator.window)
+    below = 0.0 if clean is None else cut(clean, starts, simulator.window)
+    anomalous = anomalous_windows(
+        windows, np.where(simulator.noise_sd > 0, simulator.noise_sd, simulator.scale), seed, _NUM_ANOMALOUS, SEVERITIES
+    )
+    if len(simulator.channels) > 1:
+        anomalous |= relation_anomalies(windows, np.random.default_rng([seed, 17]))
+    at = np.linspace(0, len(windows) - 1, min(_NUM_ANOMALOUS, len(windows))).astype(int)
+    if clean is not None:
+        anomalous = {key: each - (below if key[0] in RELATIONS else below[at][_order(len(at))]) for key, each in anomalous.items()}
+    anomalies = np.concatenate(list(anomalous.values()))
+    num_disjoint = sum(len(each) // simulator.window for each in series)
+    found = []
+    for name in names:
+        scorer = Scorer(simulator, ScoreOptions(name, _NUM_GENERATED, RATE, seed), learnt, runs[0])
+        flags = np.concatenate([scorer.score_series(each) > 1 for each in seen])
+        # single windows are compared with single nominal windows, whose scores vary more than those of samples
+        nominal = scorer.score_windows(windows - below)
+        limit = max(float(np.quantile(nominal, 1 - RATE)), scorer.threshold)
+        recalls: dict[str, list[float]] = {}
+        scores = np.split(scorer.score_windows(anomalies), np.cumsum([len(each) for each in anomalous.values()])[:-1])
+        for (kind, _), some in zip(anomalous, scores, strict=True):
+            recalls.setdefault(kind, []).append(metrics.recall(some, limit))
+        by_kind = {kind: float(np.mean(each)) for kind, each in recalls.items()}
+        allowed = max(_MOST_TIMES * RATE, _FEW / max(num_disjoint, 1))
+        found.append(JudgedDetector(name, float(flags.mean()), allowed, float(np.mean(list(by_kind.values()))), by_kind))
+    return found
+
+
+def _order(number: int) -> np.ndarray:
+    """The order in which `anomalous_windows` returns windows: every third one, from each of the first three."""
+    return np.concatenate([np.arange(place, number, 3) for place in range(3)])
+
+
+def relation_anomalies(windows: np.ndarray, rng: np.random.Generator) -> dict[tuple[str, float], np.ndarray]:
+    """Makes anomalies that leave the values of every channel as they are, and change only how the channels move together.
+
+    Args:
+        windows: Nominal windows, shape `(windows, samples, channels)`.
+        rng: Draws the channel of each window.
+
+    Returns:
+        As `anomalous_windows`: windows in which one channel is that of another time, and windows in which one channel is shifted by a quarter of
+        a window against the others.
+    """
+    number, samples, channels = windows.shape
+    rows, channel = np.arange(number), rng.integers(0, channels, number)
+    other, late = windows.copy(), windows.copy()
+    other[rows, :, channel] = windows[(rows + number // 2) % number, :, channel]
+    late[rows, :, channel] = np.roll(windows[rows, :, channel], round(_DELAY * samples), axis=1)
+    return {(RELATIONS[0], 1.0): other, (RELATIONS[1], 1.0): late}

@@ -1,0 +1,460 @@
+"""Fits an enhanced simulator to nominal telemetry, and measures it on the held-out end (sections 2.2 and 2.3)."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from enhsim_tf.coarse_simulator.commands import CommandTraces
+from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
+from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
+from enhsim_tf.coarse_simulator.pairing import Delay, estimate_delay
+from enhsim_tf.coarse_simulator.recording import Recording, Run, record
+from enhsim_tf.common.console import SILENT, Progress
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.enhancer.candidates import Choice, choose_enhancer, fit_enhancer
+from enhsim_tf.enhancer.held_out_blocks import NUM_FOLDS, split_fold
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.names import COARSE, RIDGE
+from enhsim_tf.noise.names import BEST as BEST_NOISE
+from enhsim_tf.simulator.alignment import Runs, Waves, pair_recordings
+from enhsim_tf.simulator.checks import check_size
+from enhsim_tf.simulator.coarse_choice import COMMANDS, LEAST_SAMPLES, choose_coarse
+from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
+from enhsim_tf.simulator.joint import cut, join_channels, long_enough, split_end, telemetry_of, times_of
+from enhsim_tf.simulator.noise_choice import JUDGED_SHARE, NoiseWindows, choose_noise
+from enhsim_tf.simulator.options import LEAST_LEARNT, FitOptions, default_window
+from enhsim_tf.simulator.report import Report, make_report
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.quantisation import Levels
+from enhsim_tf.telemetry.series import Telemetry, check_values
+from enhsim_tf.telemetry.windows import evenly_spaced_starts, random_window_starts
+
+_ALIGNMENTS = 2  # rounds in which windows are aligned with the waveform that ridge regression has learnt
+_NUM_WAVEFORM = 1_000  # most windows from which a waveform is learnt
+_NUM_LEVELS = 500  # most windows whose offset and gain are kept
+_MOST_VALUES = 2_000_000  # of all training windows, which bounds time and memory of a fit of many channels
+_LEAST_WINDOWS = 300  # training windows, however many channels
+
+
+def fit(
+    telemetry: Telemetry | Sequence[Telemetry] | Mapping[str, Sequence[Telemetry]] | Recording,
+    coarse: CoarseSimulator | None = None,
+    options: FitOptions | None = None,
+    progress: Progress = SILENT,
+    commands: np.ndarray | None = None,
+) -> tuple[EnhancedSimulator, Report]:
+    """Fits an enhanced simulator to nominal telemetry of one or several channels.
+
+    Args:
+        telemetry: Nominal telemetry: a series, the parts between its gaps, the parts of several channels by name, or a recording.
+        coarse: The coarse simulator: a recorded run of the same time, or an object that is run at the times of the telemetry. None: square
+            waves, or a constant level for a channel that is not periodic.
+        options: Options of the fit. None uses the defaults.
+        progress: Reports the progress as lines of text.
+        commands: Commands of the samples of a single channel, shape `(samples, commands)`. They are used if they explain more of the telemetry
+            than a square wave does.
+
+    Returns:
+        The simulator and the report.
+
+    Raises:
+        InputError: If the telemetry is constant or too short, if channels share too little time, or if the coarse run does not fit.
+    """
+    options, recording = options or FitOptions(), _recording_of(telemetry)
+    for channel, name in enumerate(recording.columns):
+        values = np.concatenate([part.values[:, channel] for part in recording.parts])
+        check_size(check_values(values, name), name)
+    with threadpool_limits(1):  # several threads take longer for arrays of this size, and round differently
+        if coarse is not None:
+            return _fit_runs(recording, coarse, options, progress)
+        return _fit_waves(recording, options, progress, commands)
+
+
+def _recording_of(telemetry: Any) -> Recording:
+    if isinstance(telemetry, Recording):
+        return telemetry
+    if not isinstance(telemetry, Mapping):
+        parts = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
+        name = parts[0].name if parts and isinstance(parts[0], Telemetry) else "telemetry"
+        telemetry = {name: parts}
+    groups = join_channels(telemetry)
+    if len(groups) > 1:
+        raise InputError(
+            f"Expected channels of one sampling interval that share most of their time. Received: {len(groups)} groups: "
+            f"{'; '.join(each.name for each in groups)[:160]}. Fit each group on its own."
+        )
+    return groups[0]
+
+
+# square waves
+
+
+def _fit_waves(
+    recording: Recording, options: FitOptions, progress: Progress, commands: np.ndarray | None
+) -> tuple[EnhancedSimulator, Report]:
+    learnt, held_out, note = _split(recording, options.held_out)
+    refused: dict[int, str] = {}
+    while True:
+        choices = [
+            choose_coarse(
+                telemetry_of(learnt, channel), options.window, commands if len(recording.columns) == 1 else None, refused.get(channel)
+            )
+            for channel in range(len(recording.columns))
+        ]
+        if choices[0].kind == COMMANDS:
+            traces: CommandTraces = choices[0].traces
+            run = traces.recording(commands)
+            chosen = dataclasses.replace(options, window=choices[0].window, held_out=options.held_out if learnt is not recording else 0.0)
+            return _fit_runs(recording, run, chosen, progress, f"{choices[0].said} {note}".strip(), traces.get_config())
+        window = max(each.window for each in choices)
+        if any(len(part) >= window for part in learnt.parts) and len(long_enough(learnt, window)) >= LEAST_LEARNT * window:
+            try:
+                return _fit_aligned(learnt, held_out, choices, window, options, progress, note)
+            except _FlatError as error:
+                refused[error.channel] = "nothing can be learnt from its best square wave, which its windows do not follow"
+                continue
+        raise InputError(
+            f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {len(learnt):,} samples of {recording.name}, the "
+            f"longest part {max(map(len, learnt.parts)):,}. Give more telemetry or a smaller window."
+        )
+
+
+class _FlatError(Exception):
+    """No window of a channel follows its square wave."""
+
+    def __init__(self, channel: int):
+        super().__init__(channel)
+        self.channel = channel
+
+
+def _split(recording: Recording, share: float) -> tuple[Recording, Recording | None, str]:
+    """Splits off the held-out end. Nothing is held out if the rest could not be learnt from; the text says so."""
+    learnt, held_out = split_end(recording, share)
+    if share and len(learnt) < LEAST_SAMPLES <= len(recording):
+        return recording, None, f"Nothing is held out, because the record has only {len(recording):,} samples."
+    values = np.concatenate([part.values for part in learnt.parts])
+    if share and (np.ptp(values, axis=0) == 0).any():
+        return recording, None, f"Nothing is held out, because the first {1 - share:.0%} of the record is constant."
+    return learnt, held_out, ""
+
+
+def _num_windows(options: FitOptions, window: int, channels: int) -> int:
+    return min(options.num_windows, max(_LEAST_WINDOWS, _MOST_VALUES // (window * channels)))
+
+
+def _fit_aligned(
+    learnt: Recording,
+    held_out: Recording | None,
+    choices: Sequence[Any],
+    window: int,
+    options: FitOptions,
+    progress: Progress,
+    note: str,
+) -> tuple[EnhancedSimulator, Report]:
+    usable, channels = long_enough(learnt, window), learnt.columns
+    series = [part.values for part in usable.parts]
+    number = _num_windows(options, window, len(channels))
+    starts = random_window_starts(series, window, number, np.random.default_rng(options.seed))
+    targets, times = cut(series, starts, window), times_of(usable, starts, window)
+    waves = Waves([each.coarse for each in choices], channels, learnt.interval_s, window)
+    waves, coarse, wanted, kept = _learn_waveforms(waves, targets, times)
+    is_level = all(isinstance(each, ConstantLevel) for each in waves.simulators)
+    name = options.enhancer if not is_level else COARSE
+    choice = choose_enhancer(coarse, wanted, times[kept], name, options.seed, options.epochs, _told(progress))
+    simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, np.zeros((1, len(channels), 2)))
+    shift, gain = waves.align(cut(series, evenly_spaced_starts(series, window, _NUM_LEVELS), window))[1:]
+    followed = ~waves.is_flat(gain)
+    if not followed.any():
+        raise _FlatError(0)
+    simulator.levels = np.stack([shift, gain], axis=2)[followed]
+    values = np.concatenate(series)
+    simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(len(channels)))
+
+    def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
+        windows = cut([part.values for part in some.parts], places, window)
+        clean = simulator.enhance(*waves.align(windows))
+        return NoiseWindows(windows - clean, clean, times_of(some, places, window))
+
+    def evenly(some: Recording | None) -> NoiseWindows:
+        some = long_enough(some, window)
+        if some is None:
+            return NoiseWindows(*np.zeros((2, 0, window, len(channels)), np.float32), np.zeros(0, int))
+        return noise_windows(some, evenly_spaced_starts([part.values for part in some.parts], window, number))
+
+    everything = noise_windows(usable, random_window_starts(series, window, number, np.random.default_rng([options.seed, 1])))
+    halves = tuple(evenly(each) for each in split_end(usable, JUDGED_SHARE))
+    said = _said_of(choices, channels, note)
+    return _finish(simulator, choice, halves, everything, options, usable, long_enough(held_out, window), (None, None), said, [], progress)
+
+
+def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tuple[Waves, np.ndarray, np.ndarray, np.ndarray]:
+    """Aligns windows with the waveform that ridge regression learns from each channel's own wave.
+
+    Returns:
+        The waves with their waveforms; the coarse windows and the targets in units of the waves; and which windows are kept.
+    """
+    for number in range(_ALIGNMENTS + 1):
+        coarse, shift, gain = waves.align(targets)
+        kept = ~waves.is_flat(gain)
+        for channel in range(targets.shape[2]):
+            if not kept.any() and not waves.simulators[channel].is_constant:
+                raise _FlatError(channel)
+        safe = np.where(gain != 0, gain, 1.0)
+        wanted = ((targets - shift[:, None]) / safe[:, None]).astype(np.float32)
+        if number == _ALIGNMENTS or all(each.is_constant for each in waves.simulators):
+            return waves, coarse[kept], wanted[kept], kept
+        waveforms = []
+        for channel, simulator in enumerate(waves.simulators):
+            if simulator.is_constant:
+                waveforms.append(None)
+                continue
+            some = np.flatnonzero(kept)[:_NUM_WAVEFORM]
+            ridge = fit_enhancer(RIDGE, coarse[some][:, :, [channel]], wanted[some][:, :, [channel]], times[some])
+            waveforms.append(ridge.predict(waves.phases(channel)[:, :, None])[:, :, 0])
+        waves = Waves(waves.simulators, waves.channels, waves.interval_s, waves.window, waveforms)
+    raise AssertionError("the loop returns")
+
+
+def _said_of(choices: Sequence[Any], channels: Sequence[str], note: str) -> str:
+    if len(channels) == 1:
+        return f"{choices[0].said} {note}".strip()
+    return " ".join([*(f"{name}: {each.said}" for name, each in zip(channels, choices, strict=True)), note]).strip()
+
+
+# runs of the user's simulator
+
+
+def _fit_runs(
+    recording: Recording,
+    coarse: CoarseSimulator,
+    options: FitOptions,
+    progress: Progress,
+    said: str = "",
+    commands: Mapping[str, Any] | None = None,
+) -> tuple[EnhancedSimulator, Report]:
+    run, notes = _run_of(coarse, recording)
+    guess = options.window or default_window((1 - options.held_out) * len(recording))
+    delay = Delay(options.delay_s) if options.delay_s is not None else _delay_of(recording, run, guess)
+    paired, run_there = pair_recordings(recording, run, delay.seconds, 2)
+    window = options.window or default_window((1 - options.held_out) * len(paired))
+    notes.append(_on_delay(delay, telemetry_of(recording)[0], options.delay_s is not None))
+    if len(paired) < len(recording):
+        notes.append(
+            f"{len(paired):,} of {len(recording):,} samples of the telemetry have a coarse run of the same time; the others are not used"
+        )
+    run_there, left_out = _without_constant(run_there)
+    paired, run_there = long_enough(paired, window), long_enough(run_there, window)
+    halves = (
+        [(None, None), (None, None)]
+        if paired is None
+        else list(zip(*(split_end(each, options.held_out) for each in (paired, run_there)), strict=True))
+    )
+    (learnt, learnt_run), (held_out, held_out_run) = (tuple(long_enough(each, window) for each in half) for half in halves)
+    if learnt is None or len(learnt) < LEAST_LEARNT * window:
+        raise InputError(
+            f"Expected at least {LEAST_LEARNT} windows of {window} samples to learn from. Received: {0 if learnt is None else len(learnt):,} samples that "
+            f"{recording.name} and {run.name} share, in stretches at least as long as a window. Give longer runs or a smaller --window."
+        )
+    series, coarse_series = ([part.values for part in each.parts] for each in (learnt, learnt_run))
+    number = _num_windows(options, window, len(recording.columns))
+    starts = evenly_spaced_starts(series, window, number)
+    inputs, targets, times = cut(coarse_series, starts, window), cut(series, starts, window), times_of(learnt, starts, window)
+    choice = choose_enhancer(inputs, targets, times, options.enhancer, options.seed, options.epochs, _told(progress))
+    known = None if isinstance(coarse, Recording) else coarse
+    alignment = Runs(learnt_run, window, delay.seconds, known, name_of(coarse), commands)
+    simulator = EnhancedSimulator(alignment, choice.enhancer, None, recording.columns, recording.interval_s, nominal=None)
+    values = np.concatenate(series)
+    simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(values.shape[1]))
+    residuals = _held_out_residuals(simulator, learnt, learnt_run, choice, inputs, targets, times, options)
+    everything = _cut_noise(residuals, window, number)
+    judged = tuple(_cut_noise(some, window, number) for some in _split_residuals(residuals))
+    return _finish(
+        simulator,
+        choice,
+        judged,
+        everything,
+        options,
+        learnt,
+        held_out,
+        (learnt_run, held_out_run),
+        said,
+        [*notes, *left_out],
+        progress,
+        with_signal=False,
+    )
+
+
+def _run_of(coarse: CoarseSimulator, recording: Recording) -> tuple[Recording, list[str]]:
+    """Returns the recording, or the simulator's run at the times of the telemetry, and what is to be reported about it."""
+    if isinstance(coarse, Recording):
+        return coarse, list(coarse.notes)
+    begin, last = recording.parts[0].offset_s, recording.parts[-1]
+    number = round((last.offset_s - begin) / recording.interval_s) + len(last)
+    run = record(coarse, begin + recording.interval_s * np.arange(number), start=recording.start)
+    return run, [f"{name_of(coarse)}: simulated at the times of the telemetry, {number:,} samples"]
+
+
+def _delay_of(recording: Recording, run: Recording, window: int) -> Delay:
+    """Estimates the delay from the channel that is most correlated with a coarse column."""
+    found = [estimate_delay(telemetry_of(recording, channel), run, window) for channel in range(len(recording.columns))]
+    clear = [each for each in found if each.column is not None]
+    return max(clear, key=lambda each: abs(each.correlation)) if clear else found[0]
+
+
+def _on_delay(delay: Delay, telemetry: Telemetry, was_given: bool) -> str:
+    unit, samples = telemetry.time_unit, delay.seconds / telemetry.interval_s
+    if was_given:
+        return f"delay: {delay.seconds:g} {unit} as given, {samples:g} samples"
+    if delay.column is None:
+        return "delay: none could be estimated, because no coarse column is correlated with the telemetry; 0 is used"
+    later = "later than" if delay.seconds >= 0 else "earlier than"
+    if not delay.seconds:
+        return f"delay: none found; the correlation with {delay.column!r} is largest without one ({delay.correlation:.3f})"
+    return (
+        f"delay: the telemetry is {abs(delay.seconds):g} {unit} ({abs(samples):g} samples) {later} the coarse run; the correlation with "
+        f"{delay.column!r} is {delay.correlation:.3f} there and {delay.undelayed:.3f} without the delay"
+    )
+
+
+def _without_constant(run: Recording) -> tuple[Recording, list[str]]:
+    """Leaves out coarse columns that never vary, because an enhancer learns nothing from them."""
+    varies = np.ptp(np.concatenate([part.values for part in run.parts]), axis=0) > 0
+    gone = [name for name, does in zip(run.columns, varies, strict=True) if not does]
+    if not varies.any():
+        raise InputError(f"Expected a coarse column that varies. Received: only constant ones in {run.name}: {', '.join(gone)[:120]}.")
+    kept = [name for name, does in zip(run.columns, varies, strict=True) if does]
+    return run.select(kept), [f"coarse columns left out, because they never vary: {', '.join(gone)}"] if gone else []
+
+
+def _held_out_residuals(
+    simulator: EnhancedSimulator,
+    learnt: Recording,
+    run: Recording,
+    choice: Choice,
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    times: np.ndarray,
+    options: FitOptions,
+) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Returns first sample, residual and enhanced run of all blocks of time, each from an enhancer that was not fitted to that block.
+
+    Residuals of the telemetry that an enhancer has learnt from are too small, because it has learnt part of their noise.
+    """
+    window, found = simulator.window, []
+    for fold in range(NUM_FOLDS):
+        enhancer: Enhancer = choice.without_fold
+        if fold:
+            kept, _ = split_fold(times, window, choice.edges, fold)
+            enhancer = fit_enhancer(enhancer.name, inputs[kept], targets[kept], times[kept], options.seed, options.epochs)
+        other = EnhancedSimulator(simulator.alignment, enhancer, None, simulator.channels, simulator.interval_s)
+        for block in range(fold, len(choice.edges) - 1, NUM_FOLDS):
+            for part, coarse in zip(learnt.parts, run.parts, strict=True):
+                first = round(part.offset_s / learnt.interval_s)
+                low, high = (int(np.clip(edge - first, 0, len(part))) for edge in choice.edges[block : block + 2])
+                if high - low >= window:
+                    clean = other.enhance_run(coarse.values[low:high])
+                    found.append((first + low, part.values[low:high] - clean, clean))
+    return sorted(found, key=lambda each: each[0])
+
+
+def _split_residuals(residuals: list[tuple[int, np.ndarray, np.ndarray]]) -> tuple[list, list]:
+    """Splits residuals into the first part of the time and the last, on which noise models are judged."""
+    total = sum(len(each) for _, each, _ in residuals)
+    left = total - round(JUDGED_SHARE * total)
+    first, rest = [], []
+    for place, residual, clean in residuals:
+        stop = int(np.clip(left, 0, len(residual)))
+        first += [(place, residual[:stop], clean[:stop])] if stop else []
+        rest += [(place + stop, residual[stop:], clean[stop:])] if stop < len(residual) else []
+        left -= len(residual)
+    return first, rest
+
+
+def _cut_noise(residuals: list[tuple[int, np.ndarray, np.ndarray]], window: int, number: int) -> NoiseWindows:
+    usable = [each for each in residuals if len(each[1]) >= window]
+    if not usable:
+        channels = residuals[0][1].shape[1] if residuals else 1
+        return NoiseWindows(*np.zeros((2, 0, window, channels), np.float32), np.zeros(0, int))
+    places, noise, clean = zip(*usable, strict=True)
+    starts = evenly_spaced_starts(noise, window, number)
+    firsts = np.cumsum([0] + [len(each) - window + 1 for each in noise])
+    which = np.searchsorted(firsts, starts, "right") - 1
+    return NoiseWindows(cut(noise, starts, window), cut(clean, starts, window), np.array(places)[which] + starts - firsts[which])
+
+
+# both
+
+
+def _told(progress: Progress) -> Any:
+    return lambda name: progress.step(f"enhancer {name}")
+
+
+def _finish(
+    simulator: EnhancedSimulator,
+    choice: Choice,
+    halves: tuple[NoiseWindows, NoiseWindows],
+    everything: NoiseWindows,
+    options: FitOptions,
+    learnt: Recording,
+    held_out: Recording | None,
+    runs: tuple[Recording | None, Recording | None],
+    said: str,
+    notes: list[str],
+    progress: Progress,
+    with_signal: bool = True,
+) -> tuple[EnhancedSimulator, Report]:
+    """Fits the noise and chooses the detector. What held-out time contradicts is not shipped: the next noise model is taken then."""
+    progress.step("noise")
+    is_there = bool(np.std(everything.noise, dtype=np.float64) > 0)  # noise of size 0 cannot be judged
+    rows: list[dict[str, Any]] = []
+    if options.noise != BEST_NOISE or not is_there:
+        simulator.noise = everything.fit(options.noise if options.noise != BEST_NOISE else "residual windows")
+    else:
+        simulator.noise, rows, noted = choose_noise(*halves, everything, options.seed, simulator.quantisation, with_signal)
+        notes += noted
+    simulator.nominal = learnt
+    progress.step("detectors")
+    judged_on, judged_runs = (learnt, (runs[0], runs[0])) if held_out is None else (held_out, runs)
+    detectors = judge_detectors(simulator, learnt, judged_on, judged_runs, options.seed)
+    chosen = choose_detector(detectors)
+    used = next((row["name"] for row in rows if row["is_chosen"]), options.noise if options.noise != BEST_NOISE else "residual windows")
+    if not chosen.keeps and options.noise == BEST_NOISE and used not in ("residual windows", "matched residual windows"):
+        notes.append(f"noise model {used} is not used, because held-out time contradicts it; whole residual windows are drawn")
+        simulator.noise, used = everything.fit("residual windows"), "residual windows"
+        for name in ("noise_sd", "scale"):
+            vars(simulator).pop(name, None)
+        detectors = judge_detectors(simulator, learnt, judged_on, judged_runs, options.seed)
+        chosen = choose_detector(detectors)
+    simulator.trained = {
+        "telemetry": learnt.name,
+        "num_samples": len(learnt),
+        "options": dataclasses.asdict(options),
+        "noise": used,
+        "detector": chosen.name,
+        "keeps_promise": bool(chosen.keeps),
+        "false_alarms": chosen.false_alarms,
+    }
+    report = make_report(
+        simulator, choice, rows, detectors, learnt, judged_on, judged_runs, held_out is not None, said, notes, options.seed
+    )
+    if runs[1] is not None or held_out is not None:  # thresholds know all nominal telemetry that was given
+        simulator.nominal = _joined(learnt, held_out)
+        if simulator.is_run_model:
+            simulator.alignment.nominal = _joined(*runs)
+    return simulator, report
+
+
+def _joined(first: Recording, second: Recording | None) -> Recording:
+    """Puts the end of telemetry behind its beginning again; parts that meet become one."""
+    parts = list(first.parts)
+    for part in () if second is None else second.parts:
+        last = parts[-1]
+        meets = abs(last.offset_s + len(last) * first.interval_s - part.offset_s) < 0.5 * first.interval_s
+        if meets:
+            parts[-1] = Run(np.concatenate([last.values, part.values]), last.offset_s)
+        else:
+            parts.append(part)
+    return dataclasses.replace(first, parts=tuple(parts))

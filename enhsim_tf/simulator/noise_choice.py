@@ -1,0 +1,318 @@
+"""Chooses among noise models by held-out noise (an extension of section 2.3).
+
+A noise model is useful if windows with its noise cannot be told from real windows by what is trained on them. Each candidate is therefore
+judged on held-out noise in three ways: how well a classifier separates generated from real windows of noise and the signal below them, how
+many false alarms two cheap detectors raise on real windows after training on generated ones, and how many injected anomalies they find:
+few false alarms are no success where thresholds are so high that anomalies are missed. The simplest candidate that passes all three is
+chosen. Candidates are tried from simple to complex, and those after the first that passes are not tried.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection import metrics
+from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
+from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.noise.candidates import NoiseModel, fit_candidate
+from enhsim_tf.noise.names import CANDIDATES
+from enhsim_tf.realism.two_sample import boosted_trees
+from enhsim_tf.realism.window_features import DECIMALS, signal_edges, signal_features, window_features
+from enhsim_tf.telemetry.quantisation import Levels
+from enhsim_tf.telemetry.windows import disjoint_rows
+
+MAX_AUC_EXCESS = 0.05  # by which the AUC of a candidate may exceed that of real windows against other real windows
+MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows
+MAX_RECALL_LOSS = 0.03  # by which its mean recall may be below that of detectors trained on real windows, at their own thresholds
+TOLD_APART = 0.8  # AUC above which generated noise must not be used without a warning
+JUDGED_SHARE = 0.25  # of the time, at its end, on which candidates are judged
+MOST_JUDGED = 1_000  # windows
+_CHEAP = ("PCA residual", "isolation forest")
+_LEAST_WINDOWS = 20
+_NUM_ANOMALOUS = 60  # windows with anomalies, for each kind and severity
+_ENOUGH_PIECES, _LEAST_PIECE = 200, 16  # disjoint pieces that the classifier should see, and their least length in samples
+_DRAW = 73  # number of the random draw
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseWindows:
+    """Windows of noise and the enhanced windows below them.
+
+    Args:
+        noise: Telemetry minus enhanced signal, shape `(windows, samples, channels)` or without the last axis, in the telemetry's unit.
+        clean: Enhanced windows of the same shape.
+        starts: First sample of each window, shape `(windows,)`. Needed to judge with these windows.
+    """
+
+    noise: np.ndarray
+    clean: np.ndarray
+    starts: np.ndarray | None = None
+
+    @functools.cached_property
+    def disjoint(self) -> "NoiseWindows":
+        """Those windows that share no sample."""
+        return self.at(disjoint_rows(self.starts, self.noise.shape[1]))
+
+    def at(self, rows: np.ndarray) -> "NoiseWindows":
+        """Some of the windows."""
+        return NoiseWindows(self.noise[rows], self.clean[rows], None if self.starts is None else self.starts[rows])
+
+    def fit(self, name: str) -> NoiseModel:
+        """Fits the candidate of a name to these windows."""
+        return fit_candidate(name, self.noise, self.clean, self.starts)
+
+    def __len__(self) -> int:
+        return len(self.noise)
+
+
+@dataclasses.dataclass(frozen=True)
+class CandidateJudgement:
+    """How a candidate does on held-out noise.
+
+    Args:
+        name: Name of the noise model.
+        auc: AUC of a classifier that separates generated from held-out real windows.
+        real_auc: The same for real against other real windows: the floor.
+        alarms: False-alarm rate on held-out real windows, mean over the cheap detectors, trained on generated windows.
+        real_alarms: The same for detectors trained on real windows.
+        recall: Share of injected anomalies that the same detectors find, mean over kinds, severities and detectors.
+        real_recall: The same for detectors trained on real windows.
+    """
+
+    name: str
+    auc: float
+    real_auc: float
+    alarms: float
+    real_alarms: float
+    recall: float
+    real_recall: float
+
+    @property
+    def _excesses(self) -> tuple[float, float, float]:
+        """By how much the AUC and the false alarms are above those of real windows, and the recall is below."""
+        return self.auc - max(self.real_auc, 0.5), self.alarms - self.real_alarms, self.real_recall - self.recall
+
+    @property
+    def passes(self) -> bool:
+        """Whether neither the classifier nor the detectors tell generated from real windows, within the tolerances."""
+        limits = (MAX_AUC_EXCESS, MAX_ALARM_EXCESS, MAX_RECALL_LOSS)
+        return all(excess <= limit for excess, limit in zip(self._excesses, limits, strict=True))
+
+    @property
+    def departure(self) -> float:
+        """Sum of the three excesses, by which candidates are compared if none passes."""
+        return sum(max(excess, 0) for excess in self._excesses)
+
+
+def choose(judgements: Sequence[CandidateJudgement]) -> str:
+    """Returns the name of the first candidate that passes, or of that with the smallest departure if none does."""
+    passing = [each.name for each in judgements if each.passes]
+    return passing[0] if passing else min(judgements, key=lambda each: each.departure).name
+
+
+def choose_noise(
+    learnt: NoiseWindows,
+    judged: NoiseWindows,
+    everything: NoiseWindows,
+    seed: int,
+    quantisation: Sequence[Levels | None] = (),
+    with_signal: bool = True,
+) -> tuple[NoiseModel, list[dict[str, Any]], list[str]]:
+    """Judges candidates on held-out telemetry, and returns the chosen one, fitted to all of the time.
+
+    Args:
+        learnt: Windows of the first part of the time, in order.
+        judged: Windows of the last part of the time, in order.
+        everything: Windows of the whole time.
+        seed: Seed of the draws and of the judges.
+        quantisation: Levels of each channel, or None.
+        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
+
+    Returns:
+        The noise model; for each candidate that was tried the fields of `CandidateJudgement`, `passes` and `is_chosen`; and what is to be
+        said. The list is empty if there is too little telemetry to judge; whole residual windows are drawn then.
+    """
+    if min(len(judged), len(learnt)) < _LEAST_WINDOWS or len(pieces_of(learnt, learnt, judged)[0]) < _LEAST_WINDOWS:
+        return (
+            everything.fit("residual windows"),
+            [],
+            ["there is too little telemetry to judge noise models; whole residual windows are drawn"],
+        )
+    judgements, notes, judge = [], [], HeldOutJudge(learnt, judged, seed, quantisation, with_signal)
+    for number, name in enumerate(CANDIDATES):
+        try:
+            judgements.append(judge.judge(name, learnt.fit(name), np.random.default_rng([seed, _DRAW, number])))
+        except InputError as error:
+            notes.append(f"noise model {name} left out: {error}")
+            continue
+        if judgements[-1].passes:
+            break
+    chosen = choose(judgements)
+    rows = [dataclasses.asdict(each) | {"passes": bool(each.passes), "is_chosen": each.name == chosen} for each in judgements]
+    return everything.fit(chosen), rows, notes
+
+
+class HeldOutJudge:
+    """Judges noise models on held-out telemetry. What concerns real noise alone is computed once, for all candidates.
+
+    The classifier sees disjoint windows only, cut into pieces if there are few of them: it recognises single windows that overlap, whatever
+    their noise is like. Of each candidate as many are generated: of more, some would repeat real noise if it draws real windows again.
+
+    Args:
+        learnt: Windows from which the models are fitted, in the order of time.
+        judged: Windows that they have not seen, in the order of time.
+        seed: Seed of the classifier, the detectors and the positions of the anomalies.
+        quantisation: Levels of each channel, or None.
+        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
+        rate: False-alarm rate for which thresholds are set.
+    """
+
+    def __init__(
+        self,
+        learnt: NoiseWindows,
+        judged: NoiseWindows,
+        seed: int,
+        quantisation: Sequence[Levels | None] = (),
+        with_signal: bool = True,
+        rate: float = 0.01,
+    ):
+        number = min(len(judged), len(learnt), MOST_JUDGED)
+        if number < _LEAST_WINDOWS:
+            raise InputError(
+                f"Expected at least {_LEAST_WINDOWS} windows of each kind. Received: {number}. Use more telemetry or shorter windows."
+            )
+        first, last = (each.at(np.linspace(0, len(each) - 1, number).astype(int)) for each in (learnt, judged))
+        self.rate, self.seed, self._with_signal, self._quantisation = rate, seed, with_signal, tuple(quantisation)
+        self._clean, self._learnt, self._held_out = first.clean, learnt, judged
+        few = min(number, len(learnt.disjoint), len(judged.disjoint))
+        self._few = first.clean[np.linspace(0, number - 1, few).astype(int)]
+        pieces = pieces_of(learnt, learnt, judged)
+        self._unit = unit_of(pieces[1].noise)
+        self._edges = [signal_edges(each) for each in _channels(pieces[1].clean)]
+        self._held_out_features = self._features(pieces[2])
+        self.real_auc = boosted_trees(self._features(pieces[1]), self._held_out_features, seed).auc
+        self._noise_sd = unit_of(first.noise)
+        nominal = self._seen(last)
+        self._nominal = nominal
+        self._anomalous = np.concatenate(list(anomalous_windows(nominal, self._noise_sd, seed, _NUM_ANOMALOUS).values()))
+        self.real_alarms, self.real_recall = self._detected(self._seen(first))
+
+    def _features(self, windows: NoiseWindows) -> np.ndarray:
+        """What the classifier sees: features of the noise, also where the signal has different levels and slopes, and between channels."""
+        noise = np.round(np.asarray(windows.noise, np.float64) / self._unit, DECIMALS)
+        columns = []
+        for own, signal, edges in zip(_channels(noise), _channels(windows.clean), self._edges, strict=True):
+            columns += [window_features(own), signal_features(own, signal, edges)]
+        if noise.ndim == 3 and noise.shape[2] > 1:
+            centred = noise - noise.mean(axis=1, keepdims=True)
+            covariance = np.einsum("wsa,wsb->wab", centred, centred)
+            size = np.sqrt(np.maximum(np.einsum("waa->wa", covariance), 1e-12))
+            columns.append((covariance / (size[:, :, None] * size[:, None]))[:, *np.triu_indices(noise.shape[2], 1)])
+        return np.concatenate(columns, axis=1)
+
+    def _seen(self, windows: NoiseWindows) -> np.ndarray:
+        return windows.noise + windows.clean if self._with_signal else windows.noise
+
+    def _detected(self, training: np.ndarray) -> tuple[float, float]:
+        """False-alarm rate and recall on held-out real windows, means over the cheap detectors; half of the windows set the thresholds."""
+        half, rates, recalls = len(training) // 2, [], []
+        training, nominal, anomalous = (each / self._noise_sd for each in (training, self._nominal, self._anomalous))
+        for name in _CHEAP:
+            detector = DETECTORS[name](self.seed).fit(training[:half])
+            # an infinite threshold would silence all candidates
+            threshold, _ = metrics.finite_threshold(detector.score(training[half:]), self.rate)
+            rates.append(metrics.false_alarm_rate(detector.score(nominal), threshold))
+            recalls.append(metrics.recall(detector.score(anomalous), threshold))
+        return float(np.mean(rates)), float(np.mean(recalls))
+
+    def _noise_on(self, clean: np.ndarray, model: NoiseModel, rng: np.random.Generator) -> NoiseWindows:
+        # sums of 32-bit numbers: where the signal is large, the noise that is judged has their steps, as the real one has
+        generated = clean + model.generate(len(clean), rng, clean)
+        for channel, levels in enumerate(self._quantisation):
+            if levels is not None:
+                generated[..., channel] = levels.round(generated[..., channel])
+        return NoiseWindows(generated - clean, clean)
+
+    def judge(self, name: str, model: NoiseModel, rng: np.random.Generator) -> CandidateJudgement:
+        """Judges a fitted noise model.
+
+        Args:
+            name: Its name.
+            model: The noise model.
+            rng: Random generator of its noise.
+        """
+        noise = self._noise_on(self._clean, model, rng)
+        pieces = pieces_of(self._noise_on(self._few, model, rng), self._learnt, self._held_out)[0]
+        auc = boosted_trees(self._features(pieces), self._held_out_features, self.seed).auc
+        alarms, recall = self._detected(self._seen(noise))
+        return CandidateJudgement(name, auc, self.real_auc, alarms, self.real_alarms, recall, self.real_recall)
+
+
+def _channels(windows: np.ndarray) -> list[np.ndarray]:
+    return [windows] if windows.ndim == 2 else [windows[:, :, channel] for channel in range(windows.shape[2])]
+
+
+def unit_of(noise: np.ndarray) -> np.ndarray:
+    """The standard deviation of noise, that of each channel for several ones; 1 where it is 0."""
+    deviation = np.std(noise, axis=(0, 1), dtype=np.float64)
+    return np.where(deviation > 0, deviation, 1.0)
+
+
+def anomalous_windows(
+    nominal: np.ndarray, noise_sd: np.ndarray, seed: int, number: int, severities: Sequence[float] = SEVERITIES
+) -> dict[tuple[str, float], np.ndarray]:
+    """Injects anomalies of every kind and severity into nominal windows, each into one channel.
+
+    Args:
+        nominal: Nominal windows, shape `(windows, samples, channels)` or without the last axis, in the order of time.
+        noise_sd: Standard deviation of the noise of each channel, the unit of severity.
+        seed: Seed of positions and channels.
+        number: Number of windows of each kind and severity, evenly spaced over the nominal ones; three durations alternate.
+        severities: Severities.
+
+    Returns:
+        The windows by kind and severity.
+    """
+    chosen = nominal[np.linspace(0, len(nominal) - 1, min(number, len(nominal))).astype(int)]
+    durations = [min(duration, nominal.shape[1]) for duration in DURATIONS]
+    found = {}
+    for kind in INJECTIONS:
+        for severity in severities:
+            parts = []
+            for place, duration in enumerate(durations):
+                windows, rng = chosen[place :: len(durations)].copy(), np.random.default_rng([seed, place])
+                if windows.ndim == 2:
+                    parts.append(inject(windows, kind, severity, duration, float(noise_sd), rng)[0])
+                    continue
+                channel = rng.integers(0, windows.shape[2], len(windows))
+                rows, unit = np.arange(len(windows)), noise_sd[channel][:, None]
+                windows[rows, :, channel] = inject(windows[rows, :, channel] / unit, kind, severity, duration, 1.0, rng)[0] * unit
+                parts.append(windows)
+            found[kind, severity] = np.concatenate(parts)
+    return found
+
+
+def pieces_of(generated: NoiseWindows, learnt: NoiseWindows, judged: NoiseWindows) -> list[NoiseWindows]:
+    """Returns disjoint windows of each kind, as many of each, cut into pieces if there are few.
+
+    Args:
+        generated: Generated windows of noise, or `learnt` itself.
+        learnt: Windows from which the noise model was fitted.
+        judged: Windows that it has not seen.
+    """
+    groups = [generated.disjoint if generated is learnt else generated, learnt.disjoint, judged.disjoint]
+    number, window = min(map(len, groups)), generated.noise.shape[1]
+    if not number:
+        return [each.at(np.zeros(0, int)) for each in groups]
+    pieces = max(1, min(-(-_ENOUGH_PIECES // number), window // _LEAST_PIECE))
+    short = window // pieces
+    found = []
+    for each in groups:
+        some = each.at(np.linspace(0, len(each) - 1, number).astype(int))
+        cut = (windows[:, : short * pieces].reshape(-1, short, *windows.shape[2:]) for windows in (some.noise, some.clean))
+        found.append(NoiseWindows(*cut))
+    return found

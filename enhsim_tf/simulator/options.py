@@ -1,0 +1,168 @@
+"""Options of fitting, scoring and updating, declared once: in Python as fields, on the command line as options. Nothing slow is imported."""
+
+import argparse
+import dataclasses
+from typing import Any
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.enhancer.names import BEST, CANDIDATES
+from enhsim_tf.noise.names import CANDIDATES as NOISES
+
+FEWEST_SAMPLES = 32  # minimum window length on request
+LEAST_WINDOW, MOST_WINDOW = 64, 500  # limits of the default window length in samples; the paper uses 500
+LEAST_LEARNT = 8  # minimum length of the training telemetry, in windows
+_WINDOWS_IN_RECORD = 20  # without a period, the default window is this share of the record
+
+
+def _option(
+    default: Any, help_text: str, *, least: float | None = None, most: float | None = None, choices: tuple[str, ...] = (), kind: type = int
+):  # noqa: ANN202
+    return dataclasses.field(default=default, metadata={"help": help_text, "least": least, "most": most, "choices": choices, "kind": kind})
+
+
+class _Checked:
+    """A dataclass whose fields have limits and choices."""
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            _check(field, getattr(self, field.name))
+
+
+def _check(field: dataclasses.Field, value: Any) -> None:
+    limits = field.metadata
+    if value is None and field.default is None:
+        return
+    if limits["choices"]:
+        if value not in limits["choices"]:
+            raise InputError(f"Expected {field.name}, one of: {', '.join(limits['choices'])}. Received: {field.name}={value!r}.")
+        return
+    is_number = isinstance(value, int if limits["kind"] is int else (int, float)) and not isinstance(value, bool)
+    low, high = limits["least"], limits["most"]
+    if not is_number or (low is not None and not value >= low) or (high is not None and not value <= high):
+        what = "a whole number" if limits["kind"] is int else "a number"
+        span = "" if low is None else f" of at least {low:g}" if high is None else f" from {low:g} to {high:g}"
+        raise InputError(f"Expected {field.name} to be {what}{span}. Received: {field.name}={value!r}.")
+
+
+@dataclasses.dataclass(frozen=True)
+class FitOptions(_Checked):
+    """Options of a fit. The defaults are those of the command `fit`.
+
+    Args:
+        window: Length of a window in samples.
+        num_windows: Number of training windows.
+        epochs: Passes of a network over the training windows.
+        noise: Name of the noise model, or `best`.
+        enhancer: Name of the enhancer, or `best`.
+        held_out: Share of the telemetry, taken from its end, on which the report is measured. 0 fits and reports on all telemetry.
+        delay_s: Delay of the telemetry relative to a recorded run, in seconds.
+        seed: Random seed.
+
+    Raises:
+        InputError: If a value is out of range.
+    """
+
+    window: int | None = _option(
+        None,
+        "window length in samples (default: two periods of a square wave, otherwise a twentieth of the record; limited to 64 to 500 and to an "
+        "eighth of the record)",
+        least=FEWEST_SAMPLES,
+    )
+    num_windows: int = _option(2_500, "number of training windows (default: 2500; fewer for many channels)", least=1)
+    epochs: int = _option(6, "training epochs of a network (default: 6)", least=1)
+    noise: str = _option(
+        BEST,
+        "noise model (default: best, the simplest that held-out telemetry does not tell from real noise)",
+        choices=(BEST, *NOISES),
+    )
+    enhancer: str = _option(
+        BEST,
+        "enhancer (default: best, the simplest whose error on held-out time is not measurably larger than that of the best one); network is the "
+        "paper's",
+        choices=(BEST, *CANDIDATES),
+    )
+    held_out: float = _option(0.2, "share of the telemetry held out for the report (default: 0.2)", least=0, most=0.5, kind=float)
+    delay_s: float | None = _option(
+        None,
+        "delay of the telemetry relative to the recorded run, in seconds, or in samples if there are no times (default: estimated)",
+        kind=float,
+    )
+    seed: int = _option(0, "random seed (default: 0)", least=0, most=2**31 - 1)
+
+
+@dataclasses.dataclass(frozen=True)
+class ScoreOptions:
+    """Options of scoring.
+
+    Args:
+        detector: Name of a detector, or None for the one that the fit chose by held-out time.
+        num_windows: Number of generated nominal windows from which the detector learns.
+        false_alarm_rate: Share of nominal samples to flag.
+        seed: Random seed.
+
+    Raises:
+        InputError: If the detector is unknown or a number is out of range.
+    """
+
+    detector: str | None = None
+    num_windows: int = _option(2_000, "generated windows from which the detector learns (default: 2000)", least=10)
+    false_alarm_rate: float = _option(0.01, "share of nominal samples to flag (default: 0.01)", least=1e-9, most=0.5, kind=float)
+    seed: int = _option(0, "random seed (default: 0)", least=0, most=2**31 - 1)
+
+    def __post_init__(self):
+        known = (RESIDUAL, *all_detectors())
+        if self.detector is not None and self.detector not in known:
+            raise InputError(f"Expected a detector, one of: {', '.join(known)}. Received: {self.detector!r}.")
+        for field in dataclasses.fields(self)[1:]:
+            _check(field, getattr(self, field.name))
+
+
+def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> None:
+    """Adds fields of a class of options to a parser.
+
+    Args:
+        parser: The parser or a group of it.
+        options: The class.
+        *names: Names of the fields.
+    """
+    fields = {field.name: field for field in dataclasses.fields(options)}
+    for name in names:
+        field = fields[name]
+        word = "--" + name.removesuffix("_s").replace("_", "-")
+        if field.metadata["choices"]:
+            spelled = tuple(map(option_name, field.metadata["choices"]))
+            parser.add_argument(word, dest=name, choices=spelled, default=option_name(field.default), help=field.metadata["help"])
+        else:
+            metavar = {"held_out": "SHARE", "false_alarm_rate": "SHARE", "delay_s": "SECONDS"}.get(name, "N")
+            parser.add_argument(
+                word, dest=name, type=field.metadata["kind"], default=field.default, metavar=metavar, help=field.metadata["help"]
+            )
+
+
+def options_from(namespace: argparse.Namespace, options: type) -> Any:
+    """Makes an object of a class of options from a parsed command line.
+
+    Args:
+        namespace: Parsed options.
+        options: The class.
+
+    Raises:
+        InputError: If a value is out of range.
+    """
+    found = {}
+    for field in dataclasses.fields(options):
+        if hasattr(namespace, field.name):
+            value = getattr(namespace, field.name)
+            spelled = {option_name(each): each for each in field.metadata.get("choices", ())}
+            found[field.name] = spelled.get(value, value) if isinstance(value, str) else value
+    return options(**found)
+
+
+def default_window(num_samples: float) -> int:
+    """Returns the window length in samples for a record without a period that is known.
+
+    Args:
+        num_samples: Length of the record in samples.
+    """
+    return int(min(max(num_samples // _WINDOWS_IN_RECORD, LEAST_WINDOW), MOST_WINDOW))

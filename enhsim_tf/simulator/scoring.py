@@ -1,0 +1,384 @@
+"""Scores telemetry with a detector that has learnt from generated nominal telemetry.
+
+The threshold is the larger of two: that of generated telemetry, and that of the nominal telemetry of the fit. Generated telemetry may raise a
+threshold, and never undercuts what real nominal time shows.
+"""
+
+import functools
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection import metrics
+from enhsim_tf.detection.evaluation import mean_over_windows
+from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
+from enhsim_tf.detection.registry import RESIDUAL, all_detectors
+from enhsim_tf.detection.residual_size import ResidualSize
+from enhsim_tf.simulator.joint import cut, telemetry_of
+from enhsim_tf.simulator.operating_point import Departure, find_departure
+from enhsim_tf.simulator.options import ScoreOptions
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.pandas_series import to_series
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_THRESHOLD_WINDOWS = 1_000  # length in windows of the generated series for the threshold; only scores a window apart are independent
+_STRIDES = 8  # number of scored windows that begin within one window length
+_SERIES_VALUES = 4_000_000  # most values of such a series
+_CHUNK_VALUES = 4_000_000  # values of windows that are scored at a time
+_NOMINAL_VALUES = 2_000_000  # most values of nominal telemetry with which a threshold is set
+DEFAULT = "PCA residual"
+"""The detector of a simulator whose fit chose none."""
+
+
+class Scorer:
+    """A detector of one simulator, with its threshold. Scores are divided by the threshold, so scores above 1 are anomalous.
+
+    For square waves, `residual` and `innovation` judge telemetry minus the aligned simulator, the other detectors the telemetry itself. For
+    recorded runs, all judge the telemetry minus the enhanced run of the same time.
+
+    Args:
+        simulator: The simulator.
+        options: Options of the scoring.
+        nominal: Nominal telemetry that bounds the threshold from below. None: that of the fit.
+        run: Its coarse run, for recorded runs. None: that of the fit.
+    """
+
+    def __init__(
+        self,
+        simulator: EnhancedSimulator,
+        options: ScoreOptions | None = None,
+        nominal: Recording | None = None,
+        run: Recording | None = None,
+    ):
+        self.simulator, self.options = simulator, options or ScoreOptions()
+        self.window, self.stride = simulator.window, max(1, simulator.window // _STRIDES)
+        self.name = self.options.detector or str(simulator.trained.get("detector", DEFAULT))
+        self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
+        self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
+        self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
+        self.threshold, seed = 1.0, self.options.seed
+        training = self._generated_windows(self.options.num_windows, seed)
+        self.detector = ResidualSize() if self.name == RESIDUAL else all_detectors()[self.name](seed)
+        means = training.mean(axis=1, dtype=np.float64)
+        self._low, self._high = means.min(axis=0), means.max(axis=0)
+        width = np.maximum(self._high - self._low, simulator.noise_sd)
+        self._low, self._high = self._low - width, self._high + width  # levels beyond count as residual
+        if self.name == RESIDUAL:
+            self.detector.fit_sizes(self._sizes(training))
+        else:
+            self.detector.fit(self._judged(training))
+        length = int(np.clip(_SERIES_VALUES // (self.window * len(simulator.channels)), 100, _THRESHOLD_WINDOWS))
+        scores = self._of_generated(length, seed + 1)
+        generated, self.rate = metrics.finite_threshold(scores, self.options.false_alarm_rate, length)
+        real = self._of_nominal(*((simulator.nominal, self._nominal_run()) if nominal is None else (nominal, run)))
+        self.nominal_threshold = (
+            metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0] if len(real) else -np.inf
+        )
+        self.threshold = max(generated, self.nominal_threshold)
+        self._length = length
+
+    @functools.cached_property
+    def nominal_scores(self) -> np.ndarray:
+        """Scores of a further generated series, on which alarms are counted."""
+        with threadpool_limits(1):
+            return self._relative(self._of_generated(self._length, self.options.seed + 2))
+
+    def _nominal_run(self) -> Recording | None:
+        return self.simulator.alignment.nominal if self.simulator.is_run_model else None
+
+    def _generated_windows(self, number: int, seed: int) -> np.ndarray:
+        if not self.simulator.is_run_model:
+            return self.simulator.generate(number, seed=seed)
+        return self.simulator.draw_noise(self.simulator.generate_clean(number, seed=seed), np.random.default_rng([seed, 3]))
+
+    def _of_generated(self, length: int, seed: int) -> np.ndarray:
+        series = self.simulator.generate_series(length * self.window, seed=seed)
+        if self.simulator.is_run_model:
+            series = series - self.simulator._nominal_series(len(series), 0.0)
+        return self._raw(series)
+
+    def _of_nominal(self, nominal: Recording | None, run: Recording | None) -> np.ndarray:
+        """Scores nominal telemetry, at most so many values of it, evenly spread."""
+        if nominal is None:
+            return np.zeros(0)
+        kept = [number for number, part in enumerate(nominal.parts) if len(part) >= self.window]
+        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, len(kept))))
+        found = [np.zeros(0)]
+        for number in kept:
+            first = (len(nominal.parts[number]) - most) // 2 if len(nominal.parts[number]) > most else 0
+            part = nominal.parts[number].values[first : first + most]
+            if run is not None:
+                part = part - self.simulator.enhance_run(run.parts[number].values[first : first + most])
+            found.append(self._raw(part))
+        return np.concatenate(found)
+
+    def _judged(self, windows: np.ndarray) -> np.ndarray:
+        """What the detector sees of windows: one channel as it is, several in units of their standard deviations."""
+        if self.on_residual and not self.simulator.is_run_model:
+            windows = self.simulator.residuals(windows)
+        return windows[:, :, 0] if windows.shape[2] == 1 else windows / self.unit
+
+    def _raw(self, series: np.ndarray) -> np.ndarray:
+        """Scores each sample of a series of shape `(samples, channels)` by the mean score of the windows that contain it."""
+        begins = np.unique(np.append(np.arange(0, len(series) - self.window + 1, self.stride), len(series) - self.window))
+        step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
+        if self.name == RESIDUAL:  # its scale follows the windows before, so it sees all sizes at once
+            sizes = [self._sizes(cut([series], begins[first : first + step], self.window)) for first in range(0, len(begins), step)]
+            scores = self.detector.score_sizes(np.concatenate(sizes))
+        else:
+            found = [
+                self.detector.score(self._judged(cut([series], begins[first : first + step], self.window)))
+                for first in range(0, len(begins), step)
+            ]
+            scores = np.concatenate(found)
+        return mean_over_windows(scores, begins, self.window, len(series))
+
+    def _sizes(self, windows: np.ndarray) -> np.ndarray:
+        judged = self._judged(windows)
+        sizes = np.sqrt(np.mean(judged.reshape(len(judged), -1) ** 2, axis=1, dtype=np.float64))
+        if self.simulator.is_run_model:
+            return sizes
+        means = windows.mean(axis=1, dtype=np.float64)
+        beyond = (means - np.clip(means, self._low, self._high)) / self.unit
+        return np.hypot(sizes, np.sqrt(np.mean(beyond**2, axis=1)))
+
+    def score_windows(self, windows: np.ndarray) -> np.ndarray:
+        """Scores single windows, which are not in the order of time, without dividing by the threshold.
+
+        Args:
+            windows: Telemetry, or for recorded runs residuals, shape `(windows, samples, channels)`.
+        """
+        if self.name == RESIDUAL:
+            return self._sizes(windows)
+        return self.detector.score(self._judged(windows))
+
+    def score_series(self, series: np.ndarray) -> np.ndarray:
+        """Scores every sample.
+
+        Args:
+            series: Telemetry without gaps, or for recorded runs telemetry minus the enhanced run, shape `(samples, channels)`, with at least a
+                window of samples.
+
+        Returns:
+            float64 array of shape `(samples,)`, scaled so that the threshold is 1.
+        """
+        return self._relative(self._raw(np.asarray(series, np.float32)))
+
+    def _relative(self, scores: np.ndarray) -> np.ndarray:
+        # if the threshold is not positive, the scores are shifted instead
+        return scores / self.threshold if self.threshold > 0 else 1 + scores - self.threshold
+
+
+def score(
+    simulator: EnhancedSimulator,
+    telemetry: Recording,
+    run: Recording | None = None,
+    options: ScoreOptions | None = None,
+    scorer: Scorer | None = None,
+) -> "pd.DataFrame":
+    """Scores every sample of telemetry.
+
+    Args:
+        simulator: The fitted simulator.
+        telemetry: Telemetry of its channels, as returned by `joint.join_channels`.
+        run: The coarse run of the same time, for a simulator of recorded runs.
+        options: Options of the scoring. None uses the defaults.
+        scorer: A scorer of this simulator, if there is one already.
+
+    Returns:
+        A data frame with the index of `pandas_series.to_series` and the columns `value` (of several channels, their names), with a run
+        `enhanced` (of several channels, `enhanced NAME`), `score` (scaled so that the threshold is 1), `flag` (whether the score is above 1),
+        with a lasting departure `score_after` (scores against the new operating point), and with a run `out_of_range` (above 1, the coarse run
+        is outside the training range). Samples in parts shorter than a window, or without a run, have NaN in place of scores. `frame.attrs` holds
+        `detector`, `expected_false_alarm_rate`, `events` (the rows of `events_table`), `false_alarms_per_day` (with its 95 % interval, on
+        generated telemetry) and `departure` (a sentence, or an empty text).
+
+    Raises:
+        InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
+    """
+    _check(simulator, telemetry, run)
+    with threadpool_limits(1):  # several threads take longer for arrays of this size
+        return _scored(simulator, telemetry, run, scorer or Scorer(simulator, options))
+
+
+def _scored(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None, scorer: Scorer) -> "pd.DataFrame":
+    import pandas as pd
+
+    from enhsim_tf.simulator.trusted_range import TrustedRange
+
+    trusted = TrustedRange(simulator) if run is not None else None
+    coarse = _coarse_of(simulator, telemetry, run)
+    frames, judged = [], []
+    for number, part in enumerate(telemetry.parts):
+        single = len(simulator.channels) == 1
+        columns = {"value" if single else name: part.values[:, channel] for channel, name in enumerate(simulator.channels)}
+        scores, outside = np.full(len(part), np.nan), np.full(len(part), np.nan)
+        enhanced = np.full(part.values.shape, np.nan, np.float32)
+        for first, values in coarse[number]:
+            here = slice(first, first + len(values))
+            if run is None:
+                seen = part.values[here]
+            else:
+                enhanced[here] = simulator.enhance_run(values)
+                seen = part.values[here] - enhanced[here]
+                outside[here] = trusted.score_run(values)
+            scores[here] = scorer.score_series(seen)
+            judged.append((number, first, seen))
+        if run is not None:
+            columns |= {"enhanced" if single else f"enhanced {name}": enhanced[:, k] for k, name in enumerate(simulator.channels)}
+        columns |= {"score": scores, "flag": scores > 1} | ({} if run is None else {"out_of_range": outside})
+        frames.append(pd.DataFrame(columns, index=to_series(telemetry_of(telemetry)[number]).index))
+    if not judged:
+        raise InputError(
+            f"Expected a part of at least one window of {simulator.window} samples. Received: {max(map(len, telemetry.parts))} samples. "
+            "Give more telemetry."
+        )
+    frame = pd.concat(frames)
+    departure = find_departure(scorer, telemetry, [frame["score"].to_numpy() for frame in frames], judged)
+    if departure is not None:
+        frame["score_after"] = departure.scores
+    _note(frame, scorer, [len(each) for each in frames], departure)
+    return frame
+
+
+def _check(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
+    if telemetry.columns != simulator.channels and len(telemetry.columns) != 1 != len(simulator.channels):
+        raise InputError(
+            f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
+        )
+    if abs(telemetry.interval_s - simulator.interval_s) > 1e-3 * simulator.interval_s:
+        raise InputError(
+            f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {telemetry.interval_s:g} s. "
+            "Give telemetry with the same sampling interval, or --interval."
+        )
+    if simulator.is_run_model and run is None:
+        raise InputError(
+            f"Expected the coarse run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none. "
+            "Give it with --coarse."
+        )
+    if run is not None:
+        simulator._runs()
+
+
+def _coarse_of(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> list[list[tuple[int, np.ndarray]]]:
+    """For each part of the telemetry, the first sample and the coarse values of each stretch that can be scored."""
+    if run is None:
+        return [[(0, part.values)] if len(part) >= simulator.window else [] for part in telemetry.parts]
+    _, coarse = simulator.alignment.pair(telemetry, run)
+    found: list[list[tuple[int, np.ndarray]]] = [[] for _ in telemetry.parts]
+    for stretch in coarse.parts:
+        for number, part in enumerate(telemetry.parts):
+            first = round((stretch.offset_s - part.offset_s) / telemetry.interval_s)
+            if 0 <= first < len(part):
+                found[number].append((first, stretch.values))
+    return found
+
+
+def _note(frame: "pd.DataFrame", scorer: Scorer, lengths: Sequence[int], departure: Departure | None) -> None:
+    """Notes detector, expected false alarms and events in `frame.attrs`, see `score`."""
+    window, interval_s, scores = scorer.window, scorer.simulator.interval_s, frame["score"].to_numpy()
+    events, before = [], 0
+    for length in lengths:
+        own = scores[before : before + length].copy()
+        if departure is not None and departure.begin < before + length:
+            own[max(departure.begin - before, 0) :] = np.nan  # a lasting departure is one event
+        events += event_rows(own, before, scorer.nominal_scores, window, interval_s)
+        before += length
+    if departure is not None:
+        peak = departure.begin + int(np.nanargmax(scores[departure.begin :]))
+        end, flagged = len(scores), int(np.nansum(scores[departure.begin :] > 1))
+        row = {"begin": departure.begin, "end": end, "peak": peak, "duration_s": (end - departure.begin) * interval_s}
+        events.append(row | {"num_flagged": flagged, "score": float(scores[peak]), "confidence": event_confidence(scores[peak], scorer)})
+    num_alarms = len(events_of(scorer.nominal_scores > 1, gap=window))
+    frame.attrs["detector"] = scorer.name
+    frame.attrs["expected_false_alarm_rate"] = scorer.rate
+    frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(scorer.nominal_scores) * interval_s))
+    frame.attrs["events"] = events
+    frame.attrs["departure"] = "" if departure is None else departure.said
+
+
+def event_confidence(peak: float, scorer: Scorer) -> float:
+    """Confidence that an event with this highest score is no false alarm, see `events.confidences`."""
+    return float(confidences([peak], scorer.nominal_scores, scorer.window)[0])
+
+
+def event_rows(scores: np.ndarray, before: int, nominal_scores: np.ndarray, window: int, interval_s: float) -> list[dict]:
+    """Returns the events of a part in plain JSON types. Flags within a window of each other are one event, as they share windows.
+
+    Args:
+        scores: Scores of the part, scaled so that the threshold is 1, shape `(samples,)`.
+        before: Number of samples before the part.
+        nominal_scores: Scores of a generated nominal series, shape `(samples,)`.
+        window: Length of a window in samples.
+        interval_s: Sampling interval in seconds.
+    """
+    flags, rows = scores > 1, []
+    found = events_of(flags, scores, window)
+    peaks = [scores[event.peak] for event in found]
+    for event, peak, confidence in zip(found, peaks, confidences(peaks, nominal_scores, window), strict=True):
+        rows.append(
+            {
+                "begin": before + event.begin,
+                "end": before + event.end,
+                "peak": before + event.peak,
+                "duration_s": (event.end - event.begin) * interval_s,
+                "num_flagged": int(flags[event.begin : event.end].sum()),
+                "score": float(peak),
+                "confidence": float(confidence),
+            }
+        )
+    return rows
+
+
+def events_table(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Returns the events in scores, one row per alarm.
+
+    Args:
+        frame: Scores, as returned by `score`.
+
+    Returns:
+        A data frame with the columns `begin`, `end` and `peak` (times of the first flagged sample, of the sample after the last one, and of the
+        highest score; sample numbers if the telemetry has no times), `duration_s`, `num_flagged`, `score` (the highest score; the threshold is
+        1) and `confidence` (see `events.confidences`). Runs of flags that are at most one window apart are one event; so is a lasting departure.
+    """
+    import pandas as pd
+
+    names = ["begin", "end", "peak", "duration_s", "num_flagged", "score", "confidence"]
+    table = pd.DataFrame(frame.attrs["events"], columns=names)
+    index, begin, end = frame.index, table["begin"].to_numpy(int), table["end"].to_numpy(int)
+    if hasattr(index, "tz"):
+        after = index[begin] + pd.to_timedelta(table["duration_s"].to_numpy(float), unit="s").round("us")
+    else:
+        after = index[end - 1] + 1
+    return table.assign(begin=index[begin], end=after, peak=index[table["peak"].to_numpy(int)])
+
+
+def events_path(path: str | os.PathLike) -> Path:
+    """Returns the path of the events beside a file of scores, for example `scores.events.csv` beside `scores.parquet`."""
+    return Path(path).with_suffix(".events.csv")
+
+
+def write_scores(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
+    """Writes scores to a `.parquet` or `.csv` file, and their events to `events_path`. The files appear only when both are complete.
+
+    Args:
+        path: Path of the file.
+        frame: Scores, as returned by `score`.
+    """
+    with replace_file(path) as temporary, replace_file(events_path(path)) as events:
+        events_table(frame).to_csv(events, index=False)
+        if Path(path).suffix == ".csv":
+            frame.to_csv(temporary)
+        else:
+            plain = frame.copy(deep=False)
+            plain.attrs = {}  # Parquet would store them as JSON
+            plain.to_parquet(temporary, index=True)  # sample numbers, too, are a column for every reader

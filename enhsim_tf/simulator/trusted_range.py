@@ -1,0 +1,76 @@
+"""Detects coarse windows outside the enhancer's training range, for which enhanced windows are extrapolations."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enhsim_tf.detection import metrics
+from enhsim_tf.enhancer.out_of_range import OutOfRange
+from enhsim_tf.enhancer.overlapping import average_windows, run_starts
+from enhsim_tf.simulator.joint import cut
+
+if TYPE_CHECKING:
+    from enhsim_tf.coarse_simulator.degraded import Degraded
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
+
+_NUM_NOMINAL = 900  # coarse windows for fitting the range, and as many others for its limit
+_LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows whose scores are all close to 0
+_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
+
+
+class TrustedRange:
+    """The range of a simulator's nominal coarse windows, the only ones on which its enhancer was trained.
+
+    The score is computed from coarse windows only. It cannot detect an error of the coarse simulator itself.
+
+    Args:
+        simulator: A simulator fitted to nominal telemetry.
+        rate: Share of nominal windows that count as outside the range.
+
+    Example:
+    >>> trusted = TrustedRange(simulator)
+    >>> trusted.share_outside(Degraded("stuck", severity=0.5))
+    """
+
+    def __init__(self, simulator: "EnhancedSimulator", rate: float = 0.01):
+        self.simulator = simulator
+        learnt, held_out = (self._drawn(None, _NUM_NOMINAL, seed) for seed in range(2))
+        spread = np.std(learnt, axis=(0, 1), dtype=np.float64)
+        self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), np.where(spread > 0, spread, 1.0)
+        self._range = OutOfRange().fit(self._rows(learnt))
+        limit, _ = metrics.finite_threshold(self._range.score(self._rows(held_out)), rate)
+        self._limit = max(limit, _LEAST_LIMIT)
+
+    def _rows(self, windows: np.ndarray) -> np.ndarray:
+        return ((windows - self._centre) / self._scale).reshape(len(windows), -1).astype(np.float32)
+
+    def score(self, coarse: np.ndarray) -> np.ndarray:
+        """Scores how far coarse windows are outside the training range. A share `rate` of nominal windows scores above 1.
+
+        Args:
+            coarse: Coarse windows of shape `(windows, samples, columns)`.
+
+        Returns:
+            One score per window, float64 of shape `(windows,)`.
+        """
+        return self._range.score(self._rows(coarse)) / self._limit
+
+    def score_run(self, coarse: np.ndarray) -> np.ndarray:
+        """Scores a run of shape `(samples, columns)`: the mean score of the windows that contain each sample, float32 of shape `(samples,)`."""
+        window, starts = self.simulator.window, run_starts(len(coarse), self.simulator.window)
+        scores = self.score(cut([np.asarray(coarse, np.float32)], starts, window))
+        return average_windows(lambda rows: np.repeat(scores[rows, None, None], window, axis=1), starts, window, len(coarse))[:, 0]
+
+    def share_outside(self, scenario: "Degraded | None", num_windows: int = 200, seed: int = 0) -> float:
+        """Returns the share of a scenario's windows that are outside the training range.
+
+        Args:
+            scenario: A degraded mode, or None for nominal windows.
+            num_windows: Number of windows to simulate.
+            seed: Random seed.
+        """
+        return float(np.mean(self.score(self._drawn(scenario, num_windows, 2 + seed)) > 1))
+
+    def _drawn(self, scenario: "Degraded | None", num_windows: int, seed: int) -> np.ndarray:
+        rng = np.random.default_rng([seed, 3])
+        return self.simulator.alignment.draw(rng.integers(0, _START_RANGE, num_windows), [scenario] * num_windows, rng).coarse
