@@ -13,40 +13,36 @@ _PLACES = {
     "Cleaning": "telemetry.cleaning.clean",
     "CoarseSimulator": "coarse_simulator.interface",
     "Degraded": "coarse_simulator.degraded",
-    "EnhancedSimulator": "enhanced_simulator.simulator",
-    "FitOptions": "enhanced_simulator.fit_options",
+    "EnhancedSimulator": "simulator.simulator",
+    "FitOptions": "simulator.options",
     "FmuSimulator": "coarse_simulator.fmu",
     "FunctionSimulator": "coarse_simulator.interface",
     "InjectOptions": "datasets.inject",
     "InputError": "common.errors",
-    "NoiseGAN": "noise.gan",
     "ParquetStore": "telemetry.parquet_store",
     "Recording": "coarse_simulator.recording",
-    "RunModel": "enhanced_simulator.runs.model",
-    "RunOptions": "enhanced_simulator.runs.options",
-    "ScoreOptions": "enhanced_simulator.scoring",
+    "ScoreOptions": "simulator.options",
+    "Scorer": "simulator.scoring",
     "SquareWave": "coarse_simulator.square_waves",
     "SquareWaveSimulator": "coarse_simulator.square_waves",
     "Telemetry": "telemetry.series",
-    "TrustedRange": "enhanced_simulator.trusted_range",
-    "UpdateOptions": "enhanced_simulator.update_options",
-    "build_enhancer": "enhancer.network",
+    "TelemetryDetector": "simulator.estimator",
+    "TrustedRange": "simulator.trusted_range",
     "clean": "telemetry.cleaning.clean",
-    "extract_noise": "noise.extraction",
-    "fit_channel": "enhanced_simulator.fitting",
-    "fit_run_model": "enhanced_simulator.runs.fitting",
+    "events_table": "simulator.scoring",
+    "fit": "simulator.fitting",
     "from_series": "telemetry.pandas_series",
     "inject_channel": "datasets.inject",
+    "join_channels": "simulator.joint",
     "load_labelled": "telemetry.telemanom",
     "read_recording": "coarse_simulator.recording_files",
     "read_source": "telemetry.sources",
     "read_telemetry": "telemetry.sources",
     "record": "coarse_simulator.recording",
-    "score_channel": "enhanced_simulator.scoring",
-    "score_run": "enhanced_simulator.runs.scoring",
+    "score": "simulator.scoring",
     "series_labelled": "datasets.labelled_windows",
     "to_series": "telemetry.pandas_series",
-    "update_simulator": "enhanced_simulator.updating",
+    "update": "simulator.updating",
 }
 __all__ = list(_PLACES)
 
@@ -55,3 +51,7 @@ def __getattr__(name: str):
     if name in _PLACES:
         return getattr(importlib.import_module(f"enhsim_tf.{_PLACES[name]}"), name)
     raise AttributeError(f"module 'enhsim_tf' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_PLACES])

@@ -4,28 +4,26 @@ import argparse
 import textwrap
 from pathlib import Path
 
+from enhsim_tf import __version__
 from enhsim_tf.common.console import Parser
-from enhsim_tf.detection import registry
-from enhsim_tf.detection.registry import RESIDUAL, option_name
-from enhsim_tf.enhanced_simulator.fit_options import FEWEST_SAMPLES, FitOptions
-from enhsim_tf.enhanced_simulator.runs.options import NOISES, RUNGS
-from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
+from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+from enhsim_tf.simulator.options import FitOptions, ScoreOptions, add_options
 from enhsim_tf.telemetry.registry import SOURCES
 
 EXAMPLES = """\
 from telemetry to scores:
-  python -m enhsim_tf fit telemetry.csv --out models
-  python -m enhsim_tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
-  python -m enhsim_tf score models new.csv --out scores.parquet
+  enhsim-tf fit telemetry.csv --out models
+  enhsim-tf generate models --windows 10000 --scenario stuck:0.5 --out training.parquet
+  enhsim-tf score models new.csv --out scores.parquet
 
 with simulator.csv, a recorded run of your own simulator at the times of the telemetry (docs/own_simulator.md):
-  python -m enhsim_tf fit telemetry.csv --coarse simulator.csv --out models
-  python -m enhsim_tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
+  enhsim-tf fit telemetry.csv --coarse simulator.csv --out models
+  enhsim-tf generate models --coarse fault_run.csv --copies 100 --out training.parquet
 
-python -m enhsim_tf fit --help shows the options of fit; generate, verify, score, update and inject have help texts too. A separate command,
+enhsim-tf fit --help shows the options of fit; generate, verify, score, update and inject have help texts too. A separate command,
 python -m enhsim_tf.reproduce, reproduces the paper.
 """
-DETECTORS = tuple(map(option_name, registry.DETECTORS))
+DETECTORS = tuple(map(option_name, (RESIDUAL, *all_detectors())))
 KINDS = "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain"
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 
@@ -41,61 +39,28 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """
     form = {"formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = Parser(
-        prog="python -m enhsim_tf",
+        prog="enhsim-tf",
         description="Fits simulators to channels of telemetry, generates labelled training data with them, and scores new telemetry.",
         epilog=EXAMPLES + EXIT,
         **form,
     )
+    parser.add_argument("--version", action="version", version=f"enhsim-tf {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,update,inject}", required=True)
 
     fit = commands.add_parser(
         "fit",
         help="fit an enhanced simulator to nominal telemetry",
-        description="Fits an enhanced simulator to each channel of nominal telemetry. Its coarse simulator is a square wave, or the commands in an\n"
-        "array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
+        description="Fits an enhanced simulator to the channels of nominal telemetry. The coarse simulator of a channel is a square wave, or the\n"
+        "commands in an array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
         "report evaluates the simulator on it.",
         epilog=EXIT,
         **form,
     )
     _add_source(fit)
-    fit.add_argument(
-        "--out", type=Path, required=True, metavar="MODEL_DIR", help="output folder for the simulators, one subfolder per channel"
-    )
-    fit.add_argument(
-        "--window",
-        type=int,
-        metavar="N",
-        help=f"window length in samples, at least {FEWEST_SAMPLES} (default: two periods of a square wave, otherwise a twentieth of the record; "
-        "limited to 64 to 500 and to an eighth of the record)",
-    )
-    fit.add_argument(
-        "--enhancer",
-        choices=tuple(name.replace(" ", "-") for name in RUNGS),
-        help="enhancer (default: the simplest one whose error on held-out blocks of time is not measurably larger than that of the best one); "
-        "network is the enhancer of the paper",
-    )
-    fit.add_argument(
-        "--noise",
-        choices=tuple(name.replace(" ", "-") for name in NOISES),
-        default="best",
-        metavar="MODEL",
-        help=f"noise model: {', '.join(name.replace(' ', '-') for name in NOISES)} (default: best, the simplest one that held-out telemetry does not "
-        "tell from real noise)",
-    )
-    fit.add_argument(
-        "--held-out",
-        type=float,
-        default=FitOptions.held_out,
-        metavar="SHARE",
-        help="share of the telemetry held out for the report (default: %(default)s)",
-    )
-    fit.add_argument(
-        "--num-windows", type=int, default=FitOptions.num_windows, metavar="N", help="number of training windows (default: %(default)s)"
-    )
-    fit.add_argument(
-        "--epochs", type=int, default=FitOptions.epochs, metavar="N", help="training epochs of the enhancer (default: %(default)s)"
-    )
-    fit.add_argument("--workers", metavar="auto|N", help="channels fitted in parallel, two threads each (default: auto, one per core)")
+    fit.add_argument("--out", type=Path, required=True, metavar="MODEL_DIR", help="output folder, one subfolder for each simulator")
+    fit.add_argument("--separately", action="store_true", help="fit each channel on its own (default: all channels in one simulator)")
+    add_options(fit, FitOptions, "window", "enhancer", "noise", "held_out", "num_windows", "epochs")
+    fit.add_argument("--workers", metavar="auto|N", help="with --separately: channels fitted in parallel (default: auto, one per core)")
     fit.add_argument(
         "--engine",
         choices=("local", "ray"),
@@ -112,12 +77,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         metavar="NAME",
         help="use only this column of the recorded run; may be repeated (default: all numeric columns)",
     )
-    coarse.add_argument(
-        "--delay",
-        type=float,
-        metavar="SECONDS",
-        help="delay of the telemetry relative to the recorded run, in seconds, or in samples if there are no times (default: estimated)",
-    )
+    add_options(coarse, FitOptions, "delay_s")
+    _add_json(fit)
     _add_seed(fit)
 
     generate = commands.add_parser(
@@ -141,8 +102,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         "--scenario",
         action="append",
         default=[],
-        metavar="MODE:SEVERITY[:ONSET]",
-        help="a degraded mode, such as stuck:0.5; may be repeated",
+        metavar="[CHANNEL=]MODE:SEVERITY[:ONSET]",
+        help="a degraded mode, such as stuck:0.5, of all channels or of one; may be repeated",
     )
     series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
     series.add_argument("--number", type=int, metavar="N", help="number of events at random places; the scenarios are used in turn")
@@ -161,13 +122,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     series.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channel, is_anomaly")
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
-    generate.add_argument("--channel", action="append", metavar="NAME", help="only this channel; may be repeated")
+    generate.add_argument("--channel", action="append", metavar="NAME", help="only the simulator of this name; may be repeated")
     generate.add_argument(
         "--out",
         type=Path,
         required=True,
         metavar="OUT",
-        help="a .parquet file (a series may be a .csv file), or a folder for several channels",
+        help="a .parquet file (a series may be a .csv file), or a folder for several simulators",
     )
     coarse = generate.add_argument_group("your own simulator", "for models that were fitted with --coarse (docs/own_simulator.md)")
     _add_coarse(coarse)
@@ -191,64 +152,50 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
     score = commands.add_parser(
         "score",
-        help="score telemetry with a detector trained on generated telemetry",
-        description="Trains a detector on generated nominal telemetry only and writes a score and a flag for each sample of the source.\n"
-        "Beside SCORES it writes the alarms, one per row, to a file that ends in .events.csv: begin, end, peak, duration_s,\n"
-        "num_flagged, score and confidence. Flagged samples at most one window apart form one alarm. The command reports the\n"
-        "expected number of false alarms per day at the threshold, with its 95 % interval.",
+        help="score telemetry with a detector that has learnt from generated telemetry",
+        description="Writes a score and a flag for each sample of the source. Beside SCORES it writes the alarms, one per row, to a file that ends in\n"
+        ".events.csv: begin, end, peak, duration_s, num_flagged, score and confidence. Flagged samples at most one window apart form one\n"
+        "alarm. The threshold never flags more of the nominal telemetry of the fit than it is set for.",
         epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
-        + f"\n{RESIDUAL}: judges the difference between the telemetry and the simulator that is aligned with it (docs/own_data.md)\n{EXIT}",
+        + f"\nresidual and innovation judge the difference between the telemetry and the simulator (docs/own_data.md)\n{EXIT}",
         **form,
     )
     score.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
     _add_source(score)
     score.add_argument(
-        "--detector", choices=(*DETECTORS, RESIDUAL), default="pca-residual", metavar="NAME", help="detector (default: %(default)s)"
+        "--detector", choices=DETECTORS, metavar="NAME", help="detector (default: the one that `fit` chose by held-out time)"
     )
+    add_options(score, ScoreOptions, "false_alarm_rate")
     score.add_argument(
-        "--windows", type=int, default=2_000, metavar="N", help="generated windows for training the detector (default: 2000)"
-    )
-    score.add_argument(
-        "--false-alarm-rate", type=float, default=0.01, metavar="SHARE", help="share of generated nominal samples to flag (default: 0.01)"
+        "--windows",
+        dest="num_windows",
+        type=int,
+        default=ScoreOptions.num_windows,
+        metavar="N",
+        help="generated windows from which the detector learns (default: %(default)s)",
     )
     coarse = score.add_argument_group("your own simulator", "score the difference between the telemetry and the enhanced run")
     _add_coarse(coarse)
-    score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several channels")
+    score.add_argument("--figure", action="store_true", help="draw series, scores and events beside SCORES, as .png")
+    score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several simulators")
+    _add_json(score)
     _add_seed(score)
 
     update = commands.add_parser(
         "update",
         help="update simulators with newer nominal telemetry",
-        description="Goes on from fitted simulators with newer nominal telemetry, and reports what changed: level, gain, period, phase, noise,\n"
-        "and errors and alarms before and after on the held-out end of the new telemetry (docs/own_data.md). The old simulators are kept.",
+        description="Fits the simulators again to newer nominal telemetry, and reports what changed, with errors and alarms of the old and the new\n"
+        "simulator on the held-out end of the new telemetry (docs/own_data.md). The old simulators are kept.",
         epilog=EXIT,
         **form,
     )
     update.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
     _add_source(update)
+    _add_coarse(update.add_argument_group("your own simulator", "for simulators that were fitted with --coarse"))
     update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
     update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
-    update.add_argument(
-        "--epochs",
-        type=int,
-        default=UpdateOptions.epochs,
-        metavar="N",
-        help="further epochs of the enhancer; 0 keeps its weights (default: %(default)s)",
-    )
-    update.add_argument(
-        "--num-windows",
-        type=int,
-        default=UpdateOptions.num_windows,
-        metavar="N",
-        help="training windows of these epochs (default: %(default)s)",
-    )
-    update.add_argument(
-        "--held-out",
-        type=float,
-        default=UpdateOptions.held_out,
-        metavar="SHARE",
-        help="share of the new telemetry on which the update is judged (default: %(default)s)",
-    )
+    add_options(update, FitOptions, "held_out")
+    _add_json(update)
     _add_seed(update)
 
     inject = commands.add_parser(
@@ -284,6 +231,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(inject)
     return parser.parse_args(arguments)
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print one JSON object in place of lines of text")
 
 
 def _add_seed(parser: argparse.ArgumentParser, default: int | None = 0) -> None:

@@ -1,10 +1,9 @@
-"""`python -m enhsim_tf generate`: generates labelled training data with fitted simulators."""
+"""`enhsim-tf generate`: generates labelled training data with fitted simulators."""
 
 import argparse
 from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import counted, for_each, load, output_paths
-from enhsim_tf.cli.runs import refuse_without_coarse
+from enhsim_tf.cli.options import counted, for_each, load, output_paths, refuse_without_coarse
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
@@ -12,7 +11,7 @@ if TYPE_CHECKING:
     from enhsim_tf.coarse_simulator.degraded import Degraded
     from enhsim_tf.coarse_simulator.schedule import ScheduledMode
     from enhsim_tf.datasets.places import Place
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 
 def run_generate(options: argparse.Namespace) -> int:
@@ -22,7 +21,7 @@ def run_generate(options: argparse.Namespace) -> int:
         options: Parsed options of `generate`.
     """
     if options.coarse is not None:
-        from enhsim_tf.cli.runs import generate_copies
+        from enhsim_tf.cli.copies import generate_copies
 
         return generate_copies(options)
     refuse_without_coarse(options, "coarse_time", "coarse_start", "copies", "timezone", "time_format", "missing_values")
@@ -80,7 +79,7 @@ def run_generate(options: argparse.Namespace) -> int:
     start = None if options.start is None else parse_start(options.start)
     if options.continuous is not None:
         parse_length(options.continuous)
-    from enhsim_tf.enhanced_simulator.model_folder import chosen_of, models_of
+    from enhsim_tf.simulator.model_folder import chosen_of, models_of
 
     models = chosen_of(models_of(options.models), options.channel)
     suffixes = (".csv",) if options.timeeval else (".parquet",) if options.continuous is None else (".parquet", ".csv")
@@ -110,7 +109,7 @@ def run_generate(options: argparse.Namespace) -> int:
                 )
         if not scenarios:
             return
-        from enhsim_tf.enhanced_simulator.trusted_range import TrustedRange
+        from enhsim_tf.simulator.trusted_range import TrustedRange
 
         trusted = TrustedRange(simulator)
         for scenario in scenarios:

@@ -11,7 +11,7 @@ from enhsim_tf.datasets.generate import generate_data_set
 from enhsim_tf.datasets.labelled_windows import parse_scenario
 from enhsim_tf.datasets.mix import Mix, ModelShare, make_mix
 from enhsim_tf.datasets.plan import Plan, make_plan
-from enhsim_tf.enhanced_simulator.model_folder import chosen_of, folder_of, models_of
+from enhsim_tf.simulator.model_folder import chosen_of, folder_of, models_of
 
 
 def run_generate_many(options: argparse.Namespace, tell: Callable[[str], None]) -> int:

@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +13,9 @@ from enhsim_tf.common.errors import InputError, printable
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enhsim_tf.enhanced_simulator.runs.model import RunModel
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-    from enhsim_tf.telemetry.cleaning.clean import Cleaning
+    from enhsim_tf.coarse_simulator.recording import Recording
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
+    from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
@@ -48,6 +48,24 @@ def tell_failed(failed: dict[str, str]) -> int:
     for channel, reason in failed.items():
         print(f"error: {printable(channel)}: {' '.join(reason.splitlines())}", file=sys.stderr)
     return 2 if failed else 0
+
+
+def refuse_without_coarse(options: argparse.Namespace, *names: str) -> None:
+    """Refuses options that have a meaning only with `--coarse`.
+
+    Args:
+        options: Parsed options, without `--coarse`.
+        *names: Names of the options.
+
+    Raises:
+        InputError: If one of them is given.
+    """
+    for name in names:
+        if getattr(options, name) not in (None, []):
+            word = name.removesuffix("_s").replace("_", "-")
+            raise InputError(
+                f"Expected --{word} only together with --coarse. Received: --{word} without it. Leave it out, or give --coarse."
+            )
 
 
 def counted(number: int, noun: str) -> str:
@@ -98,7 +116,7 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
         InputError: If one file is given for several channels, or if a file cannot be written.
     """
     from enhsim_tf.common.atomic_files import make_folder
-    from enhsim_tf.enhanced_simulator.model_folder import folder_of
+    from enhsim_tf.simulator.model_folder import folder_of
 
     names, is_folder = list(channels), os.path.isdir(out)
     if out.suffix in suffixes and not is_folder:
@@ -134,39 +152,76 @@ def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str]) -> None
                 raise InputError(f"Expected --out to differ from the input. Received: {path} for both. Give another --out.")
 
 
-def model_names(series: Iterable[str], models: Iterable[str]) -> dict[str, str]:
-    """Returns the name of the model of each channel that has one, and says which others the source has.
+def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict[str, dict[str, str]]:
+    """Finds the channels of a source for each model, and says which columns have none.
 
-    A single channel and a single model match even if their names differ.
+    A single channel and a single model of one channel match even if their names differ.
 
     Args:
-        series: Names of the channels.
-        models: Names of the fitted channels.
+        series: Names of the channels of the source.
+        models: Folder of each model by its name.
+
+    Returns:
+        For each model whose channels the source has, the name in the source of each of its channels.
 
     Raises:
-        InputError: If no channel has a model.
+        InputError: If the source has the channels of no model.
     """
-    series, models = list(series), list(models)
-    if len(series) == len(models) == 1:
-        return {series[0]: models[0]}
-    found = {name: name for name in series if name in models}
-    others = [name for name in series if name not in models]
+    from enhsim_tf.simulator.model_folder import channels_of
+
+    series = list(series)
+    wanted = {name: channels_of(folder) for name, folder in models.items()}
+    if len(series) == len(wanted) == 1 and len(next(iter(wanted.values()))) == 1:
+        ((name, (channel,)),) = wanted.items()
+        return {name: {channel: series[0]}}
+    found = {name: {channel: channel for channel in channels} for name, channels in wanted.items() if set(channels) <= set(series)}
+    used = {channel for channels in found.values() for channel in channels}
     if not found:
-        known = printable(", ".join(models[:8]))
-        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(others[:8])}. Select the channels with --column.")
+        known = printable("; ".join(", ".join(channels) for channels in list(wanted.values())[:8]))
+        raise InputError(f"Expected fitted channels: {known}. Received: {', '.join(series[:8])}. Select the channels with --column.")
+    others = [name for name in series if name not in used]
     if others:
         tell(f"columns without a fitted simulator, left out: {printable(', '.join(others[:8]))}")
     return found
+
+
+def cleaned_channels(
+    series: "Mapping[str, pd.Series]", names: Mapping[str, str], cleaning: "Cleaning"
+) -> "tuple[Recording, dict[str, Cleaned]]":
+    """Cleans the channels of a model and brings them onto one clock.
+
+    Args:
+        series: Raw values of each channel of the source.
+        names: Name in the source of each channel of the model.
+        cleaning: Settings of the cleaning.
+
+    Returns:
+        The telemetry, and what was cleaned of each channel.
+
+    Raises:
+        InputError: If a channel cannot be used, or if the channels share too little time.
+    """
+    from enhsim_tf.simulator.joint import join_channels
+    from enhsim_tf.telemetry.cleaning.clean import clean
+
+    cleaned = {channel: clean(series[name], cleaning) for channel, name in names.items()}
+    joined = join_channels({channel: each.parts for channel, each in cleaned.items()})
+    if len(joined) > 1:
+        raise InputError(
+            f"Expected the channels {', '.join(names)[:120]} at the same times, because they were fitted together. Received: "
+            f"{len(joined)} groups without enough common time. Give telemetry of the same time."
+        )
+    return joined[0], cleaned
 
 
 def events_line(frame: "pd.DataFrame", path: Path) -> str:
     """Says how many events the scores of a channel have, and how many are expected on nominal telemetry.
 
     Args:
-        frame: Scores with the attributes that `scoring.note_alarms` sets.
+        frame: Scores, as returned by `scoring.score`.
         path: Path of the scores.
     """
-    from enhsim_tf.enhanced_simulator.scoring import events_path
+    from enhsim_tf.simulator.scoring import events_path
 
     number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
     unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
@@ -176,14 +231,48 @@ def events_line(frame: "pd.DataFrame", path: Path) -> str:
     )
 
 
-def load(folder: Path) -> "EnhancedSimulator | RunModel":
-    """Loads the simulator or run model saved in a folder; TensorFlow is imported only here."""
-    from enhsim_tf.enhanced_simulator.saving import is_run_model
-
-    if is_run_model(folder):
-        from enhsim_tf.enhanced_simulator.runs.model import RunModel
-
-        return RunModel.load(folder)
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+def load(folder: Path) -> "EnhancedSimulator":
+    """Loads the simulator saved in a folder."""
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
     return EnhancedSimulator.load(folder)
+
+
+def run_for(
+    simulator: "EnhancedSimulator", source: str | Sequence[str] | None, options: argparse.Namespace, cleaning: "Cleaning"
+) -> "Recording | None":
+    """Reads the coarse run that a simulator needs: the commands of the telemetry's own file, or the recorded run of `--coarse`.
+
+    Args:
+        simulator: The simulator.
+        source: The source of the telemetry.
+        options: Parsed options.
+        cleaning: Settings of the cleaning of the telemetry.
+
+    Returns:
+        The run; None for square waves.
+
+    Raises:
+        InputError: If `--coarse` is missing, or given for square waves.
+    """
+    if not simulator.is_run_model:
+        if options.coarse is not None:
+            simulator._runs()
+        return None
+    from enhsim_tf.coarse_simulator.recording_files import read_recording
+
+    commands = simulator.alignment.commands
+    if commands is not None and options.coarse is None:
+        from enhsim_tf.coarse_simulator.commands import CommandTraces
+        from enhsim_tf.telemetry.commands import read_commands
+
+        found = read_commands(source)
+        if found is None:
+            raise InputError(f"Expected an array with commands, as in the fit. Received: {source}, which has none. Give such an array.")
+        return CommandTraces.from_config(commands).recording(found)
+    if options.coarse is None:
+        raise InputError(
+            f"Expected --coarse, the run of the same time, because the simulator was fitted to runs of {simulator.alignment.name}. Received: none."
+        )
+    columns = simulator.alignment.columns
+    return read_recording(options.coarse, columns, options.coarse_time, cleaning.of_run(), simulator.interval_s, options.coarse_start)

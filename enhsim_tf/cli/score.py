@@ -1,74 +1,102 @@
-"""`python -m enhsim_tf score`: scores telemetry with a detector trained on generated data."""
+"""`enhsim-tf score`: scores telemetry with a detector that has learnt from generated telemetry."""
 
 import argparse
+import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from enhsim_tf.cli.options import cleaning_options, counted, events_line, for_each, load, model_names, output_paths, refuse_same_file
-from enhsim_tf.cli.runs import refuse_without_coarse
+from enhsim_tf.cli.options import (
+    channels_by_model,
+    cleaned_channels,
+    cleaning_options,
+    counted,
+    events_line,
+    for_each,
+    load,
+    output_paths,
+    refuse_same_file,
+    run_for,
+)
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import printable
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
+
 
 def run_score(options: argparse.Namespace) -> int:
-    """Scores each channel of the source with its simulator and returns the exit code.
+    """Scores the channels of the source with their simulators and returns the exit code.
 
     Args:
         options: Parsed options of `score`.
     """
-    from enhsim_tf.detection.registry import DETECTORS, RESIDUAL, option_name
-    from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, events_path, score_channel, write_scores
+    from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
+    from enhsim_tf.simulator.options import ScoreOptions
 
-    detector = {option_name(name): name for name in (*DETECTORS, RESIDUAL)}[options.detector]
-    chosen = ScoreOptions(detector, options.windows, options.false_alarm_rate, options.seed)
+    named = {option_name(name): name for name in (RESIDUAL, *all_detectors())}
+    detector = None if options.detector is None else named[options.detector]
+    chosen = ScoreOptions(detector, options.num_windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)
-    from enhsim_tf.enhanced_simulator.model_folder import models_of
-    from enhsim_tf.telemetry.cleaning.clean import clean
+    from enhsim_tf.simulator.model_folder import models_of
+    from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
     from enhsim_tf.telemetry.sources import read_source
 
     models = models_of(options.models)
     series = read_source(options.source, options.column, options.time, cleaning)
-    names = model_names(series, models)
-    series, models = {name: series[name] for name in names}, {name: models[model] for name, model in names.items()}
-    paths = output_paths(options.out, series, (".parquet", ".csv"))
+    channels = channels_by_model(series, models)
+    source_names = {model: next(iter(names.values())) if len(names) == 1 else model for model, names in channels.items()}
+    paths = dict(zip(channels, output_paths(options.out, source_names.values(), (".parquet", ".csv")).values(), strict=True))
     refuse_same_file([*paths.values(), *map(events_path, paths.values())], options.source)
+    found = {}
 
-    if options.coarse is not None or all(map(_is_of_commands, (models[name] for name in series))):
-        from enhsim_tf.cli.runs import score_runs
+    def write(model: str) -> None:
+        telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
+        simulator = load(models[model])
+        run = run_for(simulator, options.source, options, cleaning)
+        frame = score(simulator, telemetry, run, chosen)
+        write_scores(paths[model], frame)
+        if options.figure:
+            from enhsim_tf.simulator.score_figure import score_figure
 
-        return score_runs(options, series, models, paths, chosen, cleaning)
-    refuse_without_coarse(options, "coarse_time", "coarse_start")
+            score_figure(frame, simulator, source_names[model]).savefig(paths[model].with_suffix(".png"), dpi=200, format="png")
+        found[source_names[model]] = {
+            "scores": str(paths[model]),
+            "detector": frame.attrs["detector"],
+            "flagged": float(frame["flag"].mean()),
+            "departure": frame.attrs["departure"],
+            "false_alarms_per_day": frame.attrs["false_alarms_per_day"],
+            "events": json.loads(events_table(frame).to_json(orient="records", date_format="iso")),
+        }
+        if not options.json:
+            notes = [f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())]
+            lines = [line for each in cleaned.values() for line in each.report.lines()]
+            tell("\n".join([*lines, *notes, *_said(frame, simulator, source_names[model], paths[model])]))
 
-    def write(channel: str) -> None:
-        cleaned = clean(series[channel], cleaning)
-        simulator = load(models[channel])
-        frame = score_channel(simulator, cleaned.parts, chosen)
-        write_scores(paths[channel], frame)
-        tell("\n".join(cleaned.report.lines()))
-        if hasattr(simulator, "nominal"):
-            tell(
-                f"{printable(channel)}: without --coarse, the values are judged, not their difference from an enhanced run of the same time"
-            )
-        left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
-        scored, rate = len(frame) - left, frame.attrs["expected_false_alarm_rate"]
-        tell(
-            f"{printable(channel)}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / scored:.1%}) flagged by {chosen.detector}, "
-            f"set to flag {rate:.1%} of generated nominal samples"
-            + (
-                f" (too few windows for {chosen.false_alarm_rate:.2g}: the threshold is their largest score)"
-                if rate > chosen.false_alarm_rate
-                else ""
-            )
-            + (f"; {counted(left, 'sample')} not scored, in parts shorter than a window" if left else "")
-            + f"; in {paths[channel]}"
+    code = for_each(channels, write)
+    if options.json:
+        tell(json.dumps(found))
+    return code
+
+
+def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: str, path: Path) -> list[str]:
+    name, trained, lines = printable(name), simulator.trained, []
+    if not trained.get("keeps_promise", True):
+        lines.append(
+            f"{name}: WARNING: on held-out nominal time {trained['false_alarms']:.0%} were flagged at 1 % set, so do not trust these alarms"
         )
-        tell(f"{printable(channel)}: {events_line(frame, paths[channel])}")
-
-    return for_each(series, write)
-
-
-def _is_of_commands(folder: Path) -> bool:
-    """Whether the model in a folder was fitted to the commands of a file of telemetry."""
-    from enhsim_tf.enhanced_simulator.saving import settings_of
-
-    kept = settings_of(folder).get("trained", {}).get("coarse", {})
-    return isinstance(kept, dict) and kept.get("kind") == "commands"
+    if frame.attrs["departure"]:
+        lines.append(f"{name}: {frame.attrs['departure']}")
+    left, num_flags = int(frame["score"].isna().sum()), int(frame["flag"].sum())
+    scored = len(frame) - left
+    line = (
+        f"{name}: {num_flags:,} of {counted(scored, 'scored sample')} ({num_flags / max(scored, 1):.1%}) flagged by {frame.attrs['detector']}, set to flag "
+        f"{frame.attrs['expected_false_alarm_rate']:.1%} of nominal samples"
+    )
+    if left:
+        line += f"; {counted(left, 'sample')} not scored, in parts shorter than a window or without a coarse run"
+    if "out_of_range" in frame:
+        outside = float((frame["out_of_range"] > 1).sum())
+        line += f"; {outside / max(scored, 1):.1%} outside the training range" if outside else ""
+    return [*lines, f"{line}; in {path}", f"{name}: {events_line(frame, path)}"]

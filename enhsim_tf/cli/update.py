@@ -1,52 +1,62 @@
-"""`python -m enhsim_tf update`: goes on from fitted simulators with newer nominal telemetry."""
+"""`enhsim-tf update`: goes on from fitted simulators with newer nominal telemetry."""
 
 import argparse
+import json
 import os
 from pathlib import Path
 
-from enhsim_tf.cli.options import cleaning_options, for_each, load, model_names
+from enhsim_tf.cli.options import channels_by_model, cleaned_channels, cleaning_options, for_each, load, run_for
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
 
 def run_update(options: argparse.Namespace) -> int:
-    """Updates the simulator of each channel of the source and returns the exit code.
+    """Updates the simulators of the channels of the source and returns the exit code.
 
     Args:
         options: Parsed options of `update`.
     """
     from enhsim_tf.common.atomic_files import make_folder, replace_folder, write_json
-    from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of, refuse_foreign
-    from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
+    from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
+    from enhsim_tf.simulator.options import FitOptions
 
-    chosen = UpdateOptions(options.epochs, options.num_windows, options.held_out, options.seed)
+    FitOptions(held_out=options.held_out, seed=options.seed)  # checks both
     models = models_of(options.models)
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
     cleaning = cleaning_options(options, 2, "missing")
-    from enhsim_tf.telemetry.cleaning.clean import clean
     from enhsim_tf.telemetry.sources import read_source
 
     series = read_source(options.source, options.column, options.time, cleaning)
-    names = model_names(series, models)
-    series = {name: series[name] for name in names}
-    folders = {name: folder_of(out, names[name]) for name in series}
-    for name, folder in folders.items():
+    channels = channels_by_model(series, models)
+    folders = {model: folder_of(out, model) for model in channels}
+    for model, folder in folders.items():
         refuse_foreign(folder)
         is_there = folder.is_dir() and any(folder.iterdir())
         if is_there and not options.replace:
             raise InputError(
-                f"Expected --out without a model of {printable(names[name])}, because update keeps the old one. Received: {folder}. "
+                f"Expected --out without a model of {printable(model)}, because update keeps the old one. Received: {folder}. "
                 "Give another --out, or --replace."
             )
-    from enhsim_tf.enhanced_simulator.updating import update_simulator
+    from enhsim_tf.simulator.updating import update
 
-    def write(channel: str) -> None:
-        cleaned = clean(series[channel], cleaning)
-        updated, report = update_simulator(load(models[names[channel]]), cleaned.parts, chosen)
+    found = {}
+
+    def write(model: str) -> None:
+        telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
+        simulator = load(models[model])
+        run = run_for(simulator, options.source, options, cleaning)
+        updated, report = update(simulator, telemetry, run, options.held_out, options.seed)
         make_folder(out)
-        with replace_folder(folders[channel]) as temporary:
+        kept = {"update": report.to_dict(), "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()}}
+        with replace_folder(folders[model]) as temporary:
             updated.save(temporary)
-            write_json(temporary / "report.json", {"update": report.to_dict(), "cleaning": cleaned.report.to_dict()})
-        tell("\n".join([*cleaned.report.lines(), *report.lines(), f"updated simulator and report.json in {folders[channel]}/"]))
+            write_json(temporary / "report.json", kept)
+        found[model] = kept
+        if not options.json:
+            lines = [line for each in cleaned.values() for line in each.report.lines()]
+            tell("\n".join([*lines, *report.lines(), f"updated simulator and report.json in {folders[model]}/"]))
 
-    return for_each(series, write)
+    code = for_each(channels, write)
+    if options.json:
+        tell(json.dumps(found))
+    return code

@@ -15,21 +15,21 @@ from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from enhsim_tf.enhanced_simulator.runs.model import RunModel
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _MOST_ROWS = 10**9
 _OWN = ("copy", "time", "sample", "value", "out_of_range")
 
 
-def write_copies(path: str | os.PathLike, model: "RunModel", run: Recording, num_copies: int, seed: int = 0) -> int:
+def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recording, num_copies: int, seed: int = 0) -> int:
     """Writes copies of a run to one Parquet file, copy by copy. The file appears only when it is complete.
 
     The columns are `copy` (from 0), `time` (of the telemetry, that is with the delay of the model; `sample` if the run has no
-    times), `value`, `out_of_range` (above 1, the coarse run is outside the training range), and the carried columns of the run.
+    times), `value` (of several channels, their names), `out_of_range` (above 1, the coarse run is outside the training range), and the carried columns of the run.
 
     Args:
         path: Path of the file.
-        model: The run model.
+        model: A simulator of recorded runs.
         run: The run, for example of a fault.
         num_copies: Number of copies, each with another draw of noise.
         seed: Random seed of the noise.
@@ -43,39 +43,44 @@ def write_copies(path: str | os.PathLike, model: "RunModel", run: Recording, num
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    usable = model.usable(run)
+    usable = model.alignment.usable(run)
     num_rows = num_copies * len(usable)
     if num_copies < 1 or num_rows > _MOST_ROWS:
         raise InputError(f"Expected 1 copy or more, and at most {_MOST_ROWS:,} rows. Received: {num_copies:,} copies, {num_rows:,} rows.")
     shared = _shared_columns(model, usable)
-    metadata = {"interval_s": repr(model.interval_s), "channel": str(model.trained.get("telemetry", ""))}
-    order = ["copy", *(name for name in ("time", "sample") if name in shared), "value"]
+    names = ["value"] if len(model.channels) == 1 else list(model.channels)
+    metadata = {"interval_s": repr(model.interval_s), "channel": ", ".join(model.channels)}
+    order = ["copy", *(name for name in ("time", "sample") if name in shared), *names]
     order += [name for name in shared if name not in order]
     make_folder(Path(path).parent)
-    types = {"copy": pa.int32(), "value": pa.float32()} | {name: column.type for name, column in shared.items()}
+    types = {"copy": pa.int32(), **dict.fromkeys(names, pa.float32())} | {name: column.type for name, column in shared.items()}
     schema = pa.schema([(name, types[name]) for name in order]).with_metadata(metadata)
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
         for number, parts in enumerate(model.generate_copies(usable, num_copies, seed)):
             values = np.concatenate(parts)
-            columns: Mapping[str, Any] = {"copy": pa.array(np.full(len(values), number, np.int32)), "value": pa.array(values)} | shared
+            own = {name: pa.array(np.ascontiguousarray(values[:, channel])) for channel, name in enumerate(names)}
+            columns: Mapping[str, Any] = {"copy": pa.array(np.full(len(values), number, np.int32))} | own | shared
             writer.write_table(pa.table([columns[name] for name in order], schema=schema))
     return num_rows
 
 
-def _shared_columns(model: "RunModel", usable: Recording) -> dict[str, "pa.Array"]:
+def _shared_columns(model: "EnhancedSimulator", usable: Recording) -> dict[str, "pa.Array"]:
     """Returns the columns that are the same in every copy: times, score of the range, and what is carried."""
     import pandas as pd
     import pyarrow as pa
 
+    from enhsim_tf.simulator.trusted_range import TrustedRange
+
+    trusted = TrustedRange(model)
     taken = [name for name in usable.parts[0].carried if name in _OWN]
     if taken:
         raise InputError(
             f"Expected other names than {', '.join(_OWN)} for the columns to be carried. Received: {taken[0]!r} in {usable.name}. Rename it."
         )
-    times = np.concatenate([nanoseconds(_clock(usable, number, model.delay_s)) for number in range(len(usable.parts))])
+    times = np.concatenate([nanoseconds(_clock(usable, number, model.alignment.delay_s)) for number in range(len(usable.parts))])
     has_time = usable.start is not None
     columns = {"time": pa.array(times, pa.timestamp("ns", tz="UTC"))} if has_time else {"sample": pa.array(times // 10**9)}
-    columns["out_of_range"] = pa.array(np.concatenate([model.coverage.score(part.values) for part in usable.parts]))
+    columns["out_of_range"] = pa.array(np.concatenate([trusted.score_run(part.values) for part in usable.parts]))
     for name in usable.parts[0].carried:
         cells = pd.concat([pd.Series(part.carried[name]).reset_index(drop=True) for part in usable.parts], ignore_index=True)
         try:
@@ -91,11 +96,11 @@ def _clock(usable: Recording, number: int, delay_s: float) -> Telemetry:
     return Telemetry(part.values, part.interval_s, part.offset_s + delay_s, part.start, part.name)
 
 
-def coverage_lines(model: "RunModel", run: Recording) -> list[str]:
+def coverage_lines(model: "EnhancedSimulator", run: Recording) -> list[str]:
     """Says which share of a run the training range covers, as a whole and for each of its scenarios.
 
     Args:
-        model: The run model.
+        model: A simulator of recorded runs.
         run: The run.
 
     Returns:
@@ -103,8 +108,11 @@ def coverage_lines(model: "RunModel", run: Recording) -> list[str]:
     """
     import pandas as pd
 
-    usable = model.usable(run)
-    covered = np.concatenate([model.coverage.score(part.values) <= 1 for part in usable.parts])
+    from enhsim_tf.simulator.trusted_range import TrustedRange
+
+    trusted = TrustedRange(model)
+    usable = model.alignment.usable(run)
+    covered = np.concatenate([trusted.score_run(part.values) <= 1 for part in usable.parts])
     lines = [f"the training range covers {np.mean(covered):.1%} of the run"]
     if "scenario" in usable.parts[0].carried:
         names = pd.concat([pd.Series(part.carried["scenario"]) for part in usable.parts], ignore_index=True).astype(str).to_numpy()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
 _LENGTH = re.compile(
@@ -48,7 +48,7 @@ class Share:
 
 
 def parse_scenario(text: str) -> Degraded:
-    """Parses a scenario in the form `mode:severity` or `mode:severity:onset`.
+    """Parses a scenario in the form `mode:severity` or `mode:severity:onset`, with `CHANNEL=` before it for one of several channels.
 
     Args:
         text: The scenario, for example `stuck:0.5`.
@@ -56,14 +56,15 @@ def parse_scenario(text: str) -> Degraded:
     Raises:
         InputError: If the mode is unknown or a number is out of range.
     """
-    mode, *numbers = text.split(":")
+    channel, is_named, rest = text.rpartition("=")
+    mode, *numbers = rest.split(":")
     if mode not in MODES or not 1 <= len(numbers) <= 2:
         raise InputError(f"Expected mode:severity or mode:severity:onset, mode one of {', '.join(MODES)}. Received: {text!r}.")
     try:
         values = [float(number) for number in numbers]
     except ValueError:
         raise InputError(f"Expected numbers from 0 to 1 after the mode. Received: {text!r}. Write for example {mode}:0.5.") from None
-    return Degraded(mode, *values)
+    return Degraded(mode, *values, channel=channel if is_named else None)
 
 
 def parse_length(text: str) -> tuple[float, str]:
@@ -139,7 +140,7 @@ def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     Raises:
         InputError: If a scenario would get no window.
     """
-    scenarios = [Degraded(part.mode, part.severity[0], part.onset[0]) for part in mix.scenarios]
+    scenarios = [Degraded(part.mode, part.severity[0], part.onset[0], part.channel) for part in mix.scenarios]
     num_nominal = round(mix.nominal * num_windows)
     each, left = divmod(num_windows - num_nominal, len(scenarios) or 1)
     counts = [num_nominal, *(each + (number < left) for number in range(len(scenarios)))]
@@ -152,11 +153,13 @@ def divide_windows(mix: Mix, num_windows: int, seed: int) -> list[Share]:
     return [Share(*share) for share in zip([None, *scenarios], counts, seeds, strict=True) if share[1]]
 
 
-def window_columns(window: int) -> dict[str, "pa.DataType"]:
+def window_columns(window: int, channels: Sequence[str] = ("",)) -> dict[str, "pa.DataType"]:
     """Returns the columns of labelled windows and their types.
 
     Args:
         window: Length of a window in samples.
+        channels: Names of the channels. Of several, each has a column `window NAME` and a column `mask NAME`, and `mask` marks the samples that
+            are changed in any of them.
     """
     import pyarrow as pa
 
@@ -167,13 +170,40 @@ def window_columns(window: int) -> dict[str, "pa.DataType"]:
         "end": pa.int32(),
         "mask": pa.list_(pa.bool_(), window),
     }
-    return {"window": pa.list_(pa.float32(), window)} | labels
+    values = {name: pa.list_(pa.float32(), window) for name in value_names("window", channels)}
+    masks = {name: pa.list_(pa.bool_(), window) for name in value_names("mask", channels) if len(channels) > 1}
+    return values | labels | masks
+
+
+def value_names(what: str, channels: Sequence[str]) -> list[str]:
+    """Names of the columns of channels: `what` for a single one, otherwise `what NAME`."""
+    return [what] if len(channels) == 1 else [f"{what} {name}" for name in channels]
+
+
+def window_arrays(windows: np.ndarray, masks: np.ndarray, names: Sequence[str], severities: Sequence[float]) -> list["pa.Array"]:
+    """Makes the columns of `window_columns`.
+
+    Args:
+        windows: float32 of shape `(windows, samples, channels)`.
+        masks: Which samples were changed, same shape.
+        names: Scenario of each window, which may be nominal.
+        severities: Severity of each window.
+    """
+    import pyarrow as pa
+
+    def lists(values: np.ndarray) -> "pa.Array":
+        return pa.FixedSizeListArray.from_arrays(pa.array(np.ascontiguousarray(values).ravel()), values.shape[1])
+
+    channels = range(windows.shape[2])
+    labels = label_windows(names, severities, masks.any(axis=2))
+    own = [lists(masks[:, :, channel]) for channel in channels] if len(channels) > 1 else []
+    return [*(lists(windows[:, :, channel]) for channel in channels), *labels.values(), *own]
 
 
 def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulator", shares: Sequence[Share]) -> dict[Degraded, int]:
     """Writes labelled windows to one Parquet file, chunk by chunk. The file appears only when it is complete.
 
-    The columns are `window` (a list of float32) and `label_columns.LABELS`. A window that its scenario has not changed, such as
+    The columns are those of `window_columns`, see `label_columns.LABELS`. A window that its scenario has not changed, such as
     one in which the mechanism would have stood still anyway, is labelled nominal.
 
     Args:
@@ -187,21 +217,23 @@ def write_windows_labelled(path: str | os.PathLike, simulator: "EnhancedSimulato
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    schema = pa.schema(window_columns(simulator.window)).with_metadata(
-        {"interval_s": repr(simulator.interval_s), "channel": str(simulator.trained.get("telemetry", ""))}
-    )
+    columns = window_columns(simulator.window, simulator.channels)
+    schema = pa.schema(columns).with_metadata({"interval_s": repr(simulator.interval_s), "channel": ", ".join(simulator.channels)})
+    # stores bytes of equal significance together: signs and exponents compress well, noisy mantissas do not
+    encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in value_names("window", simulator.channels)}
+    names = ["scenario"]
+    options = {"compression": "zstd", "use_dictionary": names, "column_encoding": encoding, "write_statistics": names}
     make_folder(Path(path).parent)
     unchanged: dict[Degraded, int] = {}
-    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
+    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
         for share in shares:
             scenario = _active(share.scenario, simulator.window)
             name, severity = (scenario.mode, scenario.severity) if scenario else ("", 0.0)
             for windows, masks in simulator.generate_labelled_chunks(share.num_windows, scenario, share.seed):
-                values = pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), simulator.window)
-                labels = label_windows([name] * len(windows), [severity] * len(windows), masks)
-                writer.write_table(pa.table({"window": values, **labels}).cast(schema))
+                arrays = window_arrays(windows, masks, [name] * len(windows), [severity] * len(windows))
+                writer.write_table(pa.table(arrays, names=list(columns)).cast(schema))
                 if scenario:
-                    unchanged[scenario] = unchanged.get(scenario, 0) + int(np.count_nonzero(~masks.any(axis=1)))
+                    unchanged[scenario] = unchanged.get(scenario, 0) + int(np.count_nonzero(~masks.any(axis=(1, 2))))
     return unchanged
 
 
@@ -225,7 +257,8 @@ def series_labelled(
         schedule: Degraded modes at given places, each followed by nominal operation, instead of a scenario.
 
     Returns:
-        A data frame with one row per sample and the columns `value` and `label_columns.LABELS`; `scenario` is categorical. Its
+        A data frame with one row per sample and the columns `value` (of several channels, their names, and `mask NAME` for each) and
+        `label_columns.LABELS`; `scenario` is categorical. Its
         index is a `DatetimeIndex` in UTC named `time`, or, without a start, seconds named `time_s`.
 
     Raises:
@@ -240,7 +273,10 @@ def series_labelled(
     if start is not None:
         index = pd.DatetimeIndex(parse_start(start) + pd.to_timedelta(np.round(seconds * 1e9).astype(np.int64), unit="ns"), name="time")
     values, mask, events = simulator.generate_labelled_series(num_samples, scenario, seed, schedule=schedule)
-    return pd.DataFrame({"value": values, **label_samples(mask, events)}, index=index)
+    channels = simulator.channels
+    columns = {name: values[:, number] for number, name in enumerate(["value"] if len(channels) == 1 else channels)}
+    own = {f"mask {name}": mask[:, number] for number, name in enumerate(channels) if len(channels) > 1}
+    return pd.DataFrame({**columns, **label_samples(mask.any(axis=1), events), **own}, index=index)
 
 
 def write_series_labelled(
@@ -270,7 +306,8 @@ def write_series_labelled(
     """
     frame = series_labelled(simulator, num_samples, scenario, seed, start, schedule)
     if is_timeeval:
-        write_timeeval(path, {str(simulator.trained.get("telemetry", "value")): frame})
+        value = "value" if len(simulator.channels) == 1 else None
+        write_timeeval(path, {name: frame[[value or name, "mask"]].rename(columns={value or name: "value"}) for name in simulator.channels})
     else:
         write_table(path, frame)
     return int(frame["mask"].sum())

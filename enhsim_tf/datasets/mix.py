@@ -21,12 +21,14 @@ class ScenarioShare:
         share: Share of all windows.
         severity: Minimum and maximum severity. The severity of each window is drawn uniformly between them.
         onset: Minimum and maximum onset as a share of the window, drawn in the same way.
+        channel: The only channel that is degraded; None for all.
     """
 
     mode: str
     share: float
     severity: tuple[float, float]
     onset: tuple[float, float]
+    channel: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,5 +85,5 @@ def make_mix(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
     if late:
         raise InputError(f"Expected an onset from 0 to {LATEST_ONSET}. Received: {late[0]}. Choose an earlier one.")
     share = (1 - nominal_share) / len(scenarios)
-    parts = [ScenarioShare(each.mode, share, (each.severity,) * 2, (each.onset,) * 2) for each in scenarios]
+    parts = [ScenarioShare(each.mode, share, (each.severity,) * 2, (each.onset,) * 2, each.channel) for each in scenarios]
     return Mix(nominal_share, tuple(parts))

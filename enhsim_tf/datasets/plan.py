@@ -16,14 +16,15 @@ from typing import Any
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.mix import MOST_MODELS, MOST_WINDOWS, Mix, ModelShare
-from enhsim_tf.enhanced_simulator.saving import MANIFEST, check_saved, settings_of
+from enhsim_tf.simulator.model_folder import channels_of
+from enhsim_tf.simulator.saving import MANIFEST, check_saved, settings_of
 
-FORMAT = "enhsim_tf.datasets.generate/2"
+FORMAT = "enhsim_tf.datasets.generate/3"
 _SHARD = 8_192  # default windows per shard, for windows of up to 512 samples
 _SHARD_VALUES = 2**22  # default values per shard, for longer windows
 MOST_VALUES = 2**26  # maximum values per shard: 256 MiB, which a worker holds in memory
 _MOST_SHARDS = 2_000_000
-_VERSIONS = ("tensorflow", "keras", "numpy", "pyarrow")
+_VERSIONS = ("numpy", "pyarrow")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Model:
         sha256: Checksum of its manifest, which contains the checksums of its files.
         window: Length of a window in samples.
         interval_s: Sampling interval in seconds.
+        channels: Names of the channels.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Model:
     sha256: str
     window: int
     interval_s: float
+    channels: tuple[str, ...] = ("",)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,10 +79,15 @@ class Plan:
                     f"Expected all models to have the same window and interval: {first.window} samples of {first.interval_s:g} s, as {first.name!r}. "
                     f"Received: {model.window} samples of {model.interval_s:g} s in {model.name!r}."
                 )
+            if len(model.channels) != len(first.channels) or (len(first.channels) > 1 and model.channels != first.channels):
+                raise InputError(
+                    f"Expected models of the same channels: {', '.join(first.channels)[:120]}. Received: {', '.join(model.channels)[:120]} in {model.name!r}."
+                )
         if not 1 <= self.num_windows <= MOST_WINDOWS:
             raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: {self.num_windows:,}.")
-        if self.shard * self.window > MOST_VALUES:
-            raise InputError(f"Expected shards of at most {MOST_VALUES // self.window:,} such windows. Received: shard: {self.shard:,}.")
+        values = self.window * len(self.channels)
+        if self.shard * values > MOST_VALUES:
+            raise InputError(f"Expected shards of at most {MOST_VALUES // values:,} such windows. Received: shard: {self.shard:,}.")
         if self.num_shards > _MOST_SHARDS:
             raise InputError(f"Expected at most {_MOST_SHARDS:,} shards. Received: {self.num_shards:,}. Make them larger with `shard:`.")
 
@@ -87,6 +95,11 @@ class Plan:
     def window(self) -> int:
         """Length of a window in samples."""
         return self.models[0].window
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return self.models[0].channels
 
     @property
     def num_shards(self) -> int:
@@ -105,9 +118,11 @@ class Plan:
             "seed": self.seed,
             "window": self.window,
             "interval_s": self.models[0].interval_s,
+            **({"channels": list(self.channels)} if len(self.channels) > 1 else {}),
             "nominal": self.mix.nominal,
             "scenarios": [
                 {"mode": part.mode, "share": part.share, "severity": list(part.severity), "onset": list(part.onset)}
+                | ({} if part.channel is None else {"channel": part.channel})
                 for part in self.mix.scenarios
             ],
             "models": [{"name": model.name, "share": model.share, "sha256": model.sha256} for model in self.models],
@@ -147,7 +162,9 @@ def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) 
     if len(shares) > MOST_MODELS:
         raise InputError(f"Expected at most {MOST_MODELS} models. Received: {len(shares)}.")
     models = tuple(_model_of(share, folder / share.folder) for share in shares)
-    return Plan(mix, models, seed, num_windows, mix.shard or max(1, min(_SHARD, _SHARD_VALUES // models[0].window)))
+    return Plan(
+        mix, models, seed, num_windows, mix.shard or max(1, min(_SHARD, _SHARD_VALUES // (models[0].window * len(models[0].channels))))
+    )
 
 
 def _model_of(share: ModelShare, folder: Path) -> Model:
@@ -159,4 +176,4 @@ def _model_of(share: ModelShare, folder: Path) -> Model:
         raise InputError(f"Expected interval_s to be a number above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
     if type(window) is not int or not 2 <= window <= MOST_VALUES:
         raise InputError(f"Expected window to be a number of samples in settings.json. Received: {str(window)[:40]} in {folder}.")
-    return Model(share.name, folder, share.share, sha256(folder / MANIFEST), window, float(interval_s))
+    return Model(share.name, folder, share.share, sha256(folder / MANIFEST), window, float(interval_s), channels_of(folder))

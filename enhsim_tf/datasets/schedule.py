@@ -9,10 +9,10 @@ from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.injection import TRIES, draw_begin
-from enhsim_tf.enhanced_simulator.changes import fade_length
+from enhsim_tf.simulator.changes import fade_length
 
 if TYPE_CHECKING:
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 
 def draw_schedule(
@@ -47,6 +47,8 @@ def draw_schedule(
     Raises:
         InputError: If events overlap or do not fit, or if a mode changes nothing at any of the drawn places.
     """
+    if simulator.is_run_model:
+        simulator.alignment.draw(np.zeros(0, int), [*modes, *given], rng)  # refuses them
     schedule = check_schedule(given, num_samples)
     gap = max(2 * fade_length(simulator.window) + 1, lengths[1] if gap is None else gap)
     drawn = [(modes[each % len(modes)], int(rng.integers(lengths[0], lengths[1] + 1))) for each in range(number)]
@@ -55,8 +57,9 @@ def draw_schedule(
         for _ in range(TRIES):
             event = ScheduledMode(mode.mode, mode.severity, draw_begin([(0, num_samples)], taken, length, gap, rng), length)
             times = simulator.interval_s * np.arange(event.begin, event.end)[None]
-            degraded = simulator.coarse.simulate(times, Degraded(mode.mode, mode.severity, 0.0), np.random.default_rng(0))
-            if (degraded != simulator.coarse.simulate(times)).any():
+            scenario = Degraded(mode.mode, mode.severity, 0.0)
+            waves = simulator.alignment.simulators
+            if any((each.simulate(times, scenario, np.random.default_rng(0)) != each.simulate(times)).any() for each in waves):
                 break
         else:
             raise InputError(

@@ -1,9 +1,9 @@
 """Generates one shard of a large data set. The content of a shard depends only on the plan and the number of the shard.
 
-Each shard has a random seed of its own, and the networks always compute batches of the same size. The bytes of a shard are
+Each shard has a random seed of its own, and enhancers always compute batches of the same size. The bytes of a shard are
 therefore the same in every worker and in every order of generation.
 
-The columns are `window` (a list of float32), `label_columns.LABELS`, and `model` if the plan has several models.
+The columns are those of `labelled_windows.window_columns`, and `model` if the plan has several models.
 """
 
 import functools
@@ -15,22 +15,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.schedule import held_samples
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.label_columns import NOMINAL, label_windows
-from enhsim_tf.datasets.labelled_windows import window_columns
+from enhsim_tf.datasets.label_columns import NOMINAL
+from enhsim_tf.datasets.labelled_windows import value_names, window_arrays, window_columns
 from enhsim_tf.datasets.plan import FORMAT, Plan
-from enhsim_tf.enhanced_simulator.saving import MANIFEST
+from enhsim_tf.simulator.saving import MANIFEST
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 _STREAM = 0x666C656574  # distinguishes these seeds from all others in the package
 _START_RANGE = 1_000_000  # windows start at a random sample below this one, so that every phase of the waves occurs
-_BATCH, _BATCH_VALUES = 1_024, 2**19  # maximum windows and values per call of the networks
+_BATCH, _BATCH_VALUES = 1_024, 2**19  # maximum windows and values per call of the enhancer
 _ROW_GROUP = 4_096
 
 
@@ -111,30 +110,25 @@ def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: i
         shard: Number of the shard.
 
     Returns:
-        The windows, float32 of shape `(rows, samples)`, a boolean array of the same shape that marks the samples that a scenario
+        The windows, float32 of shape `(rows, samples, channels)`, a boolean array of the same shape that marks the samples that a scenario
         has changed, and the properties of the windows.
     """
     rows, happening, noise = draw_rows(plan, shard)
-    windows, masks = np.empty((len(rows.start), plan.window), np.float32), np.empty((len(rows.start), plan.window), bool)
-    batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // plan.window))
+    shape = (len(rows.start), plan.window, len(plan.channels))
+    windows, masks = np.empty(shape, np.float32), np.empty(shape, bool)
+    batch = max(1, min(_BATCH, plan.shard, _BATCH_VALUES // (shape[1] * shape[2])))
     for number, simulator in enumerate(simulators):
         own = np.flatnonzero(rows.model == number)
         for first in range(0, len(own), batch):
             chosen = own[first : first + batch]
-            (coarse, nominal), held = np.zeros((2, batch, plan.window), np.float32), []
-            for place, row in enumerate(chosen):
-                times = simulator.interval_s * (rows.start[row] + np.arange(plan.window))
-                nominal[place] = coarse[place] = simulator.coarse.simulate(times[None])[0]
-                scenario = _scenario_of(plan, rows, row)
-                if scenario is not None:
-                    coarse[place] = simulator.coarse.simulate(times[None], scenario, happening)[0]
-                    stuck = held_samples(scenario, plan.window)
-                    held += [(place, *stuck)] if stuck else []
+            starts, scenarios = np.zeros(batch, np.int64), [_scenario_of(plan, rows, row) for row in chosen]
+            starts[: len(chosen)] = rows.start[chosen]
+            drawn = simulator.alignment.draw(starts, [*scenarios, *[None] * (batch - len(chosen))], happening)
             levels = None
             if simulator.levels is not None:
-                levels = np.zeros((batch, 2))
+                levels = np.zeros((batch, *simulator.levels.shape[1:]))
                 levels[: len(chosen)] = simulator.levels[(rows.level[chosen] * len(simulator.levels)).astype(int)]
-            completed = simulator.complete_labelled(coarse, nominal, levels, noise, held)
+            completed = simulator.complete(drawn, levels, noise)
             windows[chosen], masks[chosen] = (each[: len(chosen)] for each in completed)
     return windows, masks, rows
 
@@ -143,7 +137,8 @@ def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
     number = rows.scenario[row]
     if number == 0:
         return None
-    return Degraded(plan.mix.scenarios[number - 1].mode, float(rows.severity[row]), float(rows.onset[row]))
+    part = plan.mix.scenarios[number - 1]
+    return Degraded(part.mode, float(rows.severity[row]), float(rows.onset[row]), part.channel)
 
 
 def shard_schema(settings: dict[str, Any], key: str) -> "pa.Schema":
@@ -155,7 +150,7 @@ def shard_schema(settings: dict[str, Any], key: str) -> "pa.Schema":
     """
     import pyarrow as pa
 
-    columns = window_columns(settings["window"])
+    columns = window_columns(settings["window"], settings.get("channels", ("",)))
     if len(settings["models"]) > 1:
         columns["model"] = pa.string()
     return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})
@@ -185,7 +180,7 @@ class ShardMaker:
             raise InputError(
                 f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
             )
-        from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+        from enhsim_tf.simulator.simulator import EnhancedSimulator
 
         simulators = []
         for model in self.plan.models:
@@ -211,14 +206,14 @@ class ShardMaker:
 
         windows, masks, rows = make_windows(self.plan, self.simulators, shard)
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
-        values = pa.FixedSizeListArray.from_arrays(pa.array(windows.ravel()), self.plan.window)
-        columns = [values, *label_windows(modes[rows.scenario], rows.severity, masks).values()]
+        columns = window_arrays(windows, masks, modes[rows.scenario], rows.severity)
         if len(self.plan.models) > 1:
             columns.append(pa.array(np.array([model.name for model in self.plan.models], object)[rows.model], pa.string()))
         table = pa.table(columns, schema=shard_schema(self.settings, self.key))
         names = [name for name in ("scenario", "model") if name in table.column_names]
         # stores bytes of equal significance together: signs and exponents compress well, mantissas of noise do not
-        options = {"use_dictionary": names, "column_encoding": {"window.list.element": "BYTE_STREAM_SPLIT"}, "write_statistics": names}
+        encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in value_names("window", self.plan.channels)}
+        options = {"use_dictionary": names, "column_encoding": encoding, "write_statistics": names}
         path = self.folder / shard_file(shard)
         try:
             with replace_file(path) as temporary:

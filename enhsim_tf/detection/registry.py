@@ -53,8 +53,8 @@ FURTHER: dict[str, Callable[[int], "Detector"]] = {"innovation": partial(_build,
 
 
 RESIDUAL = "residual"
-"""Name of the detector that judges the difference between telemetry and a fitted simulator (`residual_size`, and
-`enhanced_simulator.residual_detector`). It needs a simulator, so it is no member of `DETECTORS`."""
+"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`residual_size`). It needs a
+simulator, so it is no member of `DETECTORS`."""
 
 
 def all_detectors() -> dict[str, Callable[[int], "Detector"]]:

@@ -6,7 +6,7 @@ features, which take a second, show that something beyond a linear map can be le
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -104,6 +104,7 @@ def choose_enhancer(
     variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
     variance = np.where(variance > 0, variance, 1.0)
     fitted: dict[str, Enhancer] = {}
+    penalties: list[float] = []  # chosen once, by blocks of the time that is not held out
     squared: dict[str, np.ndarray] = {}
 
     def by_stretch(predicted: np.ndarray) -> np.ndarray:
@@ -112,7 +113,8 @@ def choose_enhancer(
 
     def try_candidate(name: str) -> None:
         on_candidate(name)
-        fitted[name] = fit_enhancer(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs)
+        fitted[name] = fit_enhancer(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs, penalties)
+        penalties.extend(fitted[name].penalties[len(penalties) :])
         squared[name] = by_stretch(fitted[name].predict(inputs[held_out]))
 
     note = ""
@@ -131,7 +133,7 @@ def choose_enhancer(
             )
     judged = judge(squared)
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
-    return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs), judged, edges, fitted[chosen], note)
+    return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs, penalties), judged, edges, fitted[chosen], note)
 
 
 def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
@@ -156,7 +158,15 @@ def _standard_error(values: np.ndarray) -> float:
     return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
-def fit_enhancer(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray, seed: int = 0, epochs: int = 6) -> Enhancer:
+def fit_enhancer(
+    name: str,
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    starts: np.ndarray,
+    seed: int = 0,
+    epochs: int = 6,
+    penalties: Sequence[float] | None = None,
+) -> Enhancer:
     """Fits one candidate to all of the given windows.
 
     Args:
@@ -166,6 +176,7 @@ def fit_enhancer(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.
         starts: First sample of each window, shape `(windows,)`.
         seed: Random seed of the networks.
         epochs: Passes of the networks over the windows.
+        penalties: Penalty of each channel, as `Enhancer.penalties` of a fit to similar windows; None: chosen by blocks of time.
 
     Raises:
         InputError: If the name is unknown, shapes do not match, or a value is not finite.
@@ -185,7 +196,8 @@ def fit_enhancer(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.
     linear, factors, layers = np.zeros(outputs.shape[1]), (), ()
     left = outputs
     if name != NETWORK:
-        ridge = fit_ridge(rows, outputs, starts, num_channels=channels)
+        ridge = fit_ridge(rows, outputs, starts, num_channels=channels, chosen=penalties or None)
+        penalties = ridge.chosen
         maps = [ridge.weights] if ridge.factors is None else list(ridge.factors)
         moved = ridge.input_mean.ravel()
         for each in maps:
@@ -208,7 +220,7 @@ def fit_enhancer(name: str, inputs: np.ndarray, targets: np.ndarray, starts: np.
                 "Look for values far from all others, or use --enhancer ridge."
             )
     bias = (np.tile(middle, window) + output_unit * linear).astype(np.float32)
-    return Enhancer(name, *size, centre.astype(np.float32), bias, factors, layers)
+    return Enhancer(name, *size, centre.astype(np.float32), bias, factors, layers, penalties=tuple(penalties or ()))
 
 
 def _keeping_the_shape(name: str, inputs: np.ndarray, targets: np.ndarray, centre: np.ndarray, size: tuple[int, int, int]) -> Enhancer:

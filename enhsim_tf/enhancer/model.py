@@ -24,6 +24,7 @@ class Enhancer:
         factors: Matrices whose product maps flat windows, shape `(windows, window * columns)`, to outputs; none for no linear map.
         layers: Kernel and bias of each Dense layer of a network beside the linear map.
         main: For the candidates that keep the shape of the coarse simulator: for each channel its column, and its gain; otherwise None.
+        penalties: Penalty of each channel in the ridge regression; they are not saved.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Enhancer:
     factors: tuple[np.ndarray, ...] = ()
     layers: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     main: tuple[np.ndarray, np.ndarray] | None = None
+    penalties: tuple[float, ...] = ()
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Maps coarse windows to enhanced windows.

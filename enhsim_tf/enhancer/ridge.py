@@ -32,6 +32,7 @@ class Ridge:
             targets about their mean window, shape `(penalties,)`; of several channels, shape `(penalties, channels)`. NaN if there was
             a single window.
         factors: For few windows with many columns, two matrices whose product is `weights`, with fewer numbers; otherwise None.
+        chosen: The penalty of each channel.
     """
 
     weights: np.ndarray | None
@@ -41,6 +42,7 @@ class Ridge:
     penalties: np.ndarray
     errors: np.ndarray
     factors: tuple[np.ndarray, np.ndarray] | None = None
+    chosen: tuple[float, ...] = ()
 
     @property
     def is_at_edge(self) -> bool:
@@ -78,6 +80,7 @@ def fit_ridge(
     penalties: Sequence[float] = PENALTIES,
     num_blocks: int = 5,
     num_channels: int = 1,
+    chosen: Sequence[float] | None = None,
 ) -> Ridge:
     """Fits ridge regression, with a penalty for each channel chosen by cross-validation over blocks of time.
 
@@ -94,6 +97,7 @@ def fit_ridge(
             added to the sum of squared errors.
         num_blocks: Number of blocks of time.
         num_channels: Number of channels of the targets. Output `o` belongs to channel `o % num_channels`.
+        chosen: Penalty of each channel, if it was chosen before; nothing is cross-validated then.
 
     Returns:
         The regression, fitted to all windows.
@@ -106,15 +110,17 @@ def fit_ridge(
     if penalties.ndim != 1 or not len(penalties) or not (np.isfinite(penalties) & (penalties > 0)).all():
         raise InputError(f"Expected penalties above 0. Received: {penalties.tolist()}. Leave `penalties` at its default.")
     squares, power = np.zeros((len(penalties), num_channels)), np.zeros(num_channels)
-    for training, held_out in time_blocks(starts, num_blocks, windows.shape[1]):
+    blocks = time_blocks(starts, num_blocks, windows.shape[1]) if chosen is None else []
+    for training, held_out in blocks:
         solution = _Solution(windows[training], targets[training])
         inner, centred = solution.project(windows[held_out]), targets[held_out] - solution.target_mean
         power += _by_channel((targets[held_out] - targets.mean(axis=0)) ** 2, num_channels)
         for number, penalty in enumerate(penalties):
             squares[number] += _by_channel((centred - inner @ solution.coefficients(penalty)) ** 2, num_channels)
-    is_known = len(windows) > 1
+    is_known = len(windows) > 1 and chosen is None
     errors = np.sqrt(squares / np.where(power > 0, power, 1.0)) if is_known else np.full(squares.shape, np.nan)
-    chosen = [penalties[found == found.min()].max() if is_known else penalties.max() for found in errors.T]
+    if chosen is None:
+        chosen = [penalties[found == found.min()].max() if is_known else penalties.max() for found in errors.T]
     solution, each = _Solution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
     left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
     is_low_rank = left.size + right.size < len(left) * right.shape[1]
@@ -126,6 +132,7 @@ def fit_ridge(
         penalties,
         errors[:, 0] if num_channels == 1 else errors,
         (left, right) if is_low_rank else None,
+        tuple(map(float, chosen)),
     )
 
 

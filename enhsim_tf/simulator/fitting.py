@@ -35,7 +35,7 @@ from enhsim_tf.telemetry.windows import evenly_spaced_starts, random_window_star
 _ALIGNMENTS = 2  # rounds in which windows are aligned with the waveform that ridge regression has learnt
 _NUM_WAVEFORM = 1_000  # most windows from which a waveform is learnt
 _NUM_LEVELS = 500  # most windows whose offset and gain are kept
-_MOST_VALUES = 2_000_000  # of all training windows, which bounds time and memory of a fit of many channels
+_MOST_VALUES = 1_500_000  # of all training windows, which bounds time and memory of a fit of many channels
 _LEAST_WINDOWS = 300  # training windows, however many channels
 
 
@@ -348,7 +348,9 @@ def _held_out_residuals(
         enhancer: Enhancer = choice.without_fold
         if fold:
             kept, _ = split_fold(times, window, choice.edges, fold)
-            enhancer = fit_enhancer(enhancer.name, inputs[kept], targets[kept], times[kept], options.seed, options.epochs)
+            enhancer = fit_enhancer(
+                enhancer.name, inputs[kept], targets[kept], times[kept], options.seed, options.epochs, enhancer.penalties
+            )
         other = EnhancedSimulator(simulator.alignment, enhancer, None, simulator.channels, simulator.interval_s)
         for block in range(fold, len(choice.edges) - 1, NUM_FOLDS):
             for part, coarse in zip(learnt.parts, run.parts, strict=True):
@@ -444,6 +446,7 @@ def _finish(
         simulator.nominal = _joined(learnt, held_out)
         if simulator.is_run_model:
             simulator.alignment.nominal = _joined(*runs)
+            vars(simulator).pop("_nominal_clean", None)
     return simulator, report
 
 

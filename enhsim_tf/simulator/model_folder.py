@@ -1,4 +1,4 @@
-"""Finds and names the folders of fitted models; each channel has one folder."""
+"""Finds and names the folders of fitted models."""
 
 import os
 import urllib.parse
@@ -7,7 +7,9 @@ from pathlib import Path
 
 from enhsim_tf.common.atomic_files import encode_name
 from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.simulator.saving import MANIFEST, is_foreign
+from enhsim_tf.simulator.saving import MANIFEST, is_foreign, settings_of
+
+_MOST_BYTES = 60  # of the name of a folder
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
@@ -21,6 +23,31 @@ def folder_of(models: str | os.PathLike, channel: str) -> Path:
         InputError: If the name is empty or too long for a folder.
     """
     return Path(models) / encode_name(channel)
+
+
+def name_of_channels(channels: Sequence[str]) -> str:
+    """Returns the name of a model: that of its channel, or those of its channels joined by `+`, shortened if there are many.
+
+    Args:
+        channels: Names of the channels.
+    """
+    joined = "+".join(channels)
+    return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_BYTES else f"{channels[0]}+{len(channels) - 1} more"
+
+
+def channels_of(folder: Path) -> tuple[str, ...]:
+    """Returns the names of the channels of a saved simulator without loading it.
+
+    Args:
+        folder: The folder of the simulator.
+
+    Raises:
+        InputError: If the folder was not written by `EnhancedSimulator.save`.
+    """
+    names = settings_of(folder).get("channels")
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError(f"Expected the names of channels in settings.json. Received: {str(names)[:80]} in {folder}. Fit it again.")
+    return tuple(names)
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:

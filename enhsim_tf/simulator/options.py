@@ -69,7 +69,7 @@ class FitOptions(_Checked):
         "eighth of the record)",
         least=FEWEST_SAMPLES,
     )
-    num_windows: int = _option(2_500, "number of training windows (default: 2500; fewer for many channels)", least=1)
+    num_windows: int = _option(1_000, "number of training windows (default: 1000; fewer for many channels)", least=1)
     epochs: int = _option(6, "training epochs of a network (default: 6)", least=1)
     noise: str = _option(
         BEST,

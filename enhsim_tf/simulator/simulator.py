@@ -394,10 +394,15 @@ class EnhancedSimulator:
         begin = np.random.default_rng([seed, 2]).integers(0, len(cycle))
         return cycle[(begin + np.arange(num_windows)) % len(cycle)]
 
+    @functools.cached_property
+    def _nominal_clean(self) -> list[np.ndarray]:
+        """The parts of the nominal run, enhanced."""
+        return [self.enhance_run(part.values) for part in self._runs().usable(self.alignment.nominal).parts]
+
     def _nominal_series(self, num_samples: int, start_s: float) -> np.ndarray:
         """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions are cross-faded."""
         skipped, fade = round(start_s / self.interval_s), self.window // 2
-        clean = [self.enhance_run(part.values) for part in self.alignment.usable(self.alignment.nominal).parts]
+        clean = self._nominal_clean
         rise = (np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade) ** 2)[:, None]
         pieces, tail = [clean[0][:-fade]], clean[0][-fade:]
         length, number = len(pieces[0]), 0

@@ -1,0 +1,289 @@
+"""Fits simulators to the channels of a source: one for all channels together, or one for each, in parallel worker processes.
+
+Each simulator gets a folder of its own, for example `MODEL_DIR/volts/`, with the files of `EnhancedSimulator.save`, `report.json` and
+`report.png`.
+"""
+
+import contextlib
+import dataclasses
+import os
+import sys
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace_folder, write_json
+from enhsim_tf.common.console import SILENT, Progress, tell
+from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.parallel import engines
+from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.simulator.model_folder import folder_of, name_of_channels, refuse_foreign
+from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.simulator.saving import MANIFEST
+from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from enhsim_tf.coarse_simulator.recording import Recording
+    from enhsim_tf.telemetry.cleaning.clean import Cleaned
+
+THREADS = 1  # of a worker
+
+
+@dataclasses.dataclass(frozen=True)
+class CoarseRun:
+    """Where the recorded run of a coarse simulator is.
+
+    Args:
+        source: A source of telemetry, see `sources.read_source`.
+        columns: Names of the columns that are inputs; None: all numeric columns.
+        time: Name of the time column; None: it is detected.
+        start: Time of its zero in UTC, if its times count from zero; None: its times are those of the telemetry.
+    """
+
+    source: str
+    columns: Sequence[str] | None = None
+    time: str | None = None
+    start: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Job:
+    """Channels to fit: together, if there are several.
+
+    Args:
+        series: Raw values of each channel, as returned by `sources.read_source`.
+        out: Folder of all models; an absolute path, because a worker may have another working directory.
+        options: Options of the fit.
+        cleaning: Settings of the cleaning.
+        speaks: Whether to print lines of progress.
+        run: The recorded run of a coarse simulator, or None.
+        commands: Commands of the samples of a single channel, shape `(samples, commands)`, or None.
+    """
+
+    series: "Mapping[str, pd.Series]"
+    out: Path
+    options: FitOptions
+    cleaning: Cleaning
+    speaks: bool = False
+    run: CoarseRun | None = None
+    commands: "np.ndarray | None" = None
+
+    @property
+    def name(self) -> str:
+        """Name of the channels."""
+        return name_of_channels(list(self.series))
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What became of a job.
+
+    Args:
+        name: Name of the job.
+        lines: Lines of its reports.
+        reports: Report of each simulator, by the name of its channels.
+        failed: For each channel that could not be fitted, the reason.
+    """
+
+    name: str
+    lines: Sequence[str] = ()
+    reports: Mapping[str, dict] = dataclasses.field(default_factory=dict)
+    failed: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+def fit_channels(
+    series: "Mapping[str, pd.Series]",
+    out: str | os.PathLike,
+    options: FitOptions,
+    cleaning: Cleaning,
+    tell: Callable[[str], None],
+    separately: bool = False,
+    workers: int | None = None,
+    engine: str = "local",
+    speaks: bool = False,
+    run: CoarseRun | None = None,
+    commands: "np.ndarray | None" = None,
+) -> tuple[dict[str, dict], dict[str, str]]:
+    """Fits simulators to channels, saves them together with their reports, and prints the reports.
+
+    Args:
+        series: Raw values of each channel, by the channel's name.
+        out: Output folder for all models.
+        options: Options of the fit.
+        cleaning: Settings of the cleaning.
+        tell: Function that is called with each line of output.
+        separately: Whether each channel gets a simulator of its own.
+        workers: Number of channels that are fitted at the same time, each in its own process. None uses one worker per CPU. The
+            number of workers does not change the results. 0 fits all channels in this process.
+        engine: How worker processes are run: `local` or `ray`. The engine does not change the results.
+        speaks: Whether to print lines of progress.
+        run: The recorded run of a coarse simulator, or None.
+        commands: Commands of the samples of a single channel, shape `(samples, commands)`; None if there are none.
+
+    Returns:
+        The reports by the names of their channels, and for each channel that could not be fitted the reason.
+
+    Raises:
+        InputError: Before any fit, if a channel's name cannot be used for a folder or an output folder contains something other
+            than a saved simulator. Also if the engine is not available or a simulator cannot be written.
+    """
+    out = make_folder(out)
+    if (out / MANIFEST).is_file():
+        raise InputError(
+            f"Expected a folder for models. Received: {out}, which is a model itself. Give another --out, or its parent folder."
+        )
+    here, speaks = Path(os.path.abspath(out)), speaks and engine == "local"
+    groups = [{name: each} for name, each in series.items()] if separately else [dict(series)]
+    jobs = [Job(group, here, options, cleaning, speaks, run, commands) for group in groups]
+    for job in jobs:
+        for name in (job.name, *job.series):
+            refuse_foreign(folder_of(here, name))
+    remove_leftovers(out)
+    reports: dict[str, dict] = {}
+    failed: dict[str, str] = {}
+
+    def note(outcome: Outcome) -> None:
+        reports.update(outcome.reports)
+        failed.update(outcome.failed)
+        for line in outcome.lines:
+            tell(line)
+
+    try:
+        if workers == 0 or (len(jobs) == 1 and engine == "local"):
+            for job in jobs:
+                note(fit_or_say(job))
+        else:
+            _fit_in_processes(jobs, engine, workers, note)
+    finally:
+        remove_leftovers(out)  # temporary files of workers that were killed
+    return reports, {name: failed[name] for name in series if name in failed}
+
+
+def _fit_in_processes(jobs: Sequence[Job], engine: str, workers: int | None, note: Callable[["Outcome"], None]) -> None:
+    """Fits the channels with an engine. A channel whose worker dies repeatedly is reported and does not stop the others."""
+    waiting = {job.name: job for job in jobs}
+
+    def fit(some: Sequence[Job], workers: int | None) -> None:
+        with contextlib.closing(engines.run(engine, fit_or_say, some, workers, THREADS)) as running:
+            for outcome in running:
+                note(outcome)
+                del waiting[outcome.name]
+
+    while waiting:
+        try:
+            fit(list(waiting.values()), workers)
+        except ProcessesDiedError as died:
+            suspects = [job for job in died.items if job.name in waiting]
+            if not suspects:
+                raise
+            for job in suspects:  # one at a time, to find the channel that kills its worker, and to give it all the memory
+                try:
+                    fit([job], 1)
+                except ProcessesDiedError:
+                    reason = (
+                        "Expected a worker process to fit this channel. Received: all of them were killed, perhaps for lack of memory. "
+                        "Give less telemetry."
+                    )
+                    note(Outcome(job.name, failed=dict.fromkeys(job.series, reason)))
+                    del waiting[job.name]
+
+
+def fit_or_say(job: Job) -> Outcome:
+    """Fits the channels of a job. Errors that concern only some of them are returned, not raised.
+
+    Args:
+        job: The channels.
+
+    Raises:
+        InputError: If the machine lacks disk space or memory, which affects the other channels too.
+    """
+    cleaned, failed = {}, {}
+    for name, series in job.series.items():
+        reason = _reason_of(name, lambda name=name, series=series: cleaned.update({name: _cleaned(name, series, job.cleaning)}))
+        failed |= {name: reason} if reason else {}
+    lines = [line for each in cleaned.values() for line in each.report.lines()]
+    reports: dict[str, dict] = {}
+    for group in _groups(cleaned):
+        names = name_of_channels(group)
+        reason = _reason_of(names, lambda group=group: _fit_group({name: cleaned[name] for name in group}, job, lines, reports))
+        failed |= dict.fromkeys(group, reason) if reason else {}
+    return Outcome(job.name, lines, reports, failed)
+
+
+def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
+    import numpy as np
+
+    from enhsim_tf.telemetry.series import check_values
+
+    cleaned = clean(series, cleaning)
+    check_values(np.concatenate([part.values for part in cleaned.parts]), name)
+    return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
+
+
+def _groups(cleaned: "Mapping[str, Cleaned]") -> "list[list[str]]":
+    """Names of the channels that can be brought onto one clock."""
+    from enhsim_tf.simulator.joint import join_channels
+
+    return [list(each.columns) for each in join_channels({name: each.parts for name, each in cleaned.items()})] if cleaned else []
+
+
+def _reason_of(name: str, work: Callable[[], None]) -> str | None:
+    """Does work and returns why it could not be done, or None."""
+    try:
+        work()
+    except InputError as error:
+        return str(error)
+    except (OSError, MemoryError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or "not enough memory"
+        raise InputError(
+            f"Expected enough memory and disk space for {printable(name)}. Received: {reason}. Finished channels are kept; free some space."
+        ) from error
+    except Exception as error:  # noqa: BLE001  a defect that one channel meets must not lose the others
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        reason = " ".join(str(error).split())[:200]
+        place = f"{Path(where.filename).name}, line {where.lineno}"
+        return f"Expected a fit. Received: {type(error).__name__}: {reason}, in {place}. Please report this defect."
+    return None
+
+
+def _fit_group(cleaned: "Mapping[str, Cleaned]", job: Job, lines: list[str], reports: dict[str, dict]) -> None:
+    """Fits and saves one simulator. Nothing is written if a step fails."""
+    from enhsim_tf.simulator.fitting import fit
+    from enhsim_tf.simulator.joint import join_channels
+    from enhsim_tf.simulator.report_figure import report_figure
+
+    name = name_of_channels(list(cleaned))
+    progress = Progress(_tell_if_heard, f"{printable(name)}: ") if job.speaks else SILENT
+    (telemetry,) = join_channels({channel: each.parts for channel, each in cleaned.items()})
+    commands = job.commands if len(job.series) == 1 else None
+    simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
+    folder = folder_of(job.out, name)
+    refuse_foreign(folder)  # checked again, because the fit took time
+    found = {"report": report.to_dict(), "cleaning": {channel: each.report.to_dict() for channel, each in cleaned.items()}}
+    with replace_folder(folder) as temporary:
+        simulator.save(temporary)
+        write_json(temporary / "report.json", found)
+        report_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
+    reports[name] = found | {"folder": str(folder)}
+    lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {os.path.relpath(folder)}/"]
+
+
+def _run_of(job: Job, telemetry: "Recording") -> "Recording | None":
+    if job.run is None:
+        return None
+    from enhsim_tf.coarse_simulator.recording_files import read_recording
+
+    interval_s = telemetry.interval_s if telemetry.start is not None else None
+    return read_recording(job.run.source, job.run.columns, job.run.time, job.cleaning.of_run(min_part=2), interval_s, job.run.start)
+
+
+def _tell_if_heard(line: str) -> None:
+    """Prints a line. A reader that closes the pipe does not stop the fit."""
+    try:
+        tell(line)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it at exit

@@ -1,0 +1,141 @@
+"""Goes on from a fitted simulator with newer nominal telemetry (step 3 of the pipeline, "respond to situations on the vehicle").
+
+A fit takes seconds, so the simulator is fitted again with its own options, and both are judged on the held-out end of the new telemetry.
+"""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.simulator.alignment import Runs
+from enhsim_tf.simulator.fitting import fit
+from enhsim_tf.simulator.joint import cut, long_enough, split_end
+from enhsim_tf.simulator.options import FitOptions, ScoreOptions
+from enhsim_tf.simulator.scoring import Scorer
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.windows import evenly_spaced_starts
+
+_NUM_WINDOWS = 300  # of the held-out end, on which errors are measured
+
+
+@dataclasses.dataclass(frozen=True)
+class UpdateReport:
+    """What an update changed.
+
+    Args:
+        channels: Names of the channels.
+        num_samples: Number of samples of the new telemetry.
+        num_held_out: Number of them on which both simulators were judged.
+        before: The old simulator there: `level`, `gain`, `period_s` and `noise_sd` of each channel by name, the error of the enhanced signal
+            (`nrmse`) and the share of flagged samples (`alarms`).
+        after: The same of the new one.
+    """
+
+    channels: tuple[str, ...]
+    num_samples: int
+    num_held_out: int
+    before: dict[str, Any]
+    after: dict[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns all fields in plain JSON types."""
+        return dataclasses.asdict(self) | {"channels": list(self.channels)}
+
+    def lines(self) -> list[str]:
+        """Returns the report as lines of text."""
+        lines = [
+            f"{', '.join(self.channels)}: updated with {self.num_samples:,} samples; judged on {self.num_held_out:,} held-out ones of them"
+        ]
+        for name in self.channels:
+            parts = []
+            for what in ("level", "gain", "period_s", "noise_sd", "nrmse"):
+                old, new = self.before[what].get(name), self.after[what].get(name)
+                if old is not None and new is not None:
+                    parts.append(f"{what.removesuffix('_s')} {old:.5g} -> {new:.5g}")
+            lines.append(f"{name}: {', '.join(parts)}")
+        lines.append(f"{', '.join(self.channels)}: flagged samples {self.before['alarms']:.1%} -> {self.after['alarms']:.1%}, set for 1 %")
+        return [printable(line) for line in lines]
+
+
+def update(
+    simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None = None, held_out: float = 0.2, seed: int = 0
+) -> tuple[EnhancedSimulator, UpdateReport]:
+    """Updates a simulator with newer nominal telemetry.
+
+    Args:
+        simulator: The fitted simulator. It is not changed.
+        telemetry: Newer nominal telemetry of its channels.
+        run: The coarse run of the same time, for a simulator of recorded runs.
+        held_out: Share of the new telemetry, taken from its end, on which both simulators are judged.
+        seed: Random seed.
+
+    Returns:
+        The updated simulator, and the report on what changed.
+
+    Raises:
+        InputError: If the telemetry has other channels or another interval, or is too short.
+    """
+    if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
+        raise InputError(
+            f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
+        )
+    if abs(telemetry.interval_s / simulator.interval_s - 1) > 1e-3:
+        raise InputError(
+            f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {telemetry.interval_s:g} s. "
+            "Give telemetry with the same sampling interval, or --interval."
+        )
+    if simulator.is_run_model and run is None:
+        raise InputError("Expected the coarse run of the new telemetry. Received: none. Give it with --coarse.")
+    known = {field.name for field in dataclasses.fields(FitOptions)}
+    kept = {name: value for name, value in dict(simulator.trained.get("options", {})).items() if name in known}
+    options = FitOptions(**kept | {"held_out": held_out, "seed": seed})
+    telemetry = dataclasses.replace(telemetry, columns=simulator.channels)
+    new, _ = fit(telemetry, run, options)
+    new.trained["updates"] = [*simulator.trained.get("updates", ()), {"num_samples": len(telemetry), "held_out": held_out, "seed": seed}]
+    window = max(simulator.window, new.window)
+    judged = telemetry if run is None else _paired(simulator, telemetry, run)[0]
+    end = long_enough(split_end(judged, held_out)[1], window) or long_enough(judged, window)
+    before, after = (_state(each, end, run, seed) for each in (simulator, new))
+    return new, UpdateReport(simulator.channels, len(telemetry), len(end), before, after)
+
+
+def _paired(simulator: EnhancedSimulator, telemetry: Recording, run: Recording) -> tuple[Recording, Recording]:
+    alignment = simulator.alignment
+    if not isinstance(alignment, Runs):
+        raise InputError("Expected no coarse run for a simulator of square waves. Received: one. Leave --coarse out.")
+    return alignment.pair(telemetry, run)
+
+
+def _state(simulator: EnhancedSimulator, end: Recording, run: Recording | None, seed: int) -> dict[str, Any]:
+    series, window = [part.values for part in end.parts], simulator.window
+    starts = evenly_spaced_starts(series, window, _NUM_WINDOWS)
+    real = cut(series, starts, window)
+    found: dict[str, Any] = {"level": {}, "gain": {}, "period_s": {}}
+    if run is None:
+        aligned = simulator.alignment.align(real)
+        clean, seen = simulator.enhance(*aligned), series
+        for channel, name in enumerate(simulator.channels):
+            wave = simulator.alignment.simulators[channel]
+            found["level"][name] = float(np.median(aligned.shift[:, channel]))
+            found["gain"][name] = float(np.median(aligned.gain[:, channel]))
+            if not wave.is_constant:
+                found["period_s"][name] = float(wave.waves[0].period_s)
+    else:
+        paired, coarse = _paired(simulator, end, run)
+        series = [part.values for part in paired.parts]
+        enhanced = [simulator.enhance_run(part.values) for part in coarse.parts]
+        starts = evenly_spaced_starts(series, window, _NUM_WINDOWS)
+        real, clean = cut(series, starts, window), cut(enhanced, starts, window)
+        seen = [own - under for own, under in zip(series, enhanced, strict=True)]
+    spread = np.std(real, axis=(0, 1), dtype=np.float64)
+    errors = np.sqrt(np.mean((real - clean) ** 2, axis=(0, 1), dtype=np.float64)) / np.where(spread > 0, spread, 1.0)
+    scorer = Scorer(simulator, ScoreOptions(seed=seed))
+    alarms = np.concatenate([scorer.score_series(each) > 1 for each in seen])
+    by_name = {
+        name: dict(zip(simulator.channels, map(float, each), strict=True))
+        for name, each in (("nrmse", errors), ("noise_sd", simulator.noise_sd))
+    }
+    return found | by_name | {"alarms": float(alarms.mean())}
