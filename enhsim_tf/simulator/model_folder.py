@@ -26,13 +26,13 @@ def folder_of(models: str | os.PathLike, channel: str) -> Path:
 
 
 def name_of_channels(channels: Sequence[str]) -> str:
-    """Returns the name of a model: that of its channel, or those of its channels joined by `+`, shortened if there are many.
+    """Returns the name of a model: that of its channel, or those of its channels joined by `~`, shortened if there are many.
 
     Args:
         channels: Names of the channels.
     """
-    joined = "+".join(channels)
-    return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_BYTES else f"{channels[0]}+{len(channels) - 1} more"
+    joined = "~".join(channels)
+    return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_BYTES else f"{channels[0]}~{len(channels) - 1} more"
 
 
 def channels_of(folder: Path) -> tuple[str, ...]:

@@ -55,16 +55,22 @@ def find_departure(
         The departure; None if the flags do not last.
     """
     every = np.concatenate(list(scores))
-    begin = lasting(every, scorer.window)
+    before = np.cumsum([0, *map(len, scores)])
+    nominal = _nominal_of(scorer)
+    has_left = every > 1
+    if nominal:
+        limits = _limits_of(_windows_of(nominal, scorer.window))
+        for number, first, series in judged:
+            place = int(before[number]) + first
+            has_left[place : place + len(series)] |= beyond(series, limits, scorer.window)
+    begin = lasting(has_left, np.isfinite(every), scorer.window)
     if begin is None:
         return None
-    before = np.cumsum([0, *map(len, scores)])
     late = []
     for number, first, series in judged:
         skip = max(0, begin - int(before[number]) - first)
         if len(series) - skip >= scorer.window:
             late.append(series[skip:])
-    nominal = _nominal_of(scorer)
     what = changed_properties(_windows_of(nominal, scorer.window), _windows_of(late, scorer.window)) if nominal and late else ("shape",)
     after = every.copy()
     if nominal and late:
@@ -87,23 +93,49 @@ def find_departure(
     )
 
 
-def lasting(scores: np.ndarray, window: int) -> int | None:
+def lasting(has_left: np.ndarray, is_scored: np.ndarray, window: int) -> int | None:
     """Returns the first sample of a departure that lasts until the end, or None.
 
-    From there on at least `LEAST_FLAGGED` of the scored samples are above 1, over at least `LEAST_WINDOWS` windows.
+    From there on at least `LEAST_FLAGGED` of the scored samples have left what was learnt, over at least `LEAST_WINDOWS` windows.
 
     Args:
-        scores: Scores, shape `(samples,)`; NaN where nothing was scored.
+        has_left: Whether a sample is flagged, or in a window whose level or amplitude was never seen, shape `(samples,)`.
+        is_scored: Whether a sample has a score.
         window: Length of a window in samples.
     """
-    places = np.flatnonzero(np.isfinite(scores))
+    places = np.flatnonzero(is_scored)
     if len(places) < LEAST_WINDOWS * window:
         return None
-    flags = scores[places] > 1
+    flags = has_left[places]
     following = np.cumsum(flags[::-1])[::-1] / np.arange(len(flags), 0, -1)
     possible = np.flatnonzero(flags & (following >= LEAST_FLAGGED))
     possible = possible[possible <= len(flags) - LEAST_WINDOWS * window]
     return int(places[possible[0]]) if len(possible) else None
+
+
+def beyond(series: np.ndarray, limits: tuple[np.ndarray, np.ndarray], window: int) -> np.ndarray:
+    """Marks the samples of windows whose level or amplitude leaves the limits, shape `(samples,)`.
+
+    Args:
+        series: Shape `(samples, channels)`, with at least a window of samples.
+        limits: Lowest and highest level and amplitude of each channel, each of shape `(2, channels)`.
+        window: Length of a window in samples.
+    """
+    starts = np.unique(np.append(np.arange(0, len(series) - window + 1, max(1, window // 2)), len(series) - window))
+    windows = cut([series], starts, window)
+    found = np.stack([windows.mean(axis=1, dtype=np.float64), windows.std(axis=1, dtype=np.float64)], axis=1)
+    marks = np.zeros(len(series), bool)
+    for start in starts[((found < limits[0]) | (found > limits[1])).any(axis=(1, 2))]:
+        marks[start : start + window] = True
+    return marks
+
+
+def _limits_of(nominal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest level and amplitude that count as learnt: those of nominal windows, and their span beyond."""
+    found = np.stack([nominal.mean(axis=1, dtype=np.float64), nominal.std(axis=1, dtype=np.float64)], axis=1)
+    low, high = found.min(axis=0), found.max(axis=0)
+    span = np.maximum(high - low, 0.1 * np.median(found[:, 1], axis=0))
+    return low - span, high + span
 
 
 def changed_properties(nominal: np.ndarray, after: np.ndarray) -> tuple[str, ...]:

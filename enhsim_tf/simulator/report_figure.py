@@ -12,7 +12,7 @@ from enhsim_tf.simulator.report import Report
 
 _MOST_CHANNELS = 3
 _ROW, _GAP = 1.15, 0.62  # inches
-_COLUMNS = ((0.68, 2.66), (3.22, 5.20), (6.0, 7.0))  # left and right edges of the columns of panels, in inches
+_COLUMNS = ((0.68, 2.50), (3.00, 4.82), (5.95, 7.0))  # left and right edges of the columns of panels, in inches
 
 
 def report_figure(report: Report) -> matplotlib.figure.Figure:
@@ -68,7 +68,7 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
                 axes.plot(value, place, "o", color=ENHANCED if is_used else REAL, markersize=5 if is_used else 3, clip_on=False)
             axes.set_yticks(places, names, fontsize=6)
             axes.set_ylim(0.6 - len(names), 0.6)
-            axes.set_xlim(left=0)
+            axes.set_xlim(0, max(2.0, *values) if key == "false_alarms" else 100)
             axes.set_xlabel(label)
         alarms.axvline(100 * RATE, color=LINE, linewidth=0.6, zorder=0)
         figure.text(EDGE / DOUBLE, (FOOT - 0.18) / height, f"enhsim-tf fit · windows of {report.window:,} samples", size=7, color=QUIET)
