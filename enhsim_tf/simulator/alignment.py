@@ -19,6 +19,7 @@ from enhsim_tf.simulator.joint import cut, telemetry_of
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
 _SAME_RATE = 1e-3
+_SAME_PERIOD = 0.02  # largest relative difference of periods that are one clock
 
 
 class Aligned(NamedTuple):
@@ -101,16 +102,43 @@ class Waves:
             if simulator.is_constant:  # there is no shape to which a phase or a gain could be fitted
                 shift[:, channel], gain[:, channel] = target.mean(axis=1, dtype=np.float64), simulator.spread
                 continue
-            phases = self.phases(channel)
+            phases, best = self.phases(channel), self.best_phases(targets, channel)
             waveform = phases if self.waveforms[channel] is None else self.waveforms[channel]
-            centred = waveform - waveform.mean(axis=1, keepdims=True, dtype=np.float64)
-            length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
-            # the waveforms are centred, so the level of the telemetry has no effect
-            agreement = (target - target.mean(axis=1, keepdims=True)) @ (centred / np.where(length > 0, length, 1.0)).T.astype(np.float32)
-            best = np.argmax(agreement, axis=1)
             coarse[:, :, channel] = phases[best]
             shift[:, channel], gain[:, channel] = least_squares(waveform[best], target)
         return Aligned(coarse, shift, gain)
+
+    def best_phases(self, targets: np.ndarray, channel: int) -> np.ndarray:
+        """Returns the number of the phase at which the waveform of a channel is most correlated with each window, shape `(windows,)`."""
+        waveform = self.phases(channel) if self.waveforms[channel] is None else self.waveforms[channel]
+        target = targets[:, :, channel]
+        centred = waveform - waveform.mean(axis=1, keepdims=True, dtype=np.float64)
+        length = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
+        # the waveforms are centred, so the level of the telemetry has no effect
+        agreement = (target - target.mean(axis=1, keepdims=True)) @ (centred / np.where(length > 0, length, 1.0)).T.astype(np.float32)
+        return np.argmax(agreement, axis=1)
+
+    def on_one_clock(self, targets: np.ndarray) -> "Waves":
+        """Returns the waves with one period where periods are nearly equal, at the distance in phase that telemetry windows show.
+
+        Periods that are fitted to each channel alone differ a little, and over a long time every relation of their phases would occur.
+
+        Args:
+            targets: Telemetry windows, shape `(windows, samples, channels)`.
+        """
+        simulators = list(self.simulators)
+        moving = [number for number, each in enumerate(simulators) if not each.is_constant]
+        for place, first in enumerate(moving):
+            wave = simulators[first].waves[0]
+            for other in moving[place + 1 :]:
+                old = simulators[other].waves[0]
+                if not 0 < abs(old.period_s / wave.period_s - 1) < _SAME_PERIOD:
+                    continue
+                moved = (self.best_phases(targets, other) - self.best_phases(targets, first)) / _NUM_PHASES + old.phase - wave.phase
+                apart = np.angle(np.mean(np.exp(2j * np.pi * moved))) / (2 * np.pi)
+                phase = float(np.mod(wave.phase + apart, 1.0))
+                simulators[other] = SquareWaveSimulator([dataclasses.replace(old, period_s=wave.period_s, phase=phase)])
+        return Waves(simulators, self.channels, self.interval_s, self.window)
 
     def is_flat(self, gain: np.ndarray) -> np.ndarray:
         """Whether a window shows no shape in some channel with a wave; `gain` is that of `align`, the result has shape `(windows,)`."""

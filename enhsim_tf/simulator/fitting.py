@@ -159,7 +159,7 @@ def _fit_aligned(
     number = _num_windows(options, window, len(channels))
     starts = random_window_starts(series, window, number, np.random.default_rng(options.seed))
     targets, times = cut(series, starts, window), times_of(usable, starts, window)
-    waves = Waves([each.coarse for each in choices], channels, learnt.interval_s, window)
+    waves = Waves([each.coarse for each in choices], channels, learnt.interval_s, window).on_one_clock(targets)
     waves, coarse, wanted, kept = _learn_waveforms(waves, targets, times)
     is_level = all(isinstance(each, ConstantLevel) for each in waves.simulators)
     name = options.enhancer if not is_level else COARSE

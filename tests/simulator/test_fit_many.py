@@ -1,0 +1,64 @@
+import hashlib
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.fit_many import fit_channels
+from enhsim_tf.simulator.model_folder import channels_of, models_of, name_of_channels
+from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.telemetry.cleaning.clean import Cleaning
+from tests.simulator.conftest import joint, series
+
+OPTIONS = FitOptions(window=64, num_windows=100)
+
+
+def table(**more):
+    times = pd.date_range("2024-01-01", periods=1_500, freq="10s", tz="UTC")
+    values = joint(1_500).parts[0].values
+    columns = {"volts": values[:, 0], "watts": values[:, 1], **more}
+    return {name: pd.Series(each, times, name=name) for name, each in columns.items()}
+
+
+def fitted(tmp_path, columns, **options):
+    lines = []
+    return (*fit_channels(columns, tmp_path / "models", OPTIONS, Cleaning(), lines.append, **options), lines)
+
+
+def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_path):
+    reports, failed, lines = fitted(tmp_path, table(still=np.ones(1_500)))
+    assert list(reports) == ["volts~watts"] and list(failed) == ["still"] and "constant" in failed["still"]
+    ((name, folder),) = models_of(tmp_path / "models").items()
+    assert name == "volts~watts" and channels_of(folder) == ("volts", "watts")
+    assert {path.name for path in folder.iterdir()} == {"arrays.npz", "settings.json", "manifest.json", "report.json", "report.png"}
+    assert any("cross-correlation" in line for line in lines)
+
+
+def test_separate_simulators_have_the_same_bytes_in_any_number_of_processes(tmp_path):
+    sums = []
+    for workers in (0, 2):
+        reports, failed, _ = fitted(tmp_path / str(workers), table(), separately=True, workers=workers)
+        assert sorted(reports) == ["volts", "watts"] and not failed
+        folder = tmp_path / str(workers) / "models"
+        sums.append([hashlib.sha256((folder / name / "arrays.npz").read_bytes()).hexdigest() for name in ("volts", "watts")])
+    assert sums[0] == sums[1]
+
+
+def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
+    fast = pd.Series(series(6_000).values, pd.date_range("2024-01-01", periods=6_000, freq="1s", tz="UTC"))
+    reports, failed, _ = fitted(tmp_path, table() | {"fast": fast})
+    assert sorted(reports) == ["fast", "volts~watts"] and not failed
+
+
+def test_a_folder_with_something_else_is_left_alone(tmp_path):
+    (tmp_path / "models" / "volts").mkdir(parents=True)
+    (tmp_path / "models" / "volts" / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="something else"):
+        fitted(tmp_path, table(), separately=True)
+    assert (tmp_path / "models" / "volts" / "notes.txt").read_text() == "mine"
+
+
+def test_names_of_many_channels_are_short():
+    assert name_of_channels(["a"]) == "a" and name_of_channels(["a", "b"]) == "a~b"
+    assert name_of_channels([f"channel {number}" for number in range(30)]) == "channel 0~29 more"

@@ -1,0 +1,121 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from enhsim_tf.coarse_simulator.interface import FunctionSimulator
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.fitting import fit
+from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.telemetry.series import Telemetry
+from tests.simulator.conftest import PERIOD, WINDOW, coarse_run, joint, series, smooth_wave
+
+FEW = FitOptions(window=WINDOW, num_windows=200)
+
+
+def test_the_waveform_below_the_noise_is_recovered(single):
+    simulator, report = single
+    aligned = simulator.alignment.align((5 + 2 * smooth_wave(WINDOW))[None, :, None].astype(np.float32))
+    clean = simulator.enhance(*aligned)[0, :, 0]
+    assert np.sqrt(np.mean((clean - 5 - 2 * smooth_wave(WINDOW)) ** 2)) < 0.05  # half of the noise
+    assert simulator.alignment.simulators[0].waves[0].period_s == pytest.approx(10 * PERIOD, rel=1e-3)
+    assert report.nrmse["volts"]["enhanced"] < 0.5 * report.nrmse["volts"]["coarse"]
+
+
+def test_each_channel_keeps_its_phase_level_and_scale(both):
+    simulator, report = both
+    clean = simulator.generate_clean(400, seed=0)
+    assert clean.mean(axis=(0, 1)) == pytest.approx([5, 100], rel=0.02)
+    assert np.std(clean, axis=(0, 1)) == pytest.approx(np.std(smooth_wave(4_000)) * np.array([2, 30]), rel=0.05)
+    real = np.corrcoef(smooth_wave(4_000), -smooth_wave(4_000, 0.25))[0, 1]
+    assert np.corrcoef(clean.reshape(-1, 2).T)[0, 1] == pytest.approx(real, abs=0.05)
+    assert report.cross_correlation["apart"] < 0.1
+
+
+def test_a_delay_between_run_and_telemetry_is_recovered():
+    late = series()
+    late = Telemetry(late.values, late.interval_s, 70.0, late.start, late.name)  # the same values, seven samples later
+    simulator, report = fit(late, coarse_run(4_000), FEW)
+    assert simulator.alignment.delay_s == 70.0 and any("later than the coarse run" in note for note in report.notes)
+
+
+def test_a_function_is_run_at_the_times_of_the_telemetry():
+    wave = FunctionSimulator(lambda time_s: np.sign(np.sin(2 * np.pi * (time_s / 10 + 4) / PERIOD + 1e-6)), ["square"])
+    simulator, report = fit(series(), wave, FEW)
+    assert report.nrmse["volts"]["enhanced"] < 0.1 and simulator.alignment.coarse is wave
+
+
+def test_telemetry_without_a_period_gets_a_constant_level():
+    noise = Telemetry(np.random.default_rng(0).standard_normal(3_000).astype(np.float32), name="noise")
+    simulator, report = fit(noise, options=FEW)
+    assert simulator.alignment.simulators[0].is_constant and "only a constant level" in report.coarse
+    assert np.std(simulator.generate(200)) == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_wave_and_a_level_are_one_simulator():
+    values = np.random.default_rng(1).standard_normal(3_000).astype(np.float32)
+    other = Telemetry(values, 10.0, 0.0, series().start, "noise")
+    simulator, _ = fit({"volts": series(), "noise": other}, options=FEW)
+    assert [each.is_constant for each in simulator.alignment.simulators] == [False, True]
+    assert np.std(simulator.generate(200), axis=(0, 1))[1] == pytest.approx(1.0, rel=0.05)
+
+
+def test_quantised_channels_stay_on_their_levels():
+    telemetry = series(noise_sd=0.3)
+    rounded = Telemetry(np.round(telemetry.values / 0.5).astype(np.float32) * 0.5, 10.0, 0.0, telemetry.start, "volts")
+    simulator, _ = fit(rounded, options=FEW)
+    values = simulator.generate(50) / 0.5
+    np.testing.assert_allclose(values, np.round(values), atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["none", "gaussian", "autoregression", "residual windows", "matched residual windows"])
+def test_the_noise_that_is_asked_for_is_used(name):
+    simulator, report = fit(joint(1_500), options=FitOptions(window=64, num_windows=100, noise=name, held_out=0.0))
+    assert report.noise_model == simulator.trained["noise"] == name and not report.is_held_out
+    expected = 0.0 if name == "none" else 0.2
+    assert simulator.noise_sd[0] == pytest.approx(expected, rel=0.2)
+
+
+def test_thresholds_know_the_nominal_telemetry_that_was_given(single):
+    assert len(single[0].nominal) == 3_000
+
+
+def test_telemetry_that_cannot_be_fitted_is_refused():
+    with pytest.raises(InputError, match="constant 1"):
+        fit(Telemetry(np.ones(1_000, np.float32)))
+    with pytest.raises(InputError, match="at least 256 samples"):
+        fit(series(200))
+    with pytest.raises(InputError, match="2 groups"):
+        fit({"a": series(), "b": Telemetry(series().values, 1.0, 0.0, series().start)})
+    with pytest.raises(InputError, match="overlaps the telemetry"):
+        fit(series(), coarse_run(start="2031-01-01T00:00:00+00:00"))
+    with pytest.raises(InputError, match="8 windows of 500"):
+        fit(series(), options=FitOptions(window=500))
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"window": 3}, {"noise": "pink"}, {"enhancer": "gan"}, {"held_out": 0.7}, {"num_windows": 0}, {"seed": -1}, {"epochs": 1.5}]
+)
+def test_an_option_out_of_range_is_refused_by_its_name(wrong):
+    with pytest.raises(InputError, match=next(iter(wrong))):
+        FitOptions(**wrong)
+
+
+def test_a_default_fit_imports_no_tensorflow():
+    code = (
+        "import sys; from tests.simulator.conftest import series; from enhsim_tf.simulator.fitting import fit\n"
+        "from enhsim_tf.simulator.options import FitOptions\n"
+        "fit(series(1500), options=FitOptions(window=64, num_windows=100)); print('tensorflow' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "False"
+
+
+def test_the_network_that_is_asked_for_is_trained_and_saved_as_arrays(tmp_path):
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
+
+    options = FitOptions(window=64, num_windows=150, enhancer="ridge and network", epochs=2, held_out=0.0)
+    simulator, report = fit(series(1_500), options=options)
+    assert simulator.enhancer.layers and [each["name"] for each in report.enhancers if each["is_chosen"]] == ["ridge and network"]
+    simulator.save(tmp_path / "model")
+    np.testing.assert_array_equal(EnhancedSimulator.load(tmp_path / "model").generate(3), simulator.generate(3))

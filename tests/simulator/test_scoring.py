@@ -1,0 +1,104 @@
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.coarse_simulator.recording import Run
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.joint import join_channels
+from enhsim_tf.simulator.options import ScoreOptions
+from enhsim_tf.simulator.scoring import Scorer, event_rows, events_table, score, write_scores
+from tests.simulator.conftest import coarse_run, joint, series
+
+
+def changed(recording, begin, end, by, channel=0):
+    values = recording.parts[0].values.copy()
+    values[begin:end, channel] += by
+    return dataclasses.replace(recording, parts=(Run(values),))
+
+
+@pytest.fixture(scope="module")
+def telemetry():
+    return join_channels({"volts": series(seed=5)})[0]
+
+
+@pytest.mark.parametrize("name", ["residual", "PCA residual", "innovation", "largest step", "limit check"])
+def test_a_fault_is_flagged_and_nominal_time_is_not(single, telemetry, name):
+    frame = score(single[0], changed(telemetry, 1_000, 1_100, 1.5), options=ScoreOptions(name))
+    assert frame["flag"].iloc[1_000:1_100].mean() > (0.05 if name in ("limit check", "largest step") else 0.9)
+    assert frame["flag"].iloc[:900].mean() < 0.05 and frame["flag"].iloc[1_200:].mean() < 0.05
+    assert frame.attrs["detector"] == name and len(frame) == 3_000
+
+
+def test_a_threshold_never_undercuts_what_nominal_time_shows(single, telemetry):
+    noisy = dataclasses.replace(
+        telemetry, parts=(Run(telemetry.parts[0].values + np.random.default_rng(0).normal(0, 1, (3_000, 1)).astype(np.float32)),)
+    )
+    plain, bounded = Scorer(single[0]), Scorer(single[0], nominal=noisy)
+    assert bounded.threshold > plain.threshold and bounded.threshold == bounded.nominal_threshold
+    assert (bounded.score_series(noisy.parts[0].values) > 1).mean() <= 0.01
+
+
+def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
+    frame = score(of_run[0], changed(telemetry, 1_000, 1_200, 0.5), coarse_run())
+    assert {"value", "enhanced", "score", "flag", "out_of_range"} <= set(frame.columns)
+    assert frame["flag"].iloc[1_020:1_180].mean() > 0.9 and frame["flag"].iloc[:900].mean() < 0.05
+    clean = changed(telemetry, 1_000, 1_200, 0.5).parts[0].values[:, 0] - frame["value"]
+    assert not clean.any() and np.std(frame["value"] - frame["enhanced"]) < 0.25
+
+
+def test_samples_without_a_run_get_no_score(of_run, telemetry):
+    frame = score(of_run[0], telemetry, coarse_run(2_000))
+    assert frame["score"].isna().sum() == 1_000 and not frame["flag"].iloc[2_000:].any()
+
+
+def test_several_channels_are_scored_together(both):
+    frame = score(both[0], changed(joint(seed=7), 1_000, 1_200, -9.0, channel=1))
+    assert list(frame.columns[:2]) == ["volts", "watts"] and frame["flag"].iloc[1_020:1_180].mean() > 0.9
+    assert frame["flag"].iloc[:900].mean() < 0.05
+
+
+def test_the_same_seed_gives_the_same_scores(single, telemetry):
+    first, again = (score(single[0], telemetry, options=ScoreOptions("isolation forest", num_windows=100, seed=3)) for _ in range(2))
+    pd.testing.assert_frame_equal(first, again)
+
+
+def test_events_join_flags_within_a_window_and_count_them_by_hand():
+    scores = np.full(100, 0.5)
+    scores[10:13], scores[20], scores[60:62] = (2.0, 3.0, 2.0), 1.5, 4.0
+    rows = event_rows(scores, 1_000, np.full(400, 0.9), 10, 2.0)
+    assert [(row["begin"], row["end"], row["peak"], row["num_flagged"], row["duration_s"]) for row in rows] == [
+        (1_010, 1_021, 1_011, 4, 22.0),
+        (1_060, 1_062, 1_060, 2, 4.0),
+    ]
+    assert rows[0]["score"] == 3.0 and rows[0]["confidence"] == pytest.approx(1 - 1 / 41)  # forty blocks, and the event itself
+
+
+def test_scores_and_events_are_written_together(single, telemetry, tmp_path):
+    frame = score(single[0], changed(telemetry, 1_000, 1_100, 1.5))
+    write_scores(tmp_path / "scores.parquet", frame)
+    events = pd.read_csv(tmp_path / "scores.events.csv")
+    assert len(pd.read_parquet(tmp_path / "scores.parquet")) == 3_000 and len(events) == len(events_table(frame)) >= 1
+    assert pd.Timestamp(events["begin"][0]) < pd.Timestamp("2024-01-01T02:50:00Z") < pd.Timestamp(events["end"][0])
+
+
+def test_a_lasting_change_is_one_event_that_names_update(single, telemetry):
+    frame = score(single[0], changed(telemetry, 1_500, 3_000, 6.0))
+    assert "level" in frame.attrs["departure"] and "update" in frame.attrs["departure"]
+    (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
+    assert 1_400 <= event["begin"] <= 1_500 and frame["flag"].iloc[1_600:].mean() > 0.9
+    assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05  # against the new level
+
+
+def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
+    with pytest.raises(InputError, match="sample every 10 s"):
+        score(single[0], dataclasses.replace(telemetry, interval_s=1.0))
+    with pytest.raises(InputError, match="at least one window of 80"):
+        score(single[0], dataclasses.replace(telemetry, parts=(Run(telemetry.parts[0].values[:79]),)))
+    with pytest.raises(InputError, match="channels volts, watts"):
+        score(both[0], dataclasses.replace(joint(), columns=("volts", "amps")))
+    with pytest.raises(InputError, match="--coarse"):
+        score(of_run[0], telemetry)
+    with pytest.raises(InputError, match="one of: residual"):
+        ScoreOptions("crystal ball")
