@@ -154,10 +154,13 @@ class Pipeline:
         """The unit of the noise in the GAN: 1 for the example; for other telemetry such that its standard deviation is 0.1 there."""
         if self.own is None:
             return 1.0
-        sd = float(np.std(self.noise_windows("train"), dtype=np.float64))
-        if not sd > 1e-5 * np.std(self.parts["train"].values, dtype=np.float64):  # 32-bit telemetry resolves no less
-            raise InputError(f"Expected noise around the moving average of {self.own.name}. Received: none. Choose another channel.")
-        return 10 * sd
+        sd = {name: float(np.std(self.noise_windows(name), dtype=np.float64)) for name in self.parts}
+        for name, part in self.parts.items():
+            if not sd[name] > 1e-5 * np.std(part.values, dtype=np.float64):  # 32-bit telemetry resolves no less
+                raise InputError(
+                    f"Expected noise around the moving average of {self.own.name}. Received: none in its {name} part. Choose another channel."
+                )
+        return 10 * sd["train"]
 
     # -- 7 and 8: latent space; train generative adversarial model (GAN) -----------------------------------------------
 

@@ -115,7 +115,7 @@ def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetr
         if stop - first < window + average + 9:
             needed = 4 * (window + average + 10) + 2 * window
             raise InputError(
-                f"Expected at least {needed:,} samples of telemetry. Received: {len(telemetry.values):,}. Use a longer series."
+                f"Expected at least {needed:,} samples of telemetry. Received: {len(telemetry.values):,} of {telemetry.name}. Use a longer series."
             )
         parts[name] = telemetry.part(first, stop)
         first = stop + window

@@ -8,9 +8,9 @@ from enhsim_tf.keras_tools import convolution_maximum as fast_path
 from enhsim_tf.keras_tools.convolution_maximum import convolution_maximum, num_layers_computed
 from enhsim_tf.keras_tools.fused_adam import fused_adam
 from enhsim_tf.keras_tools.training import fit_windows
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.gan import NoiseGAN
-from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.paper import noise as of_paper
+from tests.paper.conftest import tiny_settings
 
 WINDOW, FILTERS, WIDTH, STRIDE = 63, 14, 20, 4  # the last sample lies under no filter
 
@@ -106,40 +106,25 @@ def test_mean_under_dropout_is_that_of_the_keras_layers():
     assert (ours.numpy().std(0) > 0).any()
 
 
-def small_discriminator(**settings):
-    return build_discriminator(WINDOW, FILTERS, WIDTH, STRIDE, narrow_units=5, **settings)
+def small_discriminator(dropout=0.0):
+    return of_paper.build_discriminator(tiny_settings(window=WINDOW, filters=FILTERS, narrow_units=5, dropout=dropout))
 
 
-class PlainGAN(NoiseGAN):
-    def _discriminate(self, rows):
-        return self.discriminator(rows, training=True)
-
-
-@pytest.mark.parametrize("mixed_batch", [False, True])
-def test_training_curves_are_those_of_the_keras_layers(mixed_batch):
-    noise = np.random.default_rng(0).normal(0, 0.1, (64, WINDOW)).astype(np.float32)
-    fast, plain = (
-        kind(build_generator(WINDOW, 4, 8), small_discriminator(), batch_size=16, mixed_batch=mixed_batch) for kind in (NoiseGAN, PlainGAN)
-    )
-    before = [weight.numpy() for weight in fast.combined.trainable_variables]
-    curves = [gan.fit(noise, num_iterations=20, record_every=1, verbose=False) for gan in (fast, plain)]
-    for kind in ("real", "generated"):
-        np.testing.assert_allclose(curves[0][f"loss_{kind}"], curves[1][f"loss_{kind}"], rtol=2e-5)
-    for weight, of_plain, at_first in zip(fast.combined.trainable_variables, plain.combined.trainable_variables, before, strict=True):
-        np.testing.assert_allclose(weight.numpy(), of_plain.numpy(), atol=2e-5)
-        assert not np.array_equal(weight.numpy(), at_first)
-
-
-def test_training_with_dropout_takes_the_fast_path_and_repeats(monkeypatch):
-    noise = np.random.default_rng(0).normal(0, 0.1, (64, WINDOW)).astype(np.float32)
-    curves = []
+def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
+    rows, trained = tf.constant(np.random.default_rng(0).normal(0, 0.1, (16, WINDOW)), tf.float32), []
     for _ in range(2):
-        gan = NoiseGAN(build_generator(WINDOW, 4, 8), small_discriminator(dropout=0.3), batch_size=16)
-        seeds = [layer.seed_generator.state.numpy().copy() for layer in gan.discriminator.layers if isinstance(layer, keras.layers.Dropout)]
-        curves.append(gan.fit(noise, num_iterations=4, record_every=1, verbose=False))
-        after = [layer.seed_generator.state.numpy() for layer in gan.discriminator.layers if isinstance(layer, keras.layers.Dropout)]
-        assert all((one != other).any() for one, other in zip(seeds, after, strict=True))  # new draws each time
-    np.testing.assert_array_equal(curves[0]["loss_real"], curves[1]["loss_real"])
+        settings = tiny_settings(window=WINDOW, filters=FILTERS, narrow_units=5, dropout=0.3, rows=16, fast=True)
+        gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
+        gan.compile()
+        assert isinstance(gan.discriminator.layers[0], fast_path.ConvolutionMaximum)
+        convolution, *_, narrow, _ = gan.discriminator.layers
+        drops = [layer.seed_generator.state for layer in (convolution.dropout, narrow)]
+        before = [np.array(each) for each in drops]
+        gan.train_discriminator(rows[:, :, None], of_paper.labels(16, of_paper.REAL))
+        assert all((old != np.array(new)).any() for old, new in zip(before, drops, strict=True))
+        trained.append([np.array(weight) for weight in gan.discriminator_weights])
+    for one, other in zip(*trained, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(
@@ -200,7 +185,7 @@ def small_simulator():
 
     enhancer, _, _ = enhancer_and_windows()
     waves = SquareWaveSimulator([SquareWave(period_s=10.0, low=-0.5, high=0.5)])
-    return EnhancedSimulator(waves, enhancer, NoiseGAN(build_generator(24, 4, 8), build_discriminator(24, 5, 4, 2)), offset=1.0, scale=2.0)
+    return EnhancedSimulator(waves, enhancer, GaussianNoise(0.1, 24), offset=1.0, scale=2.0)
 
 
 @pytest.mark.parametrize("mode", [None, "friction", "dropout"])
@@ -224,7 +209,6 @@ def test_windows_do_not_depend_on_the_batch_size():
     expected = simulator.enhancer.predict(coarse, verbose=0)
     for batch_size in (1, 5, 23, 1_000):
         np.testing.assert_allclose(enhance(simulator.enhancer, coarse, batch_size), expected, atol=1e-6)
-        np.testing.assert_allclose(simulator.noise.generate(23, 1, batch_size), simulator.noise.generate(23, 1), atol=1e-6)
     assert enhance(simulator.enhancer, coarse[:0]).shape == (0, 24)
 
 

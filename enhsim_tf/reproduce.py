@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, write_json
 from enhsim_tf.common.console import Parser, run_command, tell
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.stages import Stages, default_cache
 
 if TYPE_CHECKING:
     from enhsim_tf.paper.pipeline import Pipeline
     from enhsim_tf.paper.settings import Settings
     from enhsim_tf.paper.telemetry import Telemetry
 
-PROGRAM = "python -m enhsim_tf.paper"
+PROGRAM = "python -m enhsim_tf.reproduce"
 EXAMPLE = "the paper's example"
 EXAMPLES = f"""\
 examples:
@@ -40,7 +41,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--budget", choices=("smoke", "full"), default="full", help="size of the run (default: full)")
     parser.add_argument("--seed", type=int, default=0, help="seed of all random draws (default: 0)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="changes a setting; may be repeated")
-    parser.add_argument("--only", metavar="FIGURE", help="draws one figure, for example fig04, and evaluates no claim")
+    figures = [f"fig{number:02}" for number in range(1, 15)]
+    parser.add_argument("--only", choices=figures, metavar="FIGURE", help="draws one figure, for example fig04, and evaluates no claim")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="output folder (default: figures; another one for other runs than the published)"
     )
@@ -61,14 +63,6 @@ def read_settings(options: argparse.Namespace) -> "Settings":
     if wrong := [name for name, equals, value in pairs if not (equals and value)]:
         raise InputError(f"Expected --set NAME=VALUE. Received: --set {wrong[0]}.")
     return make_settings(options.budget, seed=options.seed, **{name: value for name, _, value in pairs})
-
-
-def choose_figures(only: str | None, names: list[str]) -> list[str]:
-    """Names of the figures to draw: all, or the one of a number or a name."""
-    chosen = [name for name in names if only is None or only in (name, name.split("_")[0])]
-    if not chosen:
-        raise InputError(f"Expected --only with one of {', '.join(name.split('_')[0] for name in names)}. Received: {only!r}.")
-    return chosen
 
 
 def choose_folder(options: argparse.Namespace) -> Path:
@@ -93,7 +87,7 @@ def own_channel(options: argparse.Namespace) -> dict[str, Any]:
     wave = SquareWaveSimulator.fit(read.part(0, len(read) // 2))
     offset, scale = level_offset_and_scale(wave)
     start = (read.start or START).replace("+00:00", "Z")
-    own = Telemetry(((read.values - offset) / scale).astype("float32"), read.interval_s, start, read.name or options.telemetry.stem)
+    own = Telemetry(((read.values - offset) / scale).astype("float32"), read.interval_s, start, printable(read.name))
     return {"own": own, "own_simulator": lambda time: (wave(time + read.offset_s) - offset) / scale}
 
 
@@ -137,19 +131,21 @@ def run(options: argparse.Namespace) -> int:
     began = time.perf_counter()
     if options.telemetry is None and (options.column or options.time):
         raise InputError("Expected --column and --time together with --telemetry. Received: one of them alone.")
-    settings, folder = read_settings(options), make_folder(choose_folder(options))
-    remove_leftovers(folder)
+    settings, folder = read_settings(options), choose_folder(options)
     place = {} if options.store == "parquet" else {"store": InfluxTelemetry(options.store)}
     place |= own_channel(options) if options.telemetry else {}
+    cache, folder = make_folder(options.cache or default_cache()), make_folder(folder)
+    remove_leftovers(folder)
 
-    from enhsim_tf.common.stages import Stages, default_cache  # the seconds of TensorFlow begin here, after all cheap checks
+    # the seconds of TensorFlow begin here, after all cheap checks
     from enhsim_tf.paper.claims import judge_all, outside, title
     from enhsim_tf.paper.figures import FIGURES
     from enhsim_tf.paper.pipeline import Pipeline
     from enhsim_tf.paper.report import as_text, read_published, results, write_page
 
-    chosen = choose_figures(options.only, list(FIGURES))
-    pipeline = Pipeline(settings, Stages(options.cache or default_cache(), options.fresh, tell, speaks=True), **place)
+    chosen = [name for name in FIGURES if options.only in (None, name.split("_")[0])]
+    pipeline = Pipeline(settings, Stages(cache, options.fresh, tell, speaks=True), **place)
+    _ = pipeline.noise_unit  # telemetry that cannot be used is refused before anything is drawn or trained
     early = [name for name in chosen if not FIGURES[name].needs_training]
     draw(early, pipeline, folder, options)
     if early:
@@ -193,7 +189,7 @@ def command_line(options: argparse.Namespace, figure: str = "") -> str:
     for name in ("telemetry", "column", "time"):
         words += [f"--{name}", Path(value).name if name == "telemetry" else value] if (value := getattr(options, name)) else []
     words += ["--store", options.store] if options.store != "parquet" else []
-    return shlex.join([*PROGRAM.split(), *words, *(["--only", figure.split("_")[0]] if figure else [])])
+    return printable(shlex.join([*PROGRAM.split(), *words, *(["--only", figure.split("_")[0]] if figure else [])]))
 
 
 def conclude(options: argparse.Namespace, different: list[str] | None) -> int:
