@@ -8,9 +8,9 @@ import numpy as np
 
 from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+from enhsim_tf.common.backend import tf
+from enhsim_tf.common.training import fit_windows
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.keras_tools.backend import tf
-from enhsim_tf.keras_tools.training import fit_windows
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper import noise as of_paper
 from enhsim_tf.paper.settings import Settings, make_settings

@@ -77,13 +77,14 @@ def choose_folder(options: argparse.Namespace) -> Path:
     return options.out or Path(default)
 
 
-def own_channel(options: argparse.Namespace) -> dict[str, Any]:
+def own_channel(options: argparse.Namespace, settings: "Settings") -> dict[str, Any]:
     """Telemetry of one's own and its square wave, found by the tool's reader and its search for a period."""
     from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
-    from enhsim_tf.paper.telemetry import START, Telemetry
+    from enhsim_tf.paper.telemetry import START, Telemetry, samples_needed
     from enhsim_tf.telemetry.sources import read_telemetry
 
-    read = read_telemetry(options.telemetry, options.column, options.time)
+    least = samples_needed(settings.window, settings.moving_average)
+    read = read_telemetry(options.telemetry, options.column, options.time, least)
     wave = SquareWaveSimulator.fit(read.part(0, len(read) // 2))
     offset, scale = level_offset_and_scale(wave)
     start = (read.start or START).replace("+00:00", "Z")
@@ -133,8 +134,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("Expected --column and --time together with --telemetry. Received: one of them alone.")
     settings, folder = read_settings(options), choose_folder(options)
     place = {} if options.store == "parquet" else {"store": InfluxTelemetry(options.store)}
-    place |= own_channel(options) if options.telemetry else {}
-    cache, folder = make_folder(options.cache or default_cache()), make_folder(folder)
+    place |= own_channel(options, settings) if options.telemetry else {}
+    folder, cache = make_folder(folder), make_folder(options.cache or default_cache())
     remove_leftovers(folder)
 
     # the seconds of TensorFlow begin here, after all cheap checks

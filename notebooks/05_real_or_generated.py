@@ -15,11 +15,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, verdict
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, verdict
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6", "C7")
 
 # %% [markdown]
@@ -29,7 +29,7 @@ claim("C6", "C7")
 # generated ones before you read the foot of the figure, for example `"aceg"`.
 
 # %%
-windows = show(experiment, "fig05_real_or_generated")
+windows = show(pipeline, "fig05_real_or_generated")
 
 # %%
 my_guess = None  # your answer, four letters
@@ -58,7 +58,7 @@ assert len(truly_generated) == 4
 # A thousand windows of each kind, a classifier, and windows that it was not trained on are a test:
 
 # %%
-(record,) = verdict(experiment, "C7")
+(record,) = verdict(pipeline, "C7")
 say(f"AUC of the classifier: **{record['value']:.2f}**. Chance is 0.5.")
 assert record["value"] > 0.8
 
@@ -66,7 +66,7 @@ assert record["value"] > 0.8
 # ## The noise alone
 
 # %%
-noise = show(experiment, "fig06_real_or_generated_noise")
+noise = show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
 # *What to see:* little at a glance, except that some windows begin more quietly. But what is shared is invisible in a single window. Here
@@ -95,11 +95,7 @@ say(
     f"**{ratio['generated']:.2f}** generated. Mean correlation of two windows: **{correlation['real']:.2f}** real, "
     f"**{correlation['generated']:.2f}** generated."
 )
-assert (
-    correlation["generated"]
-    > {"full": 0.3, "smoke": 0.1}[experiment.settings.budget]
-    > abs(correlation["real"])
-)
+assert correlation["generated"] > {"full": 0.3, "smoke": 0.1}[budget] > abs(correlation["real"])
 
 # %% [markdown]
 # Windows that share a pattern vary in few dimensions. The *effective rank* counts them:
@@ -110,7 +106,7 @@ say(
     f"Effective rank of {float(noise['rank_windows']):,.0f} windows: **{rank_generated:.0f}** generated, **{rank_real:.0f}** real, "
     f"a share of {rank_generated / rank_real:.0%}."
 )
-assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[experiment.settings.budget]
+assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[budget]
 
 # %% [markdown]
 # ## Long stretches
@@ -118,7 +114,7 @@ assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[experiment.setti
 # `simulator.generate_series` fades overlapping windows into each other.
 
 # %%
-series = show(experiment, "fig07_real_or_generated_series")
+series = show(pipeline, "fig07_real_or_generated_series")
 
 # %% [markdown]
 # *What to see:* no stretch has seams, and all keep the rhythm of the satellite for as long as you look.
@@ -131,7 +127,7 @@ say(
     + ", ".join(f"{value:.2f}" for value in rhythm)
     + "."
 )
-assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[experiment.settings.budget]
+assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[budget]
 
 # %% [markdown]
 # The noise betrays them all the same. Each window brings the shared pattern along, so that the noise of a generated series repeats
@@ -142,14 +138,14 @@ from enhsim_tf import extract_noise
 
 repeats = []
 for row, made in zip(series["rows"], series["is_generated"]):
-    rest, _ = extract_noise(row, experiment.settings.noise.moving_average)
+    rest, _ = extract_noise(row, pipeline.settings.moving_average)
     repeats.append(np.corrcoef(rest[:-250], rest[250:])[0, 1])
     print(
         "generated" if made else "real     ",
         f"correlation of the noise with itself 250 samples later: {repeats[-1]:.2f}",
     )
 made, repeats = np.array(series["is_generated"]), np.array(repeats)
-least = {"full": 0.3, "smoke": 0.05}[experiment.settings.budget]
+least = {"full": 0.3, "smoke": 0.05}[budget]
 assert repeats[made].min() > least > repeats[~made].max()
 
 # %% [markdown]
@@ -164,10 +160,10 @@ assert repeats[made].min() > least > repeats[~made].max()
 # %%
 from sklearn.metrics import roc_auc_score
 
-from enhsim_tf.realism.window_features import window_features
+from enhsim_tf.common.window_features import window_features
 
-real = experiment.data.noise_windows("test", None)
-generated = experiment.simulator.noise.generate(len(real), seed=1)
+real = pipeline.noise_windows("test", None)
+generated = pipeline.generate_noise(len(real), np.random.default_rng(1))
 features, label = window_features(np.concatenate([generated, real])), np.repeat([1, 0], len(real))
 names = ["mean", "log sd", "kurtosis", "maximum", "log sd of steps", "lag-1 correlation"]
 names += [f"power in band {band}" for band in range(features.shape[1] - len(names))]

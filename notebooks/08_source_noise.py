@@ -16,11 +16,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, slider
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6")
 
 # %% [markdown]
@@ -34,8 +34,8 @@ claim("C6")
 # that is not in the telemetry.
 
 # %%
-telemetry = experiment.data.channels[0].train
-values, width = telemetry.values.astype(float), experiment.settings.noise.moving_average
+telemetry = pipeline.parts["train"]
+values, width = telemetry.values.astype(float), pipeline.settings.moving_average
 
 
 def moving_average(values, width):
@@ -61,7 +61,7 @@ packaged, _ = extract_noise(telemetry.values, width)
 np.testing.assert_allclose(noise, packaged, atol=1e-6)
 
 # %%
-arrays = show(experiment, "fig08_source_noise")
+arrays = show(pipeline, "fig08_source_noise")
 
 # %% [markdown]
 # *What to see:* an even band of noise. In this example the true noise is known, because the telemetry was made by adding white noise to

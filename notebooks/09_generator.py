@@ -14,11 +14,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6")
 
 # %% [markdown]
@@ -40,7 +40,7 @@ generator = keras.Sequential(
         layers.Reshape((500, 1)),
     ]
 )
-table = show(experiment, "fig09_generator")
+table = show(pipeline, "fig09_generator")
 
 # %% [markdown]
 # *What to see:* a small network, and a narrow one. All that it knows of noise enters through 16 numbers and passes 64 neurons. A Dense
@@ -124,7 +124,7 @@ before_tanh = hidden @ np.asarray(last.kernel, float) + np.asarray(last.bias, fl
 generated = np.asarray(trained(latent))[:, :, 0]
 np.testing.assert_allclose(np.tanh(before_tanh), generated, atol=1e-4)  # 32-bit sums of 64 products
 
-real = experiment.data.noise_windows("train", 1_000, "notebook")
+real = pipeline.noise_windows("train", 1_000, "notebook")
 
 
 def shares_of_variance(windows):
@@ -158,7 +158,7 @@ with drawing(alt, height=2.3, title=title) as panel:
 # $$\mathrm{rank}=\exp\left(-\sum_i p_i\ln p_i\right).$$
 
 # %%
-from enhsim_tf.realism.measures import effective_rank
+from enhsim_tf.common.measures import effective_rank
 
 
 def rank(windows):

@@ -16,12 +16,12 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, drawing, open_experiment, show
+from lesson_tools import check_answer, drawing, open_pipeline, show
 
 from enhsim_tf.common.plot_style import GENERATED, QUIET, REAL
 
-experiment = open_experiment()
-is_full = experiment.settings.budget == "full"
+pipeline, budget = open_pipeline()
+is_full = budget == "full"
 
 # %% [markdown]
 # ## The network
@@ -39,7 +39,7 @@ discriminator = keras.Sequential(
         layers.Dense(1, activation="sigmoid", kernel_initializer="he_uniform"),
     ]
 )
-table = show(experiment, "fig10_discriminator")
+table = show(pipeline, "fig10_discriminator")
 
 # %% [markdown]
 # *What to see:* the maximum in the second row. Each filter is a pattern of 20 samples. It is compared with the window at 121 places, and
@@ -60,7 +60,7 @@ assert table["parameters"].tolist() == by_hand and discriminator.count_params() 
 # $$m_f=\max_{p}\;\mathrm{relu}\left(b_f+\sum_{k=0}^{19}K_{f,k}\,x_{4p+k}\right),\qquad p=0,\ldots,120.$$
 
 # %%
-real = experiment.data.noise_windows("train", 400, "notebook")
+real = pipeline.noise_windows("train", 400, "notebook")
 kernel, bias = discriminator.layers[0].get_weights()
 
 pieces = np.lib.stride_tricks.sliding_window_view(real[:8], 20, axis=1)[:, ::4]  # (windows, places, 20)
@@ -181,12 +181,12 @@ assert not is_full or moved["reordered blocks"] < moved["larger"] / 1.5
 # result is its *floor*.
 
 # %%
-from enhsim_tf.realism import two_sample
+from enhsim_tf.common import two_sample
 
 number = 1_000 if is_full else 60
-held_out = experiment.data.noise_windows("test", None)[:number]
-more_real = experiment.data.noise_windows("train", number, "second sample")
-generated = experiment.simulator.noise.generate(number, seed=10)
+held_out = pipeline.noise_windows("test", None)[:number]
+more_real = pipeline.noise_windows("train", number, "second sample")
+generated = pipeline.generate_noise(number, np.random.default_rng(10))
 
 
 def auc(scores, scores_of_real):
@@ -264,8 +264,8 @@ def number_of_batch(windows): ...  # your code
 # %%
 from sklearn.metrics import roc_auc_score
 
-batches = [experiment.data.noise_windows("test", 200, f"batch {number}") for number in range(20)]
-batches += [experiment.simulator.noise.generate(200, seed=number) for number in range(20)]
+batches = [pipeline.noise_windows("test", 200, f"batch {number}") for number in range(20)]
+batches += [pipeline.generate_noise(200, np.random.default_rng(number)) for number in range(20)]
 numbers = [number_of_batch(windows) for windows in batches]
 check_answer(
     None if numbers[0] is None else numbers,

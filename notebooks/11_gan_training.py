@@ -15,15 +15,15 @@
 
 # %%
 import numpy as np
-from lesson_tools import ROOT, check_answer, claim, drawing, open_experiment, say, show, slider
+from lesson_tools import ROOT, check_answer, claim, drawing, open_pipeline, say, show, slider
 
 from enhsim_tf.common.plot_style import GENERATED, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C4", "C5")
 
 # %%
-numbers = show(experiment, "fig11_gan_training")
+numbers = show(pipeline, "fig11_gan_training")
 
 # %% [markdown]
 # *What to see:* in each phase exactly one box learns, and the error of the second phase travels *through* the box that does not.
@@ -100,7 +100,7 @@ def train_step(real, latent, latent_again):
 # %%
 from enhsim_tf import NoiseGAN
 
-noise = experiment.data.noise_windows("train", experiment.settings.telemetry.num_windows, "noise windows")
+noise = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise windows")
 rows = tf.constant(noise[:, :, None])
 packaged = NoiseGAN(*experiment.untrained_noise_networks(), batch_size=200, seed=0)
 generator.set_weights(packaged.generator.get_weights())
@@ -127,7 +127,7 @@ for ours, theirs in ((a, b) for pair in pairs for a, b in zip(*(model.get_weight
 # vectors.
 
 # %%
-num_iterations = experiment.settings.adversarial.num_iterations
+num_iterations = pipeline.settings.iterations
 latent = np.random.default_rng(0).standard_normal((500, 16), "float32")
 every, frames = max(num_iterations // 50, 1), {}
 
@@ -166,7 +166,7 @@ say(
     f"Standard deviation of the generated noise, as a share of the real one: **{history[0]:.1f}** after {recorded[0]} "
     f"iterations, **{history[len(history) // 5]:.1f}** after {recorded[len(history) // 5]}, and **{history[-1]:.2f}** at the end."
 )
-assert experiment.settings.budget == "smoke" or (history[0] > 2 and abs(np.log(history[-1])) < 0.3)
+assert budget == "smoke" or (history[0] > 2 and abs(np.log(history[-1])) < 0.3)
 
 # %% [markdown]
 # The same as an animation, which the next cell writes at full budget:
@@ -175,7 +175,7 @@ assert experiment.settings.budget == "smoke" or (history[0] > 2 and abs(np.log(h
 import matplotlib.pyplot as plt
 from matplotlib.animation import FuncAnimation, PillowWriter
 
-if experiment.settings.budget == "full":
+if budget == "full":
     figure, panel = plt.subplots(figsize=(5.6, 2.2), dpi=80, layout="constrained")
     (line,) = panel.plot(frames[recorded[0]][0], color=GENERATED, linewidth=0.6)
     panel.axhspan(-2 * real_sd, 2 * real_sd, color=REAL, alpha=0.12, linewidth=0, label="±2 sd of real noise")

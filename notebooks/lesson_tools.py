@@ -28,13 +28,14 @@ from enhsim_tf.common import figure
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import STYLE
 from enhsim_tf.common.stages import Stages, default_cache
-from enhsim_tf.paper.claims import CLAIMS, judge
+from enhsim_tf.paper.claims import CLAIMS, degraded_windows, judge
 from enhsim_tf.paper.figures import DRAWINGS, FIGURES
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.report import needed, short
 from enhsim_tf.paper.settings import make_settings
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
 FULL, SMOKE = "full", "smoke"
@@ -86,6 +87,20 @@ def show(pipeline: Pipeline, name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         (path,) = figure.save(name, pipeline, folder, caption, is_smoke, ("png",), figures=FIGURES)
         _show_picture(path.read_bytes(), FIGURES[name].alt)
+
+
+def degraded(pipeline: Pipeline, mode: str, severity: float) -> "tuple[np.ndarray, np.ndarray]":
+    """Windows of the simulation and of the true signal in a degraded mode, of the same times; both have the shape `(windows, samples)`.
+
+    Args:
+        pipeline: As `open_pipeline` returns it.
+        mode: One of `enhsim_tf.paper.square_wave.MODES`, or `nominal`.
+        severity: From 0 to 1.
+    """
+    coarse, truth = (
+        degraded_windows(pipeline, mode, signal, severity) for signal in (pipeline.simulator, pipeline.truth)
+    )
+    return coarse, truth
 
 
 def claim(*ids: str) -> None:

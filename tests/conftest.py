@@ -21,7 +21,7 @@ for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THR
     os.environ.setdefault(threads, "1")  # two test processes run at a time, and waiting threads would also use CPU time
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
-from enhsim_tf.keras_tools.tensorflow_settings import apply_settings  # noqa: E402
+from enhsim_tf.common.tensorflow_settings import apply_settings  # noqa: E402
 
 apply_settings()  # tests that import Keras directly use the package's settings
 

@@ -7,7 +7,7 @@ window, where higher is more anomalous. `registry` lists all detectors by name.
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.realism.window_features import window_features
+from enhsim_tf.common.window_features import window_features
 
 
 class LimitCheck:

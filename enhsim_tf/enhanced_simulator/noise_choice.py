@@ -13,10 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.two_sample import boosted_trees
+from enhsim_tf.common.window_features import DECIMALS, signal_features, window_features
 from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.realism.two_sample import boosted_trees
-from enhsim_tf.realism.window_features import DECIMALS, signal_features, window_features
 
 MAX_AUC_EXCESS = 0.05  # by which the AUC of a candidate may exceed that of real windows against other real windows
 MAX_ALARM_EXCESS = 0.01  # by which its mean false-alarm rate may exceed that of detectors trained on real windows

@@ -15,7 +15,7 @@ from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, auc_of
 from enhsim_tf.enhanced_simulator.report import SEVERITY, ChannelReport
 from enhsim_tf.enhancer.baselines import nearest_window_means, ridge_windows
 from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
-from enhsim_tf.realism import real_floor
+from enhsim_tf.noise import real_floor
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import evenly_spaced_starts, scattered_starts

@@ -13,6 +13,7 @@ from enhsim_tf.coarse_simulator.constant_level import waves_or_level
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule, held_samples, simulate_schedule
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhanced_simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of
@@ -24,7 +25,6 @@ from enhsim_tf.enhanced_simulator.training import TrainingSettings, train
 from enhsim_tf.enhancer import network
 from enhsim_tf.enhancer.rung_networks import network_from, weights_of
 from enhsim_tf.enhancer.training_pairs import Pairs, align_to_enhanced, apply_shift_and_gain, cut_pairs
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.candidates import NoiseModel
 from enhsim_tf.noise.states import model_from, state_of
 from enhsim_tf.telemetry.parquet_store import write_windows
@@ -465,7 +465,7 @@ class EnhancedSimulator(NoisyOutput):
 
         Raises:
             InputError: If the folder contains something other than a saved simulator, if a number of the simulator is not finite,
-                or if its noise is a GAN, which is not saved; the folder is left unchanged.
+                or if its noise is a model of another make, which is not saved; the folder is left unchanged.
         """
         noise = state_of(self.noise)
         settings = {

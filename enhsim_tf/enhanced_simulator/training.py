@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.training import EpochProgress, fit_windows
 from enhsim_tf.enhanced_simulator.checks import check_coarse, check_counts, check_parts, check_size, is_finite
 from enhsim_tf.enhanced_simulator.choosing import choose_enhancer
 from enhsim_tf.enhanced_simulator.noise_fitting import JUDGED_SHARE, NoiseWindows, choose_noise
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.training_pairs import Pairs, cut_pairs, split_end
-from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 from enhsim_tf.noise.names import BEST, CANDIDATES
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.series import Telemetry, check_values

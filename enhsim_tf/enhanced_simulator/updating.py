@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.training import fit_windows
 from enhsim_tf.detection import metrics
 from enhsim_tf.enhanced_simulator.checks import check_parts, is_finite
 from enhsim_tf.enhanced_simulator.residual_detector import AlignedResidual
@@ -21,8 +23,6 @@ from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 from enhsim_tf.enhanced_simulator.update_report import RATE, State, UpdateReport
 from enhsim_tf.enhancer.training_pairs import split_end, window_errors
-from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import fit_windows
 from enhsim_tf.noise.states import state_of
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows_from_parts, evenly_spaced_starts, num_window_starts, random_window_starts

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.training import dense_stack, fit_windows, predict_windows
 from enhsim_tf.enhancer import network as enhancer_network
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.enhancer.rung_networks import linear_network, sum_of_networks
 from enhsim_tf.enhancer.scaling import Scaling
-from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import dense_stack, fit_windows, predict_windows
 
 COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_NETWORK, NETWORK = RUNGS = (
     "coarse",

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.keras_tools.backend import keras
 
 _BESIDE = "ridge"  # name of the layer that maps the inputs to the outputs beside the stack
 _MOST_LAYERS = 100

@@ -14,6 +14,7 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.figure import Figure, save
 from enhsim_tf.common.plot_style import (
     AVERAGE,
@@ -35,7 +36,6 @@ from enhsim_tf.common.plot_style import (
     panels,
     title_words,
 )
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.paper.claims import measured
 from enhsim_tf.paper.enhancer import build_enhancer
 from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.measures import autocorrelation
 from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.paper import noise, square_wave
 from enhsim_tf.paper.enhancer import build_enhancer, enhance, train_enhancer
 from enhsim_tf.paper.settings import Settings
@@ -27,7 +28,6 @@ from enhsim_tf.paper.telemetry import (
     split,
     true_signal,
 )
-from enhsim_tf.realism.measures import autocorrelation
 
 VERSION = {"telemetry": 1, "enhancer": 1, "noise GAN": 1}
 """Raised when the code of a stage gives other results for the same settings."""

@@ -8,7 +8,7 @@ import numpy as np
 from enhsim_tf.paper.settings import Settings
 
 if TYPE_CHECKING:
-    from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.common.backend import keras
 
 
 class PaperGAN:

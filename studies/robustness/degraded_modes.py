@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
+from enhsim_tf.common import measures
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, fit_ridge, nearest_windows
-from enhsim_tf.realism import measures
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.common.backend import keras
 
 SEVERITIES = (0.1, 0.25, 0.5, 0.75, 1.0)
 LARGEST_TRAINED = 0.5  # largest severity in the training of the randomised methods
@@ -144,9 +144,9 @@ class DegradedModes:
 
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """Trains the enhancer of the residual pipeline on other windows."""
+        from enhsim_tf.common.backend import keras
+        from enhsim_tf.common.training import EpochProgress, fit_windows
         from enhsim_tf.enhancer.network import build_enhancer
-        from enhsim_tf.keras_tools.backend import keras
-        from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 
         seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.paper.batch_size
         network = build_enhancer(self.settings.paper.window, seed=seed)

@@ -122,8 +122,8 @@ def test_the_remaining_time_as_text(seconds, words):
 
 
 def test_the_enhancer_reports_finished_epochs():
+    from enhsim_tf.common.training import EpochProgress, fit_windows
     from enhsim_tf.enhancer.network import build_enhancer
-    from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 
     windows, done = np.random.default_rng(0).standard_normal((5, 8)).astype(np.float32), []
     fit_windows(build_enhancer(8, 4), windows, windows, 2, batch_size=2, seed=0, callbacks=[EpochProgress(done.append)], verbose=0)

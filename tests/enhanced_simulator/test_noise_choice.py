@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from enhsim_tf.common.window_features import signal_edges
 from enhsim_tf.detection.evaluation import make_trial
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhanced_simulator.noise_choice import CandidateJudgement, NoiseJudge, choose, features_of, unit_of
-from enhsim_tf.realism.window_features import signal_edges
 
 
 def test_the_simplest_candidate_that_passes_is_chosen_and_else_the_nearest():

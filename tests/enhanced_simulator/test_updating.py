@@ -9,10 +9,10 @@ import pytest
 from enhsim_tf.__main__ import main
 from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.backend import keras
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhanced_simulator.update_options import UpdateOptions
 from enhsim_tf.enhanced_simulator.updating import update_simulator
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.series import Telemetry

@@ -9,6 +9,7 @@ import pytest
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.backend import keras
 from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import Model, Plan
 from enhsim_tf.datasets.shard import make_windows
@@ -21,7 +22,6 @@ from enhsim_tf.enhanced_simulator.runs.scoring import score_run
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.telemetry.series import Telemetry
 

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
-WITH_NETWORKS = """keras_tools.backend keras_tools.training keras_tools.fused_adam keras_tools.blockwise_training keras_tools.convolution_maximum
+WITH_NETWORKS = """common.backend common.training common.fused_adam common.blockwise_training common.convolution_maximum
     enhancer.network enhancer.ladder enhancer.rung_networks
     enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting enhanced_simulator.choosing
     enhanced_simulator.updating

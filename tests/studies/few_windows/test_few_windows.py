@@ -58,7 +58,7 @@ def test_aligned_windows_have_the_mean_and_the_covariance_of_the_target():
 
 
 def test_the_gradient_of_the_domain_is_reversed():
-    from enhsim_tf.keras_tools.backend import tf
+    from enhsim_tf.common.backend import tf
     from studies.few_windows.domain_adversarial import reverse_gradient
 
     values = tf.constant([1.0, -2.0, 3.0])

@@ -10,9 +10,9 @@ import pickle
 import numpy as np
 import pytest
 
-from enhsim_tf.realism import measures as fidelity
-from enhsim_tf.realism.real_floor import MEASURES, RealFloor, evaluate
-from tests.realism import negative_controls
+from enhsim_tf.common import measures as fidelity
+from enhsim_tf.noise.real_floor import MEASURES, RealFloor, evaluate
+from tests.common import negative_controls
 
 NUM_WINDOWS, SAMPLES = 200, 500
 NAMES = [measure.name for measure in MEASURES]

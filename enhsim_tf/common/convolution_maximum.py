@@ -18,7 +18,7 @@ the row under filter k at position t. Four properties reduce the cost:
 In a `tf.function`, gradients that are not requested are not computed, because TensorFlow prunes operations without effect.
 """
 
-from enhsim_tf.keras_tools.backend import keras, tf
+from enhsim_tf.common.backend import keras, tf
 
 _SUPPORTED = (keras.activations.relu, "valid", (1,), 1, True)  # activation, padding, dilation, groups and use_bias of the Conv1D
 _BLOCK_ROWS = 10  # number of rows in a block, whose products take 2.4 MB with 500 filters

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.realism.window_features import signal_edges, signal_features
+from enhsim_tf.common.window_features import signal_edges, signal_features
 
 
 def test_edges_divide_levels_and_slopes_into_thirds():

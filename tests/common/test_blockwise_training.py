@@ -4,10 +4,10 @@ import keras
 import numpy as np
 import pytest
 
+from enhsim_tf.common import blockwise_training
+from enhsim_tf.common.blockwise_training import BlockwiseTraining, is_wide_dense_stack
+from enhsim_tf.common.training import dense_stack, fit_windows
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.keras_tools import blockwise_training
-from enhsim_tf.keras_tools.blockwise_training import BlockwiseTraining, is_wide_dense_stack
-from enhsim_tf.keras_tools.training import dense_stack, fit_windows
 
 WINDOW, UNITS = 24, 40
 

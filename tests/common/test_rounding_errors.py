@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from enhsim_tf.common.two_sample import boosted_trees
+from enhsim_tf.common.window_features import signal_edges, window_features
 from enhsim_tf.enhanced_simulator.noise_choice import features_of
-from enhsim_tf.realism.two_sample import boosted_trees
-from enhsim_tf.realism.window_features import signal_edges, window_features
 
 
 def test_noise_on_levels_is_not_told_from_itself_by_rounding_errors():

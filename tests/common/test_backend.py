@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-START = "from enhsim_tf.keras_tools.backend import keras, tf\n"
+START = "from enhsim_tf.common.backend import keras, tf\n"
 # whether oneDNN's kernels are on, as TensorFlow itself says
 STATE = "from tensorflow.python.util import _pywrap_util_port as port\nprint(port.IsMklEnabled(), keras.backend.backend(), sep=',')\n"
 
@@ -47,7 +47,7 @@ def test_settings_that_mean_nothing_do_no_harm():
 
 def test_another_backend_of_keras_is_refused_in_one_line():
     ended = run(
-        "import importlib\nfrom enhsim_tf.common.console import run_command\nexit(run_command(lambda: importlib.import_module('enhsim_tf.keras_tools.backend'), ''))",
+        "import importlib\nfrom enhsim_tf.common.console import run_command\nexit(run_command(lambda: importlib.import_module('enhsim_tf.common.backend'), ''))",
         KERAS_BACKEND="jax",
     )
     assert ended.returncode == 2 and ended.stdout == ""
@@ -57,7 +57,7 @@ def test_another_backend_of_keras_is_refused_in_one_line():
 def test_keras_that_was_imported_with_another_backend_is_refused(tmp_path):
     """Other backends need packages that are not installed, so a stub of Keras reports another backend."""
     (tmp_path / "keras.py").write_text("class backend:\n    def backend():\n        return 'torch'\n")
-    code = "import keras\nfrom enhsim_tf.common.errors import InputError\ntry:\n    import enhsim_tf.keras_tools.backend\nexcept InputError as error:\n    print(error)"
+    code = "import keras\nfrom enhsim_tf.common.errors import InputError\ntry:\n    import enhsim_tf.common.backend\nexcept InputError as error:\n    print(error)"
     ended = run(code, PYTHONPATH=str(tmp_path))
     assert ended.stdout.startswith("Expected Keras with the backend tensorflow. Received: torch."), ended.stderr
 
@@ -75,7 +75,7 @@ def test_tensorflow_that_runs_already_keeps_its_settings():
 # Allocates and frees 40 MB as TensorFlow does for the gradient of the widest layer, and counts the pages that came anew.
 FAULTS = """
 import ctypes, resource
-from enhsim_tf.keras_tools.tensorflow_settings import keep_freed_memory
+from enhsim_tf.common.tensorflow_settings import keep_freed_memory
 print(keep_freed_memory())
 library = ctypes.CDLL(None)
 library.malloc.restype, library.malloc.argtypes, library.free.argtypes = ctypes.c_void_p, [ctypes.c_size_t], [ctypes.c_void_p]

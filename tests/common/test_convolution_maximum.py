@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import tensorflow as tf
 
-from enhsim_tf.keras_tools.convolution_maximum import convolution_maximum
+from enhsim_tf.common.convolution_maximum import convolution_maximum
 
 SHAPES = [  # rows, samples, width, stride, filters
     (3, 60, 20, 4, 7),

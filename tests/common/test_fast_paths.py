@@ -3,11 +3,11 @@ import numpy as np
 import pytest
 import tensorflow as tf
 
+from enhsim_tf.common import convolution_maximum as fast_path
+from enhsim_tf.common.convolution_maximum import convolution_maximum, num_layers_computed
+from enhsim_tf.common.fused_adam import fused_adam
+from enhsim_tf.common.training import fit_windows
 from enhsim_tf.enhancer.network import enhance
-from enhsim_tf.keras_tools import convolution_maximum as fast_path
-from enhsim_tf.keras_tools.convolution_maximum import convolution_maximum, num_layers_computed
-from enhsim_tf.keras_tools.fused_adam import fused_adam
-from enhsim_tf.keras_tools.training import fit_windows
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.paper import noise as of_paper
 from tests.paper.conftest import tiny_settings
@@ -119,10 +119,10 @@ def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
         assert isinstance(gan.discriminator.layers[0], fast_path.ConvolutionMaximum)
         convolution, *_, narrow, _ = gan.discriminator.layers
         drops = [layer.seed_generator.state for layer in (convolution.dropout, narrow)]
-        before = [np.array(each) for each in drops]
+        before = [each.numpy().copy() for each in drops]
         gan.train_discriminator(rows[:, :, None], of_paper.labels(16, of_paper.REAL))
-        assert all((old != np.array(new)).any() for old, new in zip(before, drops, strict=True))
-        trained.append([np.array(weight) for weight in gan.discriminator_weights])
+        assert all((old != new.numpy()).any() for old, new in zip(before, drops, strict=True))
+        trained.append([weight.numpy() for weight in gan.discriminator_weights])
     for one, other in zip(*trained, strict=True):
         np.testing.assert_array_equal(one, other)
 

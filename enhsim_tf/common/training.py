@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from enhsim_tf.keras_tools.backend import keras, tf
-from enhsim_tf.keras_tools.blockwise_training import BlockwiseTraining, is_wide_dense_stack
-from enhsim_tf.keras_tools.fused_adam import fused_adam
+from enhsim_tf.common.backend import keras, tf
+from enhsim_tf.common.blockwise_training import BlockwiseTraining, is_wide_dense_stack
+from enhsim_tf.common.fused_adam import fused_adam
 
 
 def seeded_initialiser(name: str, seed: int) -> keras.initializers.Initializer:

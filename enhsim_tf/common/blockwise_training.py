@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from enhsim_tf.keras_tools.backend import keras, tf
-from enhsim_tf.keras_tools.fused_adam import AdamStep, adam_step, apply_adam
+from enhsim_tf.common.backend import keras, tf
+from enhsim_tf.common.fused_adam import AdamStep, adam_step, apply_adam
 
 BLOCK_BYTES = 5_200_000
 """Maximum size of a block. A few blocks of this size, with their moments, fit into a processor's cache."""

@@ -5,7 +5,8 @@ import pytest
 import scipy.linalg
 import scipy.stats
 
-from enhsim_tf.realism import measures
+from enhsim_tf.common import measures
+from enhsim_tf.noise import distances
 
 
 def normal(*shape, seed=0):
@@ -110,7 +111,7 @@ def test_marginal_distance_of_a_shift_and_of_a_stretch():
 
 @pytest.mark.parametrize("samples", [128, 129])
 def test_power_spectrum_of_white_noise_is_flat(samples):
-    spectrum = measures.power_spectrum(0.5 * normal(2_000, samples))
+    spectrum = distances.power_spectrum(0.5 * normal(2_000, samples))
     assert spectrum.shape == (samples // 2,)
     assert np.mean(spectrum) == pytest.approx(0.25, rel=0.01)
     assert spectrum == pytest.approx(np.full(samples // 2, 0.25), rel=5 * np.sqrt(2 / 2_000))
@@ -118,7 +119,7 @@ def test_power_spectrum_of_white_noise_is_flat(samples):
 
 def test_power_spectrum_of_a_sine_peaks_at_its_frequency():
     windows = np.sin(2 * np.pi * 17 / 200 * np.arange(200) + np.array([[0.0], [1.0]]))
-    spectrum = measures.power_spectrum(windows)
+    spectrum = distances.power_spectrum(windows)
     assert np.argmax(spectrum) + 1 == 17  # the zero frequency is left out
     assert spectrum[14:19].sum() == pytest.approx(spectrum.sum(), rel=1e-3)
 
@@ -128,44 +129,44 @@ def test_lagged_products_by_hand():
     assert measures.lagged_products(windows, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
     assert measures.lagged_products(windows + 9, 2) == pytest.approx(np.array([[7, 5, 4], [7, 5, 4]]))
     squares = np.array([[1.0, 4, 16]] * 2) - 7
-    assert measures.lagged_square_products(windows + 9, 1)[0] == pytest.approx([np.mean(squares[0] ** 2), (6 * 3 - 3 * 9) / 2])
+    assert distances.lagged_square_products(windows + 9, 1)[0] == pytest.approx([np.mean(squares[0] ** 2), (6 * 3 - 3 * 9) / 2])
 
 
 def test_autocorrelation_distance_is_the_largest_difference():
     one, other = np.array([[2.0, 1, 0], [2, 0, 0]]), np.array([[1.0, 0.5, 0.5]])  # correlations 1, 1/4, 0 and 1, 1/2, 1/2
-    assert measures.autocorrelation_distance(one, other) == pytest.approx(0.5)
-    assert measures.autocorrelation_distance(9 * one, one) == pytest.approx(0)
+    assert distances.autocorrelation_distance(one, other) == pytest.approx(0.5)
+    assert distances.autocorrelation_distance(9 * one, one) == pytest.approx(0)
 
 
 def test_autocorrelation_distance_of_processes_in_closed_form():
     # a Gaussian process of correlation r has squares of correlation r^2
     white, coloured = normal(400, 500, seed=1), autoregressive(400, 500, 0.7)
-    for describe, expected in ((measures.lagged_products, 0.7), (measures.lagged_square_products, 0.49)):
-        assert measures.autocorrelation_distance(describe(white, 50), describe(coloured, 50)) == pytest.approx(expected, abs=0.02)
+    for describe, expected in ((measures.lagged_products, 0.7), (distances.lagged_square_products, 0.49)):
+        assert distances.autocorrelation_distance(describe(white, 50), describe(coloured, 50)) == pytest.approx(expected, abs=0.02)
 
 
 def test_log_scales_and_their_distance():
     windows = np.array([[1.0, -1], [3, 1], [5, -5]])  # standard deviations 1, 1, 5
-    assert measures.log_scales(windows) == pytest.approx([0, 0, np.log(5)])
-    scales = measures.log_scales(normal(50, 100))
-    assert measures.log_scale_distance(scales[::-1] + 0.25, scales) == pytest.approx(0.25)
+    assert distances.log_scales(windows) == pytest.approx([0, 0, np.log(5)])
+    scales = distances.log_scales(normal(50, 100))
+    assert distances.log_scale_distance(scales[::-1] + 0.25, scales) == pytest.approx(0.25)
     # equal in the mean, spread by one: half of each lies half a unit away on either side
-    assert measures.log_scale_distance(np.array([-1.0, 1]), np.array([0.0, 0])) == pytest.approx(1)
+    assert distances.log_scale_distance(np.array([-1.0, 1]), np.array([0.0, 0])) == pytest.approx(1)
 
 
 def test_kurtosis_of_known_distributions():
     owner, shape = np.random.default_rng(0), (400, 500)
-    assert measures.excess_kurtosis(np.array([[1.0, -1], [1, -1]]) + 4) == pytest.approx(-2)
-    assert measures.excess_kurtosis(owner.uniform(size=shape)) == pytest.approx(-1.2, abs=0.01)
-    assert measures.excess_kurtosis(owner.laplace(size=shape)) == pytest.approx(3, abs=0.3)
-    assert measures.kurtosis_difference(owner.laplace(size=shape), owner.uniform(size=shape)) == pytest.approx(4.2, abs=0.3)
+    assert distances.excess_kurtosis(np.array([[1.0, -1], [1, -1]]) + 4) == pytest.approx(-2)
+    assert distances.excess_kurtosis(owner.uniform(size=shape)) == pytest.approx(-1.2, abs=0.01)
+    assert distances.excess_kurtosis(owner.laplace(size=shape)) == pytest.approx(3, abs=0.3)
+    assert distances.kurtosis_difference(owner.laplace(size=shape), owner.uniform(size=shape)) == pytest.approx(4.2, abs=0.3)
 
 
 def test_tail_ratio_of_known_quantiles():
     gaussian = normal(400, 500)
-    assert measures.tail_ratio(1.5 * gaussian, gaussian) == pytest.approx(1.5)
+    assert distances.tail_ratio(1.5 * gaussian, gaussian) == pytest.approx(1.5)
     laplace = np.random.default_rng(1).laplace(size=(400, 500))  # 0.999 of its absolute values lie below log(1000)
-    assert measures.tail_ratio(laplace, gaussian) == pytest.approx(np.log(1000) / scipy.stats.norm.ppf(0.9995), rel=0.05)
+    assert distances.tail_ratio(laplace, gaussian) == pytest.approx(np.log(1000) / scipy.stats.norm.ppf(0.9995), rel=0.05)
 
 
 @pytest.mark.parametrize("samples", [64, 65])
@@ -177,11 +178,11 @@ def test_multitaper_spectrum_from_its_definition(samples):
     windows, bins = 3 * normal(5, samples), np.arange(1, (samples - 1) // 2 + 1)
     transform = np.exp(-2j * np.pi / samples * np.outer(time, bins))
     expected = np.mean([np.abs((windows * taper) @ transform) ** 2 for taper in tapers.T], axis=0)
-    assert measures.window_spectra(windows) == pytest.approx(expected, rel=1e-6)
+    assert distances.window_spectra(windows) == pytest.approx(expected, rel=1e-6)
 
 
 def test_multitaper_spectrum_of_white_noise_is_its_variance():
-    spectra = measures.window_spectra(0.5 * normal(1_000, 100))
+    spectra = distances.window_spectra(0.5 * normal(1_000, 100))
     assert spectra.shape == (1_000, 49)
     assert spectra.mean(axis=0) == pytest.approx(np.full(49, 0.25), rel=5 / np.sqrt(7 * 1_000))
 
@@ -190,27 +191,27 @@ def test_spectral_distances_by_hand():
     real = np.ones((3, 4)) * [1, 10, 100, 1]
     shape = np.exp([0.3, -0.3, 0.3, -0.3])
     outlier = np.array([[1.0], [1.0], [1e6]])  # one window in three does not move a median
-    assert measures.geodesic_distance(outlier * real * shape, real) == pytest.approx(0.3)
-    assert measures.geodesic_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.3)
-    assert measures.log_spectral_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.5)
+    assert distances.geodesic_distance(outlier * real * shape, real) == pytest.approx(0.3)
+    assert distances.geodesic_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.3)
+    assert distances.log_spectral_distance(np.exp(0.4) * real * shape, real) == pytest.approx(0.5)
 
 
 def test_spectral_distances_of_an_autoregressive_process_in_closed_form():
-    white, coloured = (measures.window_spectra(windows) for windows in (normal(400, 500, seed=1), autoregressive(400, 500, 0.7)))
+    white, coloured = (distances.window_spectra(windows) for windows in (normal(400, 500, seed=1), autoregressive(400, 500, 0.7)))
     frequency = np.arange(1, 250) / 500
     log_ratio = np.log(0.51 / np.abs(1 - 0.7 * np.exp(-2j * np.pi * frequency)) ** 2)
-    assert measures.geodesic_distance(coloured, white) == pytest.approx(np.std(log_ratio), rel=0.02)
-    assert measures.log_spectral_distance(coloured, white) == pytest.approx(np.sqrt(np.mean(log_ratio**2)), rel=0.02)
+    assert distances.geodesic_distance(coloured, white) == pytest.approx(np.std(log_ratio), rel=0.02)
+    assert distances.log_spectral_distance(coloured, white) == pytest.approx(np.sqrt(np.mean(log_ratio**2)), rel=0.02)
 
 
 def test_a_generator_that_stands_still_is_infinitely_far_and_finite():
     still, real = np.zeros((30, 100)), normal(30, 100)
     for describe, compare in (
-        (measures.window_spectra, measures.geodesic_distance),
-        (measures.window_spectra, measures.log_spectral_distance),
-        (measures.log_scales, measures.log_scale_distance),
-        (lambda windows: measures.lagged_products(windows, 20), measures.autocorrelation_distance),
-        (lambda windows: windows, measures.kurtosis_difference),
-        (lambda windows: windows, measures.tail_ratio),
+        (distances.window_spectra, distances.geodesic_distance),
+        (distances.window_spectra, distances.log_spectral_distance),
+        (distances.log_scales, distances.log_scale_distance),
+        (lambda windows: measures.lagged_products(windows, 20), distances.autocorrelation_distance),
+        (lambda windows: windows, distances.kurtosis_difference),
+        (lambda windows: windows, distances.tail_ratio),
     ):
         assert np.isfinite(compare(describe(still), describe(real)))

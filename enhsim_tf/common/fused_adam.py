@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from enhsim_tf.keras_tools.backend import keras, tf
+from enhsim_tf.common.backend import keras, tf
 
 
 def fused_adam(learning_rate: float | keras.optimizers.schedules.LearningRateSchedule, **settings: object) -> keras.optimizers.Adam:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from enhsim_tf.common import measures as fidelity
+from enhsim_tf.common import two_sample
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.realism import measures as fidelity
-from enhsim_tf.realism import two_sample
-from enhsim_tf.realism.window_features import DECIMALS
+from enhsim_tf.common.window_features import DECIMALS
+from enhsim_tf.noise import distances
 
 Comparison = Callable[[np.ndarray, np.ndarray], float]
 
@@ -59,7 +60,7 @@ def _products(windows: np.ndarray) -> np.ndarray:
 
 
 def _square_products(windows: np.ndarray) -> np.ndarray:
-    return fidelity.lagged_square_products(windows, min(50, windows.shape[1] // 2))
+    return distances.lagged_square_products(windows, min(50, windows.shape[1] // 2))
 
 
 def _rank_ratio(generated: np.ndarray, real: np.ndarray) -> float:
@@ -83,20 +84,20 @@ def _linear_p(generated: np.ndarray, real: np.ndarray) -> float:
 
 
 MEASURES = (
-    Measure("A1", "geodesic distance", fidelity.window_spectra, fidelity.geodesic_distance),
-    Measure("A1", "log spectral distance", fidelity.window_spectra, fidelity.log_spectral_distance),
+    Measure("A1", "geodesic distance", distances.window_spectra, distances.geodesic_distance),
+    Measure("A1", "log spectral distance", distances.window_spectra, distances.log_spectral_distance),
     Measure("A2", "scale difference", _values, fidelity.scale_difference),
-    Measure("A2", "log scale distance", fidelity.log_scales, fidelity.log_scale_distance),
+    Measure("A2", "log scale distance", distances.log_scales, distances.log_scale_distance),
     Measure("A3", "marginal distance", _values, fidelity.marginal_distance, max_resplits=100),
-    Measure("A3", "kurtosis difference", _values, fidelity.kurtosis_difference),
-    Measure("A3", "tail ratio", _values, fidelity.tail_ratio, perfect=1.0, is_ratio=True),
-    Measure("A4", "autocorrelation distance", _products, fidelity.autocorrelation_distance),
-    Measure("A4", "autocorrelation distance of squares", _square_products, fidelity.autocorrelation_distance),
+    Measure("A3", "kurtosis difference", _values, distances.kurtosis_difference),
+    Measure("A3", "tail ratio", _values, distances.tail_ratio, perfect=1.0, is_ratio=True),
+    Measure("A4", "autocorrelation distance", _products, distances.autocorrelation_distance),
+    Measure("A4", "autocorrelation distance of squares", _square_products, distances.autocorrelation_distance),
     Measure("A5", "classifier AUC, boosted trees", two_sample.window_features, _boosted_auc, 0.5, False, 20, _boosted_p),
-    Measure("A5", "classifier AUC, convolutions", two_sample.convolution_features, _linear_auc, 0.5, False, 50, _linear_p),
-    Measure("A6", "density", two_sample.window_features, two_sample.density, perfect=1.0, max_resplits=50),
-    Measure("A6", "coverage", two_sample.window_features, two_sample.coverage, perfect=1 - 2.0**-5, max_resplits=50),
-    Measure("A7", "MMD squared", two_sample.window_features, two_sample.mmd_squared, 0.0, False, 50, two_sample.mmd_p_value),
+    Measure("A5", "classifier AUC, convolutions", distances.convolution_features, _linear_auc, 0.5, False, 50, _linear_p),
+    Measure("A6", "density", two_sample.window_features, distances.density, perfect=1.0, max_resplits=50),
+    Measure("A6", "coverage", two_sample.window_features, distances.coverage, perfect=1 - 2.0**-5, max_resplits=50),
+    Measure("A7", "MMD squared", two_sample.window_features, distances.mmd_squared, 0.0, False, 50, distances.mmd_p_value),
     Measure("rank", "effective rank ratio", _values, _rank_ratio, perfect=1.0, is_ratio=True, max_resplits=40),
 )
 

@@ -5,7 +5,8 @@ import pytest
 import scipy.signal
 from sklearn.metrics import roc_auc_score
 
-from enhsim_tf.realism import two_sample
+from enhsim_tf.common import two_sample
+from enhsim_tf.noise import distances
 
 
 def normal(*shape, seed=0):
@@ -102,7 +103,7 @@ def test_permutations_keep_to_their_fold():
 
 def test_convolution_features_written_out():
     windows = normal(3, 40)
-    features = two_sample.convolution_features(windows, num_kernels=2, seed=4)
+    features = distances.convolution_features(windows, num_kernels=2, seed=4)
     assert features.shape == (3, 3 * 2 * 2) and features.dtype == np.float32  # dilations 1, 2, 4
     owner, expected = np.random.default_rng(4), []
     for dilation in (1, 2, 4):
@@ -117,7 +118,7 @@ def test_convolution_features_written_out():
 
 
 def test_convolutions_tell_what_they_should_and_not_what_they_should_not():
-    features = two_sample.convolution_features
+    features = distances.convolution_features
     same = two_sample.linear_classifier(features(normal(150, 200)), features(normal(150, 200, seed=1)))
     assert same.auc == pytest.approx(0.5, abs=5 * np.sqrt(301 / (12 * 150**2))) and same.p_value() > 0.01
     for other in (autoregressive(150, 200, 0.4), 1.5 * normal(150, 200), normal(150, 200) + 0.5):
@@ -127,15 +128,15 @@ def test_convolutions_tell_what_they_should_and_not_what_they_should_not():
 
 def test_convolution_features_refuse_windows_below_a_kernel(refused):
     with refused("at least 9 samples"):
-        two_sample.convolution_features(normal(4, 8))
+        distances.convolution_features(normal(4, 8))
 
 
 def test_density_and_coverage_by_hand():
     real = np.array([[0.0], [1.0], [2.0], [10.0]])  # to the nearest: 1, 1, 1 and 8
     generated = np.array([[0.5], [0.6], [9.0], [30.0]])
     # 0.5 and 0.6 lie in the reach of 0 and 1, 9 in that of 10; 30 and the reach of 2 stay empty
-    assert two_sample.density(generated, real, num_neighbours=1) == pytest.approx(5 / 4)
-    assert two_sample.coverage(generated, real, num_neighbours=1) == pytest.approx(3 / 4)
+    assert distances.density(generated, real, num_neighbours=1) == pytest.approx(5 / 4)
+    assert distances.coverage(generated, real, num_neighbours=1) == pytest.approx(3 / 4)
 
 
 def test_density_and_coverage_written_out():
@@ -146,16 +147,16 @@ def test_density_and_coverage_written_out():
         reach = sorted(np.linalg.norm((other - centre) / unit) for other in real)[5]
         for i, point in enumerate(generated * [1, 10, 100]):
             inside[i, j] = np.linalg.norm((point - centre) / unit) <= reach
-    assert two_sample.density(generated * [1, 10, 100], real) == pytest.approx(inside.sum() / (5 * 40))
-    assert two_sample.coverage(generated * [1, 10, 100], real) == pytest.approx(np.mean(inside.max(axis=0)))
+    assert distances.density(generated * [1, 10, 100], real) == pytest.approx(inside.sum() / (5 * 40))
+    assert distances.coverage(generated * [1, 10, 100], real) == pytest.approx(np.mean(inside.max(axis=0)))
 
 
 def test_density_and_coverage_of_two_samples_of_one_process_are_those_of_theory():
     pairs = [(normal(300, 4, seed=2 * seed), normal(300, 4, seed=2 * seed + 1)) for seed in range(20)]
-    assert np.mean([two_sample.coverage(*pair) for pair in pairs]) == pytest.approx(1 - 2.0**-5, abs=0.01)
-    assert np.mean([two_sample.density(*pair) for pair in pairs]) == pytest.approx(1, abs=0.05)
+    assert np.mean([distances.coverage(*pair) for pair in pairs]) == pytest.approx(1 - 2.0**-5, abs=0.01)
+    assert np.mean([distances.density(*pair) for pair in pairs]) == pytest.approx(1, abs=0.05)
     with pytest.raises(ValueError, match="more than 5 real windows"):
-        two_sample.density(normal(9, 4), normal(5, 4))
+        distances.density(normal(9, 4), normal(5, 4))
 
 
 def test_mmd_written_out():
@@ -169,20 +170,20 @@ def test_mmd_written_out():
     expected = sum(kernel(generated[i], generated[j]) for i in range(12) for j in range(12) if i != j) / (12 * 11)
     expected += sum(kernel(real[i], real[j]) for i in range(15) for j in range(15) if i != j) / (15 * 14)
     expected -= 2 * sum(kernel(one, other) for one in generated for other in real) / (12 * 15)
-    assert two_sample.mmd_squared(generated, real) == pytest.approx(expected)
+    assert distances.mmd_squared(generated, real) == pytest.approx(expected)
 
 
 def test_mmd_is_unbiased_and_its_p_value_uniform():
     pairs = [(normal(30, 2, seed=2 * seed), normal(30, 2, seed=2 * seed + 1)) for seed in range(300)]
-    values = [two_sample.mmd_squared(*pair) for pair in pairs]
+    values = [distances.mmd_squared(*pair) for pair in pairs]
     assert np.mean(values) == pytest.approx(0, abs=4 * np.std(values) / np.sqrt(300)) and min(values) < 0
-    p_values = np.array([two_sample.mmd_p_value(*pair, num_permutations=99) for pair in pairs])
+    p_values = np.array([distances.mmd_p_value(*pair, num_permutations=99) for pair in pairs])
     assert np.mean(p_values) == pytest.approx(0.5, abs=5 / np.sqrt(12 * 300))
     assert np.mean(p_values <= 0.1) == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 300))
-    assert two_sample.mmd_p_value(normal(30, 2) + 2, normal(30, 2, seed=1), num_permutations=99) == 0.01
+    assert distances.mmd_p_value(normal(30, 2) + 2, normal(30, 2, seed=1), num_permutations=99) == 0.01
 
 
 def test_features_that_stand_still_are_no_obstacle():
     real, generated = normal(30, 3) * [1, 0, 1], normal(30, 3, seed=1)
-    found = [compare(generated, real) for compare in (two_sample.density, two_sample.coverage, two_sample.mmd_squared)]
+    found = [compare(generated, real) for compare in (distances.density, distances.coverage, distances.mmd_squared)]
     assert np.isfinite(found).all()

@@ -1,4 +1,4 @@
-"""Starts TensorFlow for the networks of sections 2.2 and 2.3: `from enhsim_tf.keras_tools.backend import keras, tf`.
+"""Starts TensorFlow for the networks of sections 2.2 and 2.3: `from enhsim_tf.common.backend import keras, tf`.
 
 Every module with a network imports Keras and TensorFlow from here. Commands, worker processes, notebooks and programs that
 use the package as a library therefore share the same settings (see `tensorflow_settings`), and TensorFlow's start-up
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.keras_tools.tensorflow_settings import SETTINGS, apply_settings
+from enhsim_tf.common.tensorflow_settings import SETTINGS, apply_settings
 
 
 @contextlib.contextmanager

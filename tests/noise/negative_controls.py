@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from enhsim_tf.realism.measures import autocorrelation
+from enhsim_tf.common.measures import autocorrelation
 from studies.common.noise_processes import AutoregressiveNoise
 
 Control = Callable[[np.ndarray, np.random.Generator], np.ndarray]
