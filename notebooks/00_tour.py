@@ -128,8 +128,9 @@ num_records = pipeline.settings.iterations // pipeline.settings.record_every
 history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* the discriminator soon recognises nearly every window. Then the generator deceives it, and the accuracies for real and for
-# generated windows swing in opposite directions; their mean stays near one half, and both losses near ln 2, which is what guessing gives.
+# *What to see:* the accuracies for real and for generated windows swing in opposite directions: at one time the discriminator takes nearly
+# everything for real, at another nearly everything for generated. Their mean stays near one half, and both losses near ln 2, which is what
+# guessing gives.
 # The networks are in balance, and the paper stops here: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
 
 # %%
@@ -138,8 +139,8 @@ say(f"Classified correctly over the last three records: **{late:.0%}** of both k
 assert 0.35 < late < 0.65
 if budget == "full":
     losses = np.array([history["loss_real"], history["loss_generated"]])
-    assert history["accuracy_real"][1] > 0.9 and history["accuracy_generated"][1] > 0.9
-    assert np.all(losses[:, 1] < 0.5) and np.all(np.abs(losses[:, -3:] - np.log(2)) < 0.1)
+    assert np.corrcoef(history["accuracy_real"], history["accuracy_generated"])[0, 1] < -0.5
+    assert np.all(np.abs(losses - np.log(2)) < 0.15)
 
 # %% [markdown]
 # At a glance the noise is similar indeed:
@@ -259,15 +260,15 @@ if budget == "full":  # noise of the wrong size would teach a detector nothing
 # | stage | what it does | where it fails |
 # |---|---|---|
 # | coarse simulator | square waves of known period: fast, right rhythm | wrong shape; four values |
-# | enhancer | maps coarse windows to smooth ones | one matrix does better (C1); five of six faults that it never saw come out wrong (C9) |
+# | enhancer | maps coarse windows to smooth ones | one matrix does better; five of six faults that it never saw come out wrong (C9) |
 # | moving average | splits telemetry into waveform and noise | a little of the waveform stays in the noise, and a little noise is lost |
 # | noise GAN | sixteen random numbers to a window of noise | varies in few dimensions; the discriminator does not detect it (C6) |
 # | sum | adds the two | the noise does not depend on the signal; the PCA residual separates the sum from telemetry (C8) |
 
 # %% [markdown]
 # The verdicts below are those of the one seed that this book shows. (The lessons were not all executed on the same machine. On another
-# processor, the same seed trains a GAN whose measures differ a little.) The table of all claims decides over ten seeds where a claim
-# depends on the seed. (*AUC*: the area under the curve of a classifier that tries to tell generated from real: 0.5 if it cannot, 1 if it
+# processor, the same seed trains a GAN whose measures differ a little.) The published verdicts rest on several readings of the paper, seeds
+# and processors ([readings](../studies/readings/README.md)). (*AUC*: the area under the curve of a classifier that tries to tell generated from real: 0.5 if it cannot, 1 if it
 # always can.)
 
 # %%

@@ -55,20 +55,20 @@ say(f"{len(values):,} samples of telemetry, a width of {width} samples, {len(noi
 # differ by a little more than that:
 
 # %%
-from enhsim_tf import extract_noise
+from enhsim_tf.paper.noise import extract_noise
 
 packaged, _ = extract_noise(telemetry.values, width)
 np.testing.assert_allclose(noise, packaged, atol=1e-6)
 
 # %%
-arrays = show(pipeline, "fig08_source_noise")
+show(pipeline, "fig08_source_noise")
 
 # %% [markdown]
 # *What to see:* an even band of noise. In this example the true noise is known, because the telemetry was made by adding white noise to
 # two sines. The filter finds almost its standard deviation:
 
 # %%
-chosen = experiment.settings.telemetry
+chosen = pipeline.settings
 true_sd, half = chosen.noise_sd, width // 2
 say(f"Standard deviation of the noise: **{noise.std():.4f}** extracted, **{true_sd}** put in.")
 assert abs(noise.std() / true_sd - 1) < 0.03
@@ -84,7 +84,7 @@ assert abs(noise.std() / true_sd - 1) < 0.03
 #    $1-c$ of its amplitude $A$ is called noise, with a variance of $A^2(1-c)^2/2$.
 
 # %%
-periods = np.array([chosen.orbit_period_s, chosen.rotation_period_s])
+periods = np.array([chosen.orbit_period, chosen.rotation_period])
 amplitudes = np.array([chosen.orbit_amplitude, chosen.rotation_amplitude])
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from enhsim_tf.common import measures as fidelity
 from enhsim_tf.noise.real_floor import MEASURES, RealFloor, evaluate
-from tests.common import negative_controls
+from tests.noise import negative_controls
 
 NUM_WINDOWS, SAMPLES = 200, 500
 NAMES = [measure.name for measure in MEASURES]
