@@ -8,12 +8,12 @@ import numpy as np
 
 from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+from enhsim_tf.common.backend import tf
+from enhsim_tf.common.training import fit_windows
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.keras_tools.backend import tf
-from enhsim_tf.keras_tools.training import fit_windows
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.gan import NoiseGAN
-from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.paper import noise as of_paper
+from enhsim_tf.paper.settings import Settings, make_settings
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -29,31 +29,42 @@ def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) 
     return run, num_steps
 
 
+def gan_settings(num_iterations: int = 1_000, **changed: float) -> Settings:
+    """The paper's settings, with two updates of the discriminator on 200 rows in each iteration, as in the compared code."""
+    return make_settings(iterations=num_iterations, record_every=num_iterations, rounds=1, update="two of 200", **changed)
+
+
 def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, filters: int = 500) -> Work:
     """Prepares iterations of the paper's GAN, with 200 real and 200 generated rows for the discriminator and 200 for the generator."""
-    gan = NoiseGAN(build_generator(window), build_discriminator(window, filters, dropout=dropout))
-    noise = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1))
-    rows = tf.constant(noise / gan.scale, tf.float32)
+    settings = gan_settings(num_iterations, dropout=dropout, window=window, filters=filters)
+    gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
+    gan.compile()
+    noise = np.random.default_rng(0).normal(0, 0.1, (1_500, window)).astype(np.float32)
+    rows = of_paper.Rows(noise, settings.rows_of_each_kind, num_iterations, np.random.default_rng(0))
 
     def run() -> None:
-        for _ in range(num_iterations):
-            gan._step(rows)  # what `fit` calls, without its records and progress bar
+        gan.fit(rows, epochs=1, shuffle=False, verbose=0)
 
     return run, num_iterations
 
 
 def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator:
-    """Builds an untrained simulator of the paper's size. Its speed does not depend on its weights."""
+    """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
-    networks = NoiseGAN(build_generator(window), build_discriminator(window))
-    return EnhancedSimulator(SquareWaveSimulator(waves), build_enhancer(window, hidden_units), networks)
+    residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window)).astype(np.float32)
+    return EnhancedSimulator(SquareWaveSimulator(waves), build_enhancer(window, hidden_units), WindowBootstrap.fit(residuals))
 
 
-def enhance_and_noise(num_windows: int, **size: int) -> Work:
-    """Prepares the enhancement of existing coarse windows and the generation of their noise, in memory."""
-    made = simulator(**size)
-    coarse = made.generate_coarse(num_windows)
-    return lambda: made.enhance(coarse) + made.noise.generate(num_windows, seed=0), num_windows
+def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
+    """Prepares the enhancement of existing coarse windows by the paper's networks and the generation of their noise, in memory."""
+    from enhsim_tf.paper.enhancer import build_enhancer as build
+    from enhsim_tf.paper.enhancer import enhance
+
+    settings = make_settings(window=window, hidden_units=hidden_units)
+    enhancer, generator = build(settings), of_paper.build_generator(settings)
+    coarse = simulator(window, 8).generate_coarse(num_windows)
+    noise = np.random.default_rng(0)
+    return lambda: enhance(enhancer, coarse) + of_paper.generate_noise(generator, num_windows, settings, noise), num_windows
 
 
 def generate(num_windows: int, **size: int) -> Work:

@@ -9,7 +9,7 @@ sys.path.insert(0, str(ROOT))
 
 from docutils.utils.math.latex2mathml import tex2mathml  # noqa: E402
 
-import enhsim_tf.keras_tools.backend  # noqa: E402, F401  starts TensorFlow before another module imports it
+import enhsim_tf.common.backend  # noqa: E402, F401  starts TensorFlow before another module imports it
 from enhsim_tf import __version__  # noqa: E402
 
 if TYPE_CHECKING:

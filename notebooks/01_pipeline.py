@@ -16,29 +16,28 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
+from lesson_tools import check_answer, claim, degraded, drawing, open_pipeline, say, show
 
 from enhsim_tf.common.plot_style import COARSE, ENHANCED, GENERATED
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C2", "C7")
 
 # %%
-arrays = show(experiment, "fig01_pipeline")
+show(pipeline, "fig01_pipeline")
 
 # %% [markdown]
-# Every curve in the boxes was computed: one window of held-out time on its way through the networks, and real telemetry of the same times
-# beside the result. Solid arrows run whenever telemetry is made, dashed ones only in training.
+# The curves in the boxes were computed with seed 0: one window of held-out time on its way through the networks, and real telemetry of the
+# same times beside the result. Solid arrows run whenever telemetry is made, dashed ones only in training.
 #
 # ## Step by step
 #
 # Both networks are plain Keras models. A window needs four lines:
 
 # %%
-simulator = experiment.simulator  # holds the coarse simulator and the networks, trained
-enhancer, generator = simulator.enhancer, simulator.noise.generator
+enhancer, generator = pipeline.enhancer, pipeline.generator
 
-coarse = simulator.generate_coarse(num_windows=4, seed=7)  # steps 1 and 2: square waves
+coarse = pipeline.windows("test", 4, "lesson")["coarse"]  # steps 1 and 2: square waves
 clean = enhancer.predict(coarse, verbose=0)  # steps 3 and 5: the waveform
 latent = np.random.default_rng(8).standard_normal((4, 16), "float32")  # step 7: 16 random numbers a window
 noise = generator.predict(latent, verbose=0)[:, :, 0]  # steps 8 and 9: the noise
@@ -48,8 +47,8 @@ telemetry = clean + noise  # combined
 # The package wraps these steps. It must give the same numbers; sums of thousands of 32-bit products differ in the sixth decimal:
 
 # %%
-np.testing.assert_allclose(simulator.enhance(coarse), clean, atol=1e-5)
-np.testing.assert_allclose(simulator.noise.generate(num_windows=4, seed=8), noise, atol=1e-5)
+np.testing.assert_allclose(pipeline.enhance(coarse), clean, atol=1e-5)
+np.testing.assert_allclose(pipeline.generate_noise(4, np.random.default_rng(8)), noise, atol=1e-5)
 say(f"{telemetry.shape[0]} windows of {telemetry.shape[1]} samples, as {telemetry.dtype}.")
 
 # %%
@@ -72,56 +71,51 @@ with drawing(alt, 4, 1.6, title, sharey=True) as panels:
 # satellite that got stuck therefore gets the same noise as a healthy one from the same seed:
 
 # %%
-from enhsim_tf import Degraded
-
 added = {}
-for name, fault in {"healthy": None, "stuck": Degraded("stuck")}.items():
-    waveform = simulator.generate_clean(num_windows=4, scenario=fault, seed=7)
-    added[name] = simulator.generate(num_windows=4, scenario=fault, seed=7) - waveform
-difference = np.abs(added["healthy"] - added["stuck"]).max()
+for mode, severity in {"nominal": 0.0, "stuck": 1.0}.items():
+    source, _ = degraded(pipeline, mode, severity)
+    added[mode] = pipeline.combine(source, np.random.default_rng(7)) - pipeline.enhance(source)
+difference = np.abs(added["nominal"] - added["stuck"]).max()
 say(
     f"Largest difference between the noise of the healthy and of the stuck satellite: **{difference:.0e}**, which is rounding."
 )
 assert difference < 1e-5
 
 # %% [markdown]
-# With telemetry of your own, the pipeline is one call. It fits the coarse simulator, and chooses the enhancer and the noise model by
-# held-out telemetry:
-#
-# ```python
-# simulator = EnhancedSimulator.fit(telemetry, seed=0)
-# simulator.save("model_dir")
-# ```
+# `python -m enhsim_tf.reproduce --telemetry my.csv` runs these steps on telemetry of your own. The tool (`python -m enhsim_tf fit my.csv`)
+# has a simulator with more choices: it fits the coarse simulator, and chooses the enhancer and the noise model by held-out telemetry.
 #
 # ## Exercises
 #
-# **1.** A detector needs days, not windows. `simulator.generate_series` makes one long series of windows that overlap by half. Has it
-# seams? Complete the function: the mean size of the step from sample to sample, at each of the 250 places within half a window.
+# **1.** A detector needs days, not windows. The next cell puts 100 generated windows of noise end to end on the enhanced signal, as figure 7
+# does. Has the series seams? Complete the function: the mean size of the step from sample to sample, at each of the 500 places within a
+# window.
 
 # %%
-half = simulator.window // 2
+window = pipeline.settings.window
+real = pipeline.windows("test")
 series = {
-    "generated": simulator.generate_series(25_000, seed=3),
-    "real": experiment.data.channels[0].test.values[:25_000],
+    "generated": pipeline.combine(real["coarse"], np.random.default_rng(3)).ravel(),
+    "real": real["target"].ravel(),
 }
 
 
 def mean_step_by_place(values):
     steps = np.abs(np.diff(values, append=values[-1]))
-    # your code: the mean of steps[0], steps[250], steps[500], ...; of steps[1], steps[251], ...; and so on
+    # your code: the mean of steps[0], steps[500], steps[1_000], ...; of steps[1], steps[501], ...; and so on
     return None
 
 
 # %%
 def expected(values):
     steps = np.abs(np.diff(values, append=values[-1]))
-    return [steps[place::half].mean() for place in range(half)]
+    return [steps[place::window].mean() for place in range(window)]
 
 
 check_answer(
     mean_step_by_place(series["real"]),
     lambda found: np.allclose(found, expected(series["real"])),
-    "steps.reshape(-1, half) has a row for each half window.",
+    "steps.reshape(-1, window) has a row for each window.",
 )
 
 # %% [markdown]
@@ -132,8 +126,8 @@ check_answer(
 correlation = None  # your answer
 
 # %%
-many = simulator.generate_clean(num_windows=1_000, seed=1)
-its_noise = simulator.generate(num_windows=1_000, seed=1) - many
+many = pipeline.enhance(real["coarse"])
+its_noise = pipeline.combine(real["coarse"], np.random.default_rng(1)) - many
 check_answer(
     correlation,
     lambda answer: abs(answer - np.corrcoef(np.abs(many).ravel(), np.abs(its_noise).ravel())[0, 1]) < 0.05,
@@ -151,19 +145,19 @@ check_answer(
 #
 # def mean_step_by_place(values):
 #     steps = np.abs(np.diff(values, append=values[-1]))
-#     return steps.reshape(-1, half).mean(axis=0)
+#     return steps.reshape(-1, window).mean(axis=0)
 #
 #
-# with drawing("Mean step by place within half a window", height=1.8, title="No seam, but a rhythm") as panel:
+# with drawing("Mean step by place within a window", height=1.8, title="Hardly a seam, but a rhythm") as panel:
 #     for name, color in {"generated": GENERATED, "real": REAL}.items():
 #         panel.plot(mean_step_by_place(series[name]), color=color, linewidth=0.8, label=name)
-#     panel.set(xlabel="place within half a window (s; an edge is at 249)", ylabel="mean step", ylim=(0, None))
+#     panel.set(xlabel="place within a window (s; an edge is at 499)", ylabel="mean step", ylim=(0, None))
 #     panel.legend(frameon=False)
 # ```
 #
-# There is no seam: the edge is one place among many. But there is a *rhythm*. Real telemetry is equally rough at every place; the
-# generated series is smooth at some places and rough at others, and repeats this every half window. Blending the windows does not cause
-# it. The windows of the generator share a fixed pattern, which notebook 21 extracts and shows.
+# The edge is one place among many. But there is a *rhythm*. Real telemetry is equally rough at every place; the generated series is smooth
+# at some places and rough at others, and repeats this in every window. The windows of the generator share a fixed pattern, which notebook
+# 21 extracts and shows.
 #
 # </details>
 

@@ -15,35 +15,38 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, verdict
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, verdict
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
+from enhsim_tf.paper.claims import measured
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6", "C7")
 
 # %% [markdown]
 # ## The quiz
 #
-# Four of these windows were made by `simulator.generate`, and four were cut from held-out telemetry. Enter the four letters of the
+# Four of these windows were made by both networks, and four were cut from held-out telemetry. Enter the four letters of the
 # generated ones before you read the foot of the figure, for example `"aceg"`.
 
 # %%
-windows = show(experiment, "fig05_real_or_generated")
+show(pipeline, "fig05_real_or_generated")
 
 # %%
 my_guess = None  # your answer, four letters
 
 # %%
 letters = "abcdefgh"
-truly_generated = {letter for letter, made in zip(letters, windows["is_generated"]) if made}
+rng = pipeline.draw("figure 5")  # of the noise, then of the order
+pipeline.generate_noise(4, rng)
+truly_generated = {letter for letter, number in zip(letters, rng.permutation(8)) if number >= 4}
 if my_guess is None:
     print("Not yet answered.")
 else:
     print(f"{len(set(my_guess) & truly_generated)} of {len(truly_generated)} right.")
 
 # %% [markdown]
-# *What to see:* little at a glance, except that one window begins smoother than the others. If three or four of your four letters are
+# *What to see:* little at a glance. If three or four of your four letters are
 # right, was it skill? By pure guessing, the number of right letters has a hypergeometric distribution:
 # $P(k)=\binom{4}{k}\binom{4}{4-k}/\binom{8}{4}$.
 
@@ -58,23 +61,24 @@ assert len(truly_generated) == 4
 # A thousand windows of each kind, a classifier, and windows that it was not trained on are a test:
 
 # %%
-(record,) = verdict(experiment, "C7")
-say(f"AUC of the classifier: **{record['value']:.2f}**. Chance is 0.5.")
-assert record["value"] > 0.8
+(record,) = verdict(pipeline, "C7")
+auc = record["measured"]["auc"]
+say(f"AUC of the classifier: **{auc:.2f}**. Chance is 0.5.")
+assert auc > 0.8
 
 # %% [markdown]
 # ## The noise alone
 
 # %%
-noise = show(experiment, "fig06_real_or_generated_noise")
+show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* little at a glance, except that some windows begin more quietly. But what is shared is invisible in a single window. Here
-# are the mean of the four real windows and the mean of the four generated ones:
+# *What to see:* little at a glance. But what is shared is invisible in a single window. Here are the mean of the four real windows and the mean of the four generated ones:
 
 # %%
-rows, is_generated = noise["rows"], noise["is_generated"]
-groups = {"real": (rows[~is_generated], REAL, "-"), "generated": (rows[is_generated], GENERATED, DASHED)}
+four_generated = pipeline.generate_noise(4, pipeline.draw("figure 6"))
+four_real = pipeline.noise_windows("test", 4, "figure 6, real")
+groups = {"real": (four_real, REAL, "-"), "generated": (four_generated, GENERATED, DASHED)}
 means = {name: group.mean(axis=0) for name, (group, _, _) in groups.items()}
 ratio = {name: means[name].std() / group.std() for name, (group, _, _) in groups.items()}
 alt = "Mean of four real and of four generated windows of noise"
@@ -95,62 +99,58 @@ say(
     f"**{ratio['generated']:.2f}** generated. Mean correlation of two windows: **{correlation['real']:.2f}** real, "
     f"**{correlation['generated']:.2f}** generated."
 )
-assert (
-    correlation["generated"]
-    > {"full": 0.3, "smoke": 0.1}[experiment.settings.budget]
-    > abs(correlation["real"])
-)
+assert correlation["generated"] > {"full": 0.3, "smoke": 0.1}[budget] > abs(correlation["real"])
 
 # %% [markdown]
 # Windows that share a pattern vary in few dimensions. The *effective rank* counts them:
 
 # %%
-rank_generated, rank_real = float(noise["rank_generated"]), float(noise["rank_real"])
+found = measured("noise resemblance", pipeline)
+rank_generated, rank_real = found["rank"], found["real_rank"]
 say(
-    f"Effective rank of {float(noise['rank_windows']):,.0f} windows: **{rank_generated:.0f}** generated, **{rank_real:.0f}** real, "
+    f"Effective rank of {len(pipeline.noise_windows('test')):,} windows: **{rank_generated:.0f}** generated, **{rank_real:.0f}** real, "
     f"a share of {rank_generated / rank_real:.0%}."
 )
-assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[experiment.settings.budget]
+assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[budget]
 
 # %% [markdown]
 # ## Long stretches
 #
-# `simulator.generate_series` fades overlapping windows into each other.
+# Four windows in a row, each with noise of its own.
 
 # %%
-series = show(experiment, "fig07_real_or_generated_series")
+show(pipeline, "fig07_real_or_generated_series")
 
 # %% [markdown]
-# *What to see:* no stretch has seams, and all keep the rhythm of the satellite for as long as you look.
+# *What to see:* all stretches keep the rhythm of the satellite for as long as you look. The next cell makes one of each kind anew, as long as the
+# whole test part.
 
 # %%
-orbit = 480  # samples
-rhythm = [np.corrcoef(row[:-orbit], row[orbit:])[0, 1] for row in series["rows"]]
+orbit, size = 480, pipeline.settings.window  # samples
+test = pipeline.windows("test")
+series = {"real": test["target"].ravel()}
+series["generated"] = pipeline.combine(test["coarse"], np.random.default_rng(7)).ravel()
+rhythm = [np.corrcoef(row[:-orbit], row[orbit:])[0, 1] for row in series.values()]
 say(
-    "Correlation of each stretch with itself one orbit later: "
+    "Correlation of a real and of a generated series with itself one orbit later: "
     + ", ".join(f"{value:.2f}" for value in rhythm)
     + "."
 )
-assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[experiment.settings.budget]
+assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[budget]
 
 # %% [markdown]
 # The noise betrays them all the same. Each window brings the shared pattern along, so that the noise of a generated series repeats
-# itself every half window, however long the series is:
+# itself in every window, however long the series is:
 
 # %%
-from enhsim_tf import extract_noise
+from enhsim_tf.paper.noise import extract_noise
 
-repeats = []
-for row, made in zip(series["rows"], series["is_generated"]):
-    rest, _ = extract_noise(row, experiment.settings.noise.moving_average)
-    repeats.append(np.corrcoef(rest[:-250], rest[250:])[0, 1])
-    print(
-        "generated" if made else "real     ",
-        f"correlation of the noise with itself 250 samples later: {repeats[-1]:.2f}",
-    )
-made, repeats = np.array(series["is_generated"]), np.array(repeats)
-least = {"full": 0.3, "smoke": 0.05}[experiment.settings.budget]
-assert repeats[made].min() > least > repeats[~made].max()
+repeats = {}
+for name, row in series.items():
+    rest, _ = extract_noise(row, pipeline.settings.moving_average)
+    repeats[name] = np.corrcoef(rest[:-size], rest[size:])[0, 1]
+    print(f"{name:10} correlation of the noise with itself one window later: {repeats[name]:.2f}")
+assert repeats["generated"] > {"full": 0.3, "smoke": 0.05}[budget] > abs(repeats["real"])
 
 # %% [markdown]
 # So the answer to the question is no. A difference that nobody sees can be the one that a detector sees best (notebook 13).
@@ -164,10 +164,10 @@ assert repeats[made].min() > least > repeats[~made].max()
 # %%
 from sklearn.metrics import roc_auc_score
 
-from enhsim_tf.realism.window_features import window_features
+from enhsim_tf.common.window_features import window_features
 
-real = experiment.data.noise_windows("test", None)
-generated = experiment.simulator.noise.generate(len(real), seed=1)
+real = pipeline.noise_windows("test", None)
+generated = pipeline.generate_noise(len(real), np.random.default_rng(1))
 features, label = window_features(np.concatenate([generated, real])), np.repeat([1, 0], len(real))
 names = ["mean", "log sd", "kurtosis", "maximum", "log sd of steps", "lag-1 correlation"]
 names += [f"power in band {band}" for band in range(features.shape[1] - len(names))]

@@ -16,11 +16,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, slider
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6")
 
 # %% [markdown]
@@ -34,8 +34,8 @@ claim("C6")
 # that is not in the telemetry.
 
 # %%
-telemetry = experiment.data.channels[0].train
-values, width = telemetry.values.astype(float), experiment.settings.noise.moving_average
+telemetry = pipeline.parts["train"]
+values, width = telemetry.values.astype(float), pipeline.settings.moving_average
 
 
 def moving_average(values, width):
@@ -55,20 +55,20 @@ say(f"{len(values):,} samples of telemetry, a width of {width} samples, {len(noi
 # differ by a little more than that:
 
 # %%
-from enhsim_tf import extract_noise
+from enhsim_tf.paper.noise import extract_noise
 
 packaged, _ = extract_noise(telemetry.values, width)
 np.testing.assert_allclose(noise, packaged, atol=1e-6)
 
 # %%
-arrays = show(experiment, "fig08_source_noise")
+show(pipeline, "fig08_source_noise")
 
 # %% [markdown]
 # *What to see:* an even band of noise. In this example the true noise is known, because the telemetry was made by adding white noise to
 # two sines. The filter finds almost its standard deviation:
 
 # %%
-chosen = experiment.settings.telemetry
+chosen = pipeline.settings
 true_sd, half = chosen.noise_sd, width // 2
 say(f"Standard deviation of the noise: **{noise.std():.4f}** extracted, **{true_sd}** put in.")
 assert abs(noise.std() / true_sd - 1) < 0.03
@@ -84,7 +84,7 @@ assert abs(noise.std() / true_sd - 1) < 0.03
 #    $1-c$ of its amplitude $A$ is called noise, with a variance of $A^2(1-c)^2/2$.
 
 # %%
-periods = np.array([chosen.orbit_period_s, chosen.rotation_period_s])
+periods = np.array([chosen.orbit_period, chosen.rotation_period])
 amplitudes = np.array([chosen.orbit_amplitude, chosen.rotation_amplitude])
 
 

@@ -14,11 +14,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6")
 
 # %% [markdown]
@@ -36,11 +36,11 @@ generator = keras.Sequential(
         keras.Input((16,)),
         layers.Dense(64, activation="relu", kernel_initializer="he_uniform"),
         layers.BatchNormalization(),
-        layers.Dense(500, activation="tanh", kernel_initializer="he_uniform"),
+        layers.Dense(500, activation="tanh"),
         layers.Reshape((500, 1)),
     ]
 )
-table = show(experiment, "fig09_generator")
+show(pipeline, "fig09_generator")
 
 # %% [markdown]
 # *What to see:* a small network, and a narrow one. All that it knows of noise enters through 16 numbers and passes 64 neurons. A Dense
@@ -50,7 +50,7 @@ table = show(experiment, "fig09_generator")
 # %%
 by_hand = [64 * (16 + 1), 4 * 64, 500 * (64 + 1), 0]
 say(f"Parameters by layer: {by_hand}, together **{generator.count_params():,}**.")
-assert table["parameters"].tolist() == by_hand and generator.count_params() == sum(by_hand) == table["total"]
+assert by_hand == [layer.count_params() for layer in generator.layers]
 
 # %% [markdown]
 # ## One update
@@ -84,22 +84,25 @@ def update_generator(generator, discriminator, optimizer, latent):
 # rounding.
 
 # %%
-from enhsim_tf import NoiseGAN
+import dataclasses
 
-packaged, discriminator = experiment.untrained_noise_networks()
+from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator
+
+settings = dataclasses.replace(pipeline.settings, dropout=0.0)  # so that nothing is dropped at random
+packaged, discriminator = build_generator(settings), build_discriminator(settings)
 generator.set_weights(packaged.get_weights())
-gan = NoiseGAN(packaged, discriminator, seed=0)
+gan = NoiseGAN(packaged, discriminator, settings)
+gan.compile()
 latent = keras.random.normal((200, 16), seed=keras.random.SeedGenerator(0))  # what the package draws first
 
 first = generator.get_weights()
 loss = update_generator(generator, discriminator, keras.optimizers.Adam(0.001), latent)
-gan._update_generator()
+gan.train_generator()
 for ours, theirs in zip(generator.get_weights(), packaged.get_weights()):
     np.testing.assert_allclose(ours, theirs, atol=1e-5)
 moved = float(np.abs(generator.get_weights()[0] - first[0]).max())
 say(
-    f"Loss before the update: **{loss:.2f}**: neither network is trained, and this discriminator happens to take nearly "
-    f"everything for real. The weights of the first layer moved by up to {moved:.4f}."
+    f"Loss before the update: **{loss:.2f}**; guessing gives {np.log(2):.2f}. Neither network is trained. The weights of the first layer moved by up to {moved:.4f}."
 )
 
 # %% [markdown]
@@ -116,7 +119,7 @@ say(
 # sort the dimensions by their share of the variance, which are the squared singular values of the windows:
 
 # %%
-trained = experiment.simulator.noise.generator
+trained = pipeline.generator
 first, normalise, last, _ = trained.layers
 latent = np.random.default_rng(0).standard_normal((1_000, 16), "float32")
 hidden = np.asarray(normalise(first(latent)), float)
@@ -124,7 +127,7 @@ before_tanh = hidden @ np.asarray(last.kernel, float) + np.asarray(last.bias, fl
 generated = np.asarray(trained(latent))[:, :, 0]
 np.testing.assert_allclose(np.tanh(before_tanh), generated, atol=1e-4)  # 32-bit sums of 64 products
 
-real = experiment.data.noise_windows("train", 1_000, "notebook")
+real = pipeline.noise_windows("train", 1_000, "notebook")
 
 
 def shares_of_variance(windows):
@@ -158,7 +161,7 @@ with drawing(alt, height=2.3, title=title) as panel:
 # $$\mathrm{rank}=\exp\left(-\sum_i p_i\ln p_i\right).$$
 
 # %%
-from enhsim_tf.realism.measures import effective_rank
+from enhsim_tf.common.measures import effective_rank
 
 
 def rank(windows):
@@ -212,14 +215,10 @@ def rank_of_untrained(latent, hidden):
 
 
 # %%
-from enhsim_tf.noise.generator import build_generator
-
-
 def expected(number, units):
     draws = np.random.default_rng(0).standard_normal((1_000, number), "float32")
-    return effective_rank(
-        build_generator(latent=number, hidden_units=units).predict(draws, verbose=0)[:, :, 0]
-    )
+    changed = dataclasses.replace(settings, latent=number, generator_units=units)
+    return effective_rank(build_generator(changed).predict(draws, verbose=0)[:, :, 0])
 
 
 check_answer(
@@ -255,7 +254,7 @@ check_answer(
 #             keras.Input((latent,)),
 #             layers.Dense(hidden, activation="relu", kernel_initializer="he_uniform"),
 #             layers.BatchNormalization(),
-#             layers.Dense(500, activation="tanh", kernel_initializer="he_uniform"),
+#             layers.Dense(500, activation="tanh"),
 #         ]
 #     )
 #     draws = np.random.default_rng(0).standard_normal((1_000, latent), "float32")

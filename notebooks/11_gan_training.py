@@ -15,22 +15,25 @@
 
 # %%
 import numpy as np
-from lesson_tools import ROOT, check_answer, claim, drawing, open_experiment, say, show, slider
+from lesson_tools import ROOT, check_answer, claim, drawing, open_pipeline, say, show, slider
 
 from enhsim_tf.common.plot_style import GENERATED, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C4", "C5")
 
 # %%
-numbers = show(experiment, "fig11_gan_training")
+show(pipeline, "fig11_gan_training")
 
 # %% [markdown]
 # *What to see:* in each phase exactly one box learns, and the error of the second phase travels *through* the box that does not.
 
 # %%
-say(f"Rows of each kind in a batch: {int(numbers['batch_size'])}; latent numbers: {int(numbers['latent'])}.")
-assert numbers["batch_size"] == 200 and numbers["latent"] == 16 and not numbers["mixed_batch"]
+settings = pipeline.settings
+say(
+    f"Rows in a batch: {settings.rows}, of which {settings.rows_of_each_kind} are real; latent numbers: {settings.latent}."
+)
+assert (settings.rows, settings.rows_of_each_kind, settings.latent) == (200, 100, 16)
 
 # %% [markdown]
 # ## The whole loop on one page
@@ -42,28 +45,30 @@ import keras
 import tensorflow as tf
 from keras import layers
 
-he = "he_uniform"
+he = "he_uniform"  # where the author's code has it; elsewhere Keras' default
 generator = keras.Sequential(
     [
         keras.Input((16,)),
         layers.Dense(64, activation="relu", kernel_initializer=he),
         layers.BatchNormalization(),
-        layers.Dense(500, activation="tanh", kernel_initializer=he),
+        layers.Dense(500, activation="tanh"),
         layers.Reshape((500, 1)),
     ]
 )
 discriminator = keras.Sequential(
     [
         keras.Input((500, 1)),
-        layers.Conv1D(500, 20, strides=4, activation="relu", kernel_initializer=he),
+        layers.Conv1D(500, 20, strides=4, activation="relu"),
+        layers.Dropout(0.3),
         layers.GlobalMaxPooling1D(),
         layers.Dense(25, activation="relu", kernel_initializer=he),
-        layers.Dense(1, activation="sigmoid", kernel_initializer=he),
+        layers.Dropout(0.3),
+        layers.Dense(1, activation="sigmoid"),
     ]
 )
 
 # %%
-real_tags, generated_tags = tf.ones((200, 1)), tf.zeros((200, 1))
+real_tags, generated_tags = tf.ones((100, 1)), tf.zeros((100, 1))
 loss = keras.losses.BinaryCrossentropy()
 optimizers = {"discriminator": keras.optimizers.Adam(0.001), "generator": keras.optimizers.Adam(0.001)}
 optimizers["discriminator"].build(discriminator.trainable_variables)
@@ -72,17 +77,18 @@ optimizers["generator"].build(generator.trainable_variables)
 
 @tf.function  # compiles the step; without this line it does the same, but slower
 def train_step(real, latent, latent_again):
-    # phase 1: the discriminator learns to tell real rows (tag 1) from generated ones (tag 0)
-    generated = generator(latent, training=False)
-    for rows, tags in ((real, real_tags), (generated, generated_tags)):
-        with tf.GradientTape() as tape:
-            error = loss(tags, discriminator(rows, training=True))
-        weights = discriminator.trainable_variables
-        optimizers["discriminator"].apply(tape.gradient(error, weights), weights)
+    # phase 1: the discriminator learns to tell real rows (tag 1) from generated ones (tag 0), on one batch of both
+    rows = tf.concat([real, generator(latent, training=False)], 0)
+    tags = tf.concat([real_tags, generated_tags], 0)
+    with tf.GradientTape() as tape:
+        error = loss(tags, discriminator(rows, training=True))
+    weights = discriminator.trainable_variables
+    optimizers["discriminator"].apply(tape.gradient(error, weights), weights)
 
     # phase 2: the tags are reversed, and the discriminator is frozen: its weights are not in the list
     with tf.GradientTape() as tape:
-        error = loss(real_tags, discriminator(generator(latent_again, training=True), training=True))
+        judged = discriminator(generator(latent_again, training=True), training=True)
+        error = loss(tf.ones_like(judged), judged)
     weights = generator.trainable_variables
     optimizers["generator"].apply(tape.gradient(error, weights), weights)
 
@@ -93,29 +99,36 @@ def train_step(real, latent, latent_again):
 #
 # ## The same numbers as the package
 #
-# `NoiseGAN` in `enhsim_tf/noise/gan.py` has this loop. Both start from the same weights and draw the same rows and latent vectors. After
-# five iterations Adam has moved weights by up to 0.01. Rounding is magnified by Adam, which divides small gradients by their own size;
-# the tolerance is a tenth of that movement.
+# `NoiseGAN` in `enhsim_tf/paper/noise.py` is a Keras model with this step. Both start from the same weights and get the same rows and latent
+# vectors; without dropout, whose draws would differ. After five iterations Adam has moved weights by up to 0.005. Rounding is magnified by
+# Adam, which divides small gradients by their own size; the tolerance is a fifth of that movement.
 
 # %%
-from enhsim_tf import NoiseGAN
+import dataclasses
 
-noise = experiment.data.noise_windows("train", experiment.settings.telemetry.num_windows, "noise windows")
-rows = tf.constant(noise[:, :, None])
-packaged = NoiseGAN(*experiment.untrained_noise_networks(), batch_size=200, seed=0)
+from enhsim_tf.paper.noise import NoiseGAN, build_discriminator, build_generator
+
+without_dropout = dataclasses.replace(settings, dropout=0.0)
+packaged = NoiseGAN(build_generator(settings), build_discriminator(without_dropout), without_dropout)
+packaged.compile()
 generator.set_weights(packaged.generator.get_weights())
 discriminator.set_weights(packaged.discriminator.get_weights())
-seeds = keras.random.SeedGenerator(0)
+drops = [layer for layer in discriminator.layers if isinstance(layer, layers.Dropout)]
+noise = pipeline.noise_windows("train", settings.num_windows, "noise windows")
+rng, seeds = np.random.default_rng(0), keras.random.SeedGenerator(settings.seed)
 
 
 def draw_batch():
-    real = tf.gather(rows, keras.random.randint((200,), 0, len(noise), seed=seeds))
-    return real, keras.random.normal((200, 16), seed=seeds), keras.random.normal((200, 16), seed=seeds)
+    real = tf.constant(rng.choice(noise, 100)[:, :, None])
+    return real, *(keras.random.normal((number, 16), seed=seeds) for number in (100, 200))
 
 
+for drop in drops:
+    drop.rate = 0.0
 for _ in range(5):
-    train_step(*draw_batch())
-packaged.fit(noise, num_iterations=5, verbose=False)
+    batch = draw_batch()
+    train_step(*batch)
+    packaged.train_step(batch[0])  # draws the same latent vectors, because its seed is the same
 pairs = ((generator, packaged.generator), (discriminator, packaged.discriminator))
 for ours, theirs in ((a, b) for pair in pairs for a, b in zip(*(model.get_weights() for model in pair))):
     np.testing.assert_allclose(ours, theirs, atol=1e-3)
@@ -123,11 +136,16 @@ for ours, theirs in ((a, b) for pair in pairs for a, b in zip(*(model.get_weight
 # %% [markdown]
 # ## Training, and the noise forming
 #
-# The loop goes on to the paper's number of iterations. Every 20 iterations, we keep what the generator makes of the same 500 latent
-# vectors.
+# From here on with dropout, the loop goes on to the paper's number of iterations. Every 20 iterations, we keep what the generator makes of the
+# same 500 latent vectors.
 
 # %%
-num_iterations = experiment.settings.adversarial.num_iterations
+for drop in drops:
+    drop.rate = 0.3
+train_step = tf.function(
+    train_step.python_function
+)  # compiled anew, because the first one was compiled without dropout
+num_iterations = settings.iterations
 latent = np.random.default_rng(0).standard_normal((500, 16), "float32")
 every, frames = max(num_iterations // 50, 1), {}
 
@@ -157,8 +175,8 @@ recorded = list(frames)
 slider(draw, "iteration", recorded, shown=(recorded[0], recorded[len(recorded) // 5], recorded[-1]))
 
 # %% [markdown]
-# *What to see:* the untrained generator fills the whole range of its tanh. The discriminator recognises that at once, and the generator
-# learns first of all to make smaller noise.
+# *What to see:* the noise of the untrained generator is far too large. The discriminator recognises that at once, and the generator learns
+# first of all to make smaller noise.
 
 # %%
 history = np.array(list(share.values()))
@@ -166,7 +184,7 @@ say(
     f"Standard deviation of the generated noise, as a share of the real one: **{history[0]:.1f}** after {recorded[0]} "
     f"iterations, **{history[len(history) // 5]:.1f}** after {recorded[len(history) // 5]}, and **{history[-1]:.2f}** at the end."
 )
-assert experiment.settings.budget == "smoke" or (history[0] > 2 and abs(np.log(history[-1])) < 0.3)
+assert budget == "smoke" or (history[0] > 2 and abs(np.log(history[-1])) < 0.3)
 
 # %% [markdown]
 # The same as an animation, which the next cell writes at full budget:
@@ -175,7 +193,7 @@ assert experiment.settings.budget == "smoke" or (history[0] > 2 and abs(np.log(h
 import matplotlib.pyplot as plt
 from matplotlib.animation import FuncAnimation, PillowWriter
 
-if experiment.settings.budget == "full":
+if budget == "full":
     figure, panel = plt.subplots(figsize=(5.6, 2.2), dpi=80, layout="constrained")
     (line,) = panel.plot(frames[recorded[0]][0], color=GENERATED, linewidth=0.6)
     panel.axhspan(-2 * real_sd, 2 * real_sd, color=REAL, alpha=0.12, linewidth=0, label="±2 sd of real noise")
@@ -248,29 +266,30 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** "It then trains on the entire batch" could also mean *one* update of the discriminator on 400 mixed rows instead of two on 200
-# each. Write this update. The check compares it with the package's setting `mixed_batch`.
+# **2.** The author's code reads the paper otherwise: *two* updates of the discriminator, one on real rows and one on generated ones. Write this
+# pair of updates. The check compares it with the package's setting `update="two of 200"`.
 
 
 # %%
-def update_on_mixed_batch(
+def update_twice(
     discriminator, optimizer, real, generated
-): ...  # your code: one step of the optimizer; return the error
+): ...  # your code: two steps of the optimizer, first on the real rows; return the second error
 
 
 # %%
-judges = [experiment.untrained_noise_networks()[1] for _ in range(2)]
-maker = experiment.untrained_noise_networks()[0]
-reference = NoiseGAN(maker, judges[1], mixed_batch=True, seed=0)
-draws = keras.random.SeedGenerator(0)
-real_rows = tf.gather(rows, keras.random.randint((200,), 0, len(noise), seed=draws))
-generated_rows = maker(keras.random.normal((200, 16), seed=draws), training=False)
-error = update_on_mixed_batch(judges[0], keras.optimizers.Adam(0.001), real_rows, generated_rows)
-reference.fit(noise, num_iterations=1, verbose=False)
+twice = dataclasses.replace(without_dropout, update="two of 200")
+judges = [build_discriminator(twice) for _ in range(2)]
+reference = NoiseGAN(build_generator(twice), judges[1], twice)
+reference.compile()
+real_rows = tf.constant(np.random.default_rng(1).choice(noise, 200)[:, :, None])
+first_latent = keras.random.normal((200, 16), seed=keras.random.SeedGenerator(settings.seed))
+generated_rows = reference.generator(first_latent, training=False)
+error = update_twice(judges[0], keras.optimizers.Adam(0.001), real_rows, generated_rows)
+reference.train_step(real_rows)
 check_answer(
     error,
     lambda _: all(np.allclose(*w, atol=3e-4) for w in zip(*(judge.get_weights() for judge in judges))),
-    "Join rows and tags with tf.concat(..., 0), and take one gradient of the loss of all 400.",
+    "The tags of real rows are tf.ones((200, 1)), those of generated rows tf.zeros((200, 1)).",
 )
 
 # %% [markdown]
@@ -293,19 +312,19 @@ check_answer(
 # </details>
 
 # %% [markdown]
-# <details><summary>2. One mixed update</summary>
+# <details><summary>2. Two updates</summary>
 #
 # ```python
-# def update_on_mixed_batch(discriminator, optimizer, real, generated):
-#     all_rows, tags = tf.concat([real, generated], 0), tf.concat([real_tags, generated_tags], 0)
-#     with tf.GradientTape() as tape:
-#         error = loss(tags, discriminator(all_rows, training=True))
-#     weights = discriminator.trainable_variables
-#     optimizer.apply(tape.gradient(error, weights), weights)
+# def update_twice(discriminator, optimizer, real, generated):
+#     for rows, tags in ((real, tf.ones((200, 1))), (generated, tf.zeros((200, 1)))):
+#         with tf.GradientTape() as tape:
+#             error = loss(tags, discriminator(rows, training=True))
+#         weights = discriminator.trainable_variables
+#         optimizer.apply(tape.gradient(error, weights), weights)
 #     return float(error)
 # ```
 #
-# Two updates take two steps of Adam in the time of one, so the discriminator learns faster with them. The paper's text leaves it open;
-# the author's public code takes two. The setting of the reproduction is `adversarial.mixed_batch`, so that you can try what it changes.
+# Two updates are two steps of Adam in an iteration, so the discriminator learns faster with them. The paper speaks of one batch; the
+# author's public code takes two. `python -m enhsim_tf.reproduce --set "update=two of 200"` shows what it changes.
 #
 # </details>

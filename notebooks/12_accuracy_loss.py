@@ -15,11 +15,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import ROOT, check_answer, claim, drawing, open_experiment, say, show, verdict
+from lesson_tools import ROOT, check_answer, claim, drawing, open_pipeline, say, show, verdict
 
 from enhsim_tf.common.plot_style import GENERATED, QUIET
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C4", "C5")
 
 # %% [markdown]
@@ -33,8 +33,8 @@ import keras
 import tensorflow as tf
 
 gan = experiment.simulator.noise
-noise = experiment.data.noise_windows("train", experiment.settings.telemetry.num_windows, "noise windows")
-rows, seeds = tf.constant(noise[:, :, None]), keras.random.SeedGenerator(experiment.settings.seed + 1)
+noise = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise windows")
+rows, seeds = tf.constant(noise[:, :, None]), keras.random.SeedGenerator(pipeline.settings.seed + 1)
 
 real = tf.gather(rows, keras.random.randint((gan.batch_size,), 0, len(noise), seed=seeds))
 generated = gan.generator(keras.random.normal((gan.batch_size, 16), seed=seeds), training=False)
@@ -54,7 +54,7 @@ say(", ".join(f"{name.replace('_', ', ')}: **{value:.2f}**" for name, value in b
 # chance in the figure.
 
 # %%
-history = show(experiment, "fig12_accuracy_loss")
+history = show(pipeline, "fig12_accuracy_loss")
 
 # %% [markdown]
 # *What to see:* the discriminator learns first. Then the generator catches up, and both losses stay near ln 2. In the second half, when
@@ -73,8 +73,8 @@ say(
     f"accuracies in the second half: **{together:.2f}**."
 )
 assert abs(both - 0.5) < 0.2
-assert abs(mean_loss - np.log(2)) < {"full": 0.15, "smoke": 3.0}[experiment.settings.budget]
-assert experiment.settings.budget == "smoke" or together < -0.5
+assert abs(mean_loss - np.log(2)) < {"full": 0.15, "smoke": 3.0}[budget]
+assert budget == "smoke" or together < -0.5
 
 # %% [markdown]
 # How much of the wiggling is chance? An accuracy $p$ from $n$ rows has a standard error of $\sqrt{p(1-p)/n}$:
@@ -115,8 +115,8 @@ say(
     f"At the end, the generated noise has **{size[-1]:.2f}** times the standard deviation and **{rank[-1]:.2f}** times the effective rank "
     f"of real noise (from 200 windows of each; with more windows, real noise fills more dimensions, and the ratio falls)."
 )
-assert rank.max() < {"full": 0.5, "smoke": 0.9}[experiment.settings.budget]
-assert abs(np.log(size[-1])) < {"full": 0.1, "smoke": 3.0}[experiment.settings.budget]
+assert rank.max() < {"full": 0.5, "smoke": 0.9}[budget]
+assert abs(np.log(size[-1])) < {"full": 0.1, "smoke": 3.0}[budget]
 
 # %% [markdown]
 # One seed is not enough. The reproduction was repeated with other seeds; this cell reads its results:
@@ -139,7 +139,7 @@ assert np.ptp(shares) < 0.15 and smallest < 0.95
 # ## The verdicts
 
 # %%
-records = verdict(experiment, "C4", "C5")
+records = verdict(pipeline, "C4", "C5")
 assert records[1]["verdict"] in ("reproduced", "partly")
 
 # %% [markdown]
@@ -164,9 +164,10 @@ check_answer(
 # fast, for 400 iterations each. Return the standard deviation of the noise, divided by that of the real noise.
 
 # %%
-from enhsim_tf import NoiseGAN
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.generator import build_generator
+
+from enhsim_tf import NoiseGAN
 
 short = noise[:500, :100]
 

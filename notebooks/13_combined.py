@@ -16,11 +16,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, slider, verdict
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, slider, verdict
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, GENERATED, QUIET, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C7")
 
 # %% [markdown]
@@ -30,13 +30,13 @@ claim("C7")
 
 # %%
 simulator = experiment.simulator
-held_out = experiment.data.windows("test", None)
+held_out = pipeline.windows("test", None)
 clean = simulator.enhance(held_out["coarse"])
 combined = clean + simulator.noise.generate(len(clean), seed=2)
 real = held_out["target"]
 
 # %%
-arrays = show(experiment, "fig13_combined")
+arrays = show(pipeline, "fig13_combined")
 
 # %% [markdown]
 # *What to see:* at a glance the orange line and the black one under it could be exchanged. Three numbers agree with the eye, too:
@@ -60,14 +60,14 @@ for name, windows in {"clean": clean, "combined": combined}.items():
         f"{name.capitalize()}: **{sizes:.3f}** times the real standard deviation, values **{values:.3f}** sd apart on average, "
         f"**{rough:.2f}** times the real roughness."
     )
-if experiment.settings.budget == "full":  # twenty iterations give noise of the wrong size
+if budget == "full":  # twenty iterations give noise of the wrong size
     assert abs(np.log(sizes)) < 0.1 and values < 0.05 and 0.8 < rough < 1.25
 
 # %% [markdown]
 # A classifier that looks at whole windows is not convinced:
 
 # %%
-(record,) = verdict(experiment, "C7")
+(record,) = verdict(pipeline, "C7")
 assert record["value"] > 0.8
 
 # %% [markdown]
@@ -116,8 +116,8 @@ def conformal_threshold(scores, rate):
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.detection.metrics import threshold
 
-number = experiment.settings.detectors.num_windows
-training = experiment.data.windows("train", number, "arms, real")["target"]
+number = pipeline.settings.detector_windows
+training = pipeline.windows("train", number, "arms, real")["target"]
 scores, packaged = residual(fit_pca(training), real), PCAResidual().fit(training).score(real)
 np.testing.assert_allclose(scores, packaged, rtol=0.1)
 for rate in (0.01, 0.05, 0.3):
@@ -130,18 +130,16 @@ for rate in (0.01, 0.05, 0.3):
 # watch real nominal telemetry of a later time. A kind of data that is good enough gives about 1 % there, too.
 
 # %%
-noise_sd = experiment.data.noise_windows(
-    "train", experiment.settings.telemetry.num_windows, "noise windows"
-).std(dtype=float)
+noise_sd = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise windows").std(dtype=float)
 
 
 def kinds_of(purpose):
-    coarse = experiment.data.windows("train", number, purpose)["coarse"]
+    coarse = pipeline.windows("train", number, purpose)["coarse"]
     enhanced, rng = (
         simulator.enhance(coarse),
-        np.random.default_rng(int(experiment.data.draw(purpose).integers(2**31))),
+        np.random.default_rng(int(pipeline.draw(purpose).integers(2**31))),
     )
-    seed = int(experiment.data.draw(purpose).integers(2**31))
+    seed = int(pipeline.draw(purpose).integers(2**31))
     return {
         "coarse": coarse,
         "enhanced": enhanced,
@@ -152,7 +150,7 @@ def kinds_of(purpose):
 
 training_windows, threshold_windows = kinds_of("arms, training"), kinds_of("arms, threshold")
 training_windows["real"] = training
-threshold_windows["real"] = experiment.data.windows("calibration", None)["target"]
+threshold_windows["real"] = pipeline.windows("calibration", None)["target"]
 
 rates = {}
 for kind, windows in training_windows.items():
@@ -160,7 +158,7 @@ for kind, windows in training_windows.items():
     limit = conformal_threshold(residual(model, threshold_windows[kind]), 0.01)
     rates[kind] = np.mean(residual(model, real) > limit)
 
-found = experiment.false_alarms  # the same test in the reproduction, whose first detector is this one
+found = measured("detection", pipeline)  # the same test in the reproduction, whose first detector is this one
 np.testing.assert_allclose(list(rates.values()), found["false_alarm_rate"][:, 0], atol=0.05)
 
 # %%
@@ -184,7 +182,7 @@ with drawing(alt, height=1.9, title=title) as panel:
 
 # %%
 say(", ".join(f"{kind}: **{rate:.1%}**" for kind, rate in rates.items()) + ".")
-if experiment.settings.budget == "full":
+if budget == "full":
     assert rates["enhanced"] > 0.9 and rates["enhanced + GAN noise"] > 0.9
     assert rates["enhanced + Gaussian noise"] < 0.05 and rates["real"] < 0.05
 
@@ -202,7 +200,7 @@ say(
     + ", ".join(f"**{value:.2f}** ({kind})" for kind, value in outside.items())
     + "."
 )
-assert experiment.settings.budget == "smoke" or outside["enhanced + GAN noise"] < outside["real"] / 2
+assert budget == "smoke" or outside["enhanced + GAN noise"] < outside["real"] / 2
 
 # %% [markdown]
 # ## How much noise is right?

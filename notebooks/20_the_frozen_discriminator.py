@@ -18,11 +18,11 @@
 import warnings
 
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show
 
 from enhsim_tf.common.plot_style import DASHED, GENERATED, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C5")
 
 # %%
@@ -38,7 +38,7 @@ print("Keras", keras.__version__)
 # In each phase one network learns and the other is frozen:
 
 # %%
-_ = show(experiment, "fig11_gan_training")
+_ = show(pipeline, "fig11_gan_training")
 
 # %% [markdown]
 # ## The classic pattern
@@ -71,7 +71,7 @@ def small_pair():
     return generator, discriminator
 
 
-real_noise = experiment.data.noise_windows("train", 1_000, "notebook")[:, :100, None]
+real_noise = pipeline.noise_windows("train", 1_000, "notebook")[:, :100, None]
 generator, discriminator = small_pair()
 
 discriminator.compile("adam", "binary_crossentropy")

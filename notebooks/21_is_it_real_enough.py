@@ -15,12 +15,13 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, say, show, verdict
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, verdict
 
+from enhsim_tf.common import measures
 from enhsim_tf.common.plot_style import DASHED, GENERATED, QUIET, REAL
-from enhsim_tf.realism import measures
+from enhsim_tf.noise import distances
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C6", "C8")
 
 # %% [markdown]
@@ -28,13 +29,17 @@ claim("C6", "C8")
 # standard deviation of the training noise. Notebook 05 asks you to tell the first two apart by eye.
 
 # %%
-is_full = experiment.settings.budget == "full"  # a smoke run makes noise of the wrong size
-real = experiment.data.noise_windows("test", None)
-training_noise = experiment.data.noise_windows("train", None)
+is_full = budget == "full"  # a smoke run makes noise of the wrong size
+real = pipeline.noise_windows("test", None)
+training_noise = pipeline.noise_windows("train", None)
 gaussian = training_noise.std(dtype=float) * np.random.default_rng(1).standard_normal(real.shape)
-noises = {"real": real, "GAN": experiment.simulator.noise.generate(len(real), seed=1), "Gaussian": gaussian}
+noises = {
+    "real": real,
+    "GAN": pipeline.generate_noise(len(real), np.random.default_rng(1)),
+    "Gaussian": gaussian,
+}
 looks = {"real": (REAL, "-"), "GAN": (GENERATED, DASHED), "Gaussian": (QUIET, ":")}
-_ = show(experiment, "fig06_real_or_generated_noise")
+_ = show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
 # ## Easy to match: values and spectrum
@@ -53,7 +58,7 @@ def power(windows):
 
 frequency = np.arange(1, 251) / 500  # cycles a sample; a sample is 1 s, so this is in Hz
 spectrum = {name: power(windows) for name, windows in noises.items()}
-np.testing.assert_allclose(spectrum["real"], measures.power_spectrum(real), rtol=1e-9)
+np.testing.assert_allclose(spectrum["real"], distances.power_spectrum(real), rtol=1e-9)
 
 # %%
 alt = "Histogram of the values and mean power spectrum of real, GAN and Gaussian noise"
@@ -183,8 +188,8 @@ from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import PCAResidual
 
 chosen, simulator = experiment.settings.detectors, experiment.simulator
-healthy = experiment.data.windows("test", None)["target"]
-coarse = experiment.data.windows("train", 2 * chosen.num_windows, "notebook")["coarse"]
+healthy = pipeline.windows("test", None)["target"]
+coarse = pipeline.windows("train", 2 * chosen.num_windows, "notebook")["coarse"]
 clean = simulator.enhance(coarse)
 added = {
     "GAN": simulator.noise.generate(len(clean), seed=5),
@@ -236,14 +241,14 @@ assert not is_full or (alarms["GAN"] > 0.9 and alarms["Gaussian"] < 0.05)
 # ## Sufficient for what?
 
 # %%
-found = experiment.false_alarms
+found = measured("detection", pipeline)
 header = "".join(f"{detector:>20}" for detector in found["detectors"])
 print(f"{'false alarms / recall':27}{header}")
 for arm, rates, recall in zip(found["arms"], found["false_alarm_rate"], found["recall"]):
     print(f"{arm:27}" + "".join(f"{f'{rate:.1%} / {caught:.0%}':>20}" for rate, caught in zip(rates, recall)))
 
 # %%
-records = verdict(experiment, "C6", "C8")
+records = verdict(pipeline, "C6", "C8")
 assert records[0]["verdict"] != "reproduced"
 
 # %% [markdown]
@@ -259,7 +264,7 @@ assert records[0]["verdict"] != "reproduced"
 # By which factor does the *real* noise's rank alone fall if it is computed from 200 instead of 1,000 windows?
 
 # %%
-many = experiment.data.noise_windows("train", 1_000, "exercise")
+many = pipeline.noise_windows("train", 1_000, "exercise")
 factor = None  # your answer: rank from 200 windows, divided by rank from 1,000
 
 # %%

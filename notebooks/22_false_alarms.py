@@ -16,12 +16,12 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, open_study, verdict
+from lesson_tools import check_answer, claim, drawing, open_pipeline, open_study, verdict
 
 from enhsim_tf.common.plot_style import AVERAGE, ENHANCED, QUIET, REAL
 
-experiment = open_experiment()
-is_full = experiment.settings.budget == "full"
+pipeline, budget = open_pipeline()
+is_full = budget == "full"
 claim("C8")
 
 # %% [markdown]
@@ -64,7 +64,7 @@ def threshold_for(scores, rate=0.01):
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.detection.metrics import finite_threshold
 
-data, number = experiment.data, experiment.settings.detectors.num_windows
+data, number = experiment.data, pipeline.settings.detector_windows
 real = data.windows("train", number, "arms, real")["target"]
 calibration = data.windows("calibration", None)["target"]  # later than the training windows
 healthy = data.windows("test", None)["target"]  # later still: real nominal windows that judge every arm
@@ -92,7 +92,7 @@ assert threshold_for(by_hand) == finite_threshold(by_hand, 0.01)[0]
 from enhsim_tf.enhancer.ridge import fit_ridge
 
 simulator, rng = experiment.simulator, np.random.default_rng(22)
-num_learnt = experiment.settings.telemetry.num_windows
+num_learnt = pipeline.settings.num_windows
 pool = data.windows("train", 2 * number, "lesson 22")
 enhanced = simulator.enhance(pool["coarse"])
 noise_sd = data.noise_windows("train", num_learnt, "noise windows").std(dtype=float)
@@ -203,7 +203,7 @@ if is_full:
 # %%
 from studies.common.noise_processes import NOISES
 
-sd, shot, signal = experiment.settings.telemetry.noise_sd, NOISES["shot"], pool["truth"]
+sd, shot, signal = pipeline.settings.noise_sd, NOISES["shot"], pool["truth"]
 
 
 def draw_shot(num_windows):
@@ -301,7 +301,7 @@ assert all((rate < 0.02) == (kind in gaussian) for kind, rate in rates["residual
 # through a layer of 16 units and scores what it cannot restore.
 
 # %%
-_ = verdict(experiment, "C8")
+_ = verdict(pipeline, "C8")
 
 # %% [markdown]
 # The noise of the training windows decides the false alarms. Its scale must be right to a few per cent, but that is not enough: with the

@@ -16,11 +16,11 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_experiment, open_study, say, slider
+from lesson_tools import check_answer, claim, drawing, open_pipeline, open_study, say, slider
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
 
-experiment = open_experiment()
+pipeline, budget = open_pipeline()
 claim("C9")
 
 # %% [markdown]
@@ -43,7 +43,7 @@ def errors_of(estimate, truth):  # of each window
 faults = {"nominal": None, "stuck": Degraded("stuck", 0.5), "drift": Degraded("drift", 0.5)}
 pairs = {name: windows_of(fault) for name, fault in faults.items()}
 nominal_sd = pairs["nominal"][1].std(dtype=float)
-enhanced = {name: experiment.simulator.enhance(coarse) for name, (coarse, _) in pairs.items()}
+enhanced = {name: pipeline.enhance(coarse) for name, (coarse, _) in pairs.items()}
 error = {name: errors_of(enhanced[name], truth) for name, (_, truth) in pairs.items()}
 median = {name: np.median(values) for name, values in error.items()}
 
@@ -69,7 +69,7 @@ say(
     + ", ".join(f"{name} **{value:.2f}**" for name, value in median.items())
     + "."
 )
-assert experiment.settings.budget == "smoke" or median["drift"] > 2 * median["nominal"]
+assert budget == "smoke" or median["drift"] > 2 * median["nominal"]
 
 # %% [markdown]
 # ## A score that needs no truth
@@ -84,10 +84,8 @@ assert experiment.settings.budget == "smoke" or median["drift"] > 2 * median["no
 # the training windows. The weight ¼ is a choice: nominal waves in new phases should count, but less than new shapes.
 
 # %%
-number = experiment.settings.telemetry.num_windows
-learned = np.unique(
-    experiment.data.windows("train", number, "training windows")["coarse"].astype(float), axis=0
-)
+number = pipeline.settings.num_windows
+learned = np.unique(pipeline.windows("train", number, "training windows")["coarse"].astype(float), axis=0)
 mean = learned.mean(axis=0)
 _, sizes, directions = np.linalg.svd(learned - mean, full_matrices=False)
 explained = np.cumsum(sizes**2) / np.sum(sizes**2)
@@ -105,7 +103,7 @@ def out_of_range(windows):
 
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 
-packaged = OutOfRange().fit(experiment.data.windows("train", number, "training windows")["coarse"])
+packaged = OutOfRange().fit(pipeline.windows("train", number, "training windows")["coarse"])
 stuck = pairs["stuck"][0]
 np.testing.assert_allclose(
     out_of_range(stuck), packaged.score(stuck), atol=2e-3
@@ -117,7 +115,7 @@ np.testing.assert_allclose(
 # %%
 from enhsim_tf.detection.metrics import finite_threshold
 
-limit, rate = finite_threshold(out_of_range(experiment.data.windows("calibration", None)["coarse"]), 0.01)
+limit, rate = finite_threshold(out_of_range(pipeline.windows("calibration", None)["coarse"]), 0.01)
 scores = {name: out_of_range(coarse) for name, (coarse, _) in pairs.items()}
 flagged = {name: np.mean(values > limit) for name, values in scores.items()}
 
@@ -148,7 +146,7 @@ say(
     f"Out of range: nominal **{flagged['nominal']:.1%}**, stuck **{flagged['stuck']:.0%}**, drift **{flagged['drift']:.0%}**. "
     f"Rank correlation of score and error: **{correlation:.2f}**."
 )
-assert np.median(scores["drift"]) > limit and (experiment.settings.budget == "smoke" or correlation > 0.5)
+assert np.median(scores["drift"]) > limit and (budget == "smoke" or correlation > 0.5)
 
 # %% [markdown]
 # The slider changes the severity of a stuck mechanism: it stands still for that share of the time after the onset.
@@ -157,7 +155,7 @@ assert np.median(scores["drift"]) > limit and (experiment.settings.budget == "sm
 # %%
 def draw(severity):
     coarse, truth = windows_of(Degraded("stuck", severity))
-    estimate = experiment.simulator.enhance(coarse)
+    estimate = pipeline.enhance(coarse)
     share, now = np.mean(out_of_range(coarse) > limit), np.median(errors_of(estimate, truth))
     title = f"Stuck for {severity:.0%} of the time: error {now:.2f}, {share:.0%} of the windows out of range"
     with drawing(f"A window that is stuck at severity {severity}", height=1.7, title=title) as panel:
@@ -186,7 +184,7 @@ from enhsim_tf.enhancer.ridge import fit_ridge
 severities = (0.1, 0.25, 0.5, 1.0)
 cases = {(mode, severity): windows_of(Degraded(mode, severity)) for mode in MODES for severity in severities}
 half = len(pairs["nominal"][0]) // 2  # the first half trains, the second half judges
-noise_sd, rng = experiment.settings.telemetry.noise_sd, np.random.default_rng(0)
+noise_sd, rng = pipeline.settings.noise_sd, np.random.default_rng(0)
 
 
 def fitted(chosen):
@@ -209,7 +207,7 @@ table = {
     f"ridge, {name}": [mean_error(ridge.predict, severity) for severity in severities]
     for name, ridge in ridges.items()
 }
-table["network, nominal"] = [mean_error(experiment.simulator.enhance, severity) for severity in severities]
+table["network, nominal"] = [mean_error(pipeline.enhance, severity) for severity in severities]
 table["coarse simulator"] = [mean_error(lambda windows: windows, severity) for severity in severities]
 
 # %%
@@ -242,10 +240,7 @@ for name, values in table.items():
         + "".join(f"   severity {severity}: {value:.2f}" for severity, value in zip(severities, values))
     )
 assert table["ridge, nominal and faults"][2] < table["ridge, nominal"][2]
-assert (
-    experiment.settings.budget == "smoke"
-    or table["ridge, nominal and faults"][3] < table["network, nominal"][3]
-)
+assert budget == "smoke" or table["ridge, nominal and faults"][3] < table["network, nominal"][3]
 
 # %% [markdown]
 # ## Does it hold elsewhere?
@@ -303,9 +298,7 @@ def error_ratio():
 def expected():
     everything = [pairs["nominal"], *cases.values()]
     score = np.concatenate([packaged.score(coarse) for coarse, _ in everything])
-    wrong = np.concatenate(
-        [errors_of(experiment.simulator.enhance(coarse), truth) for coarse, truth in everything]
-    )
+    wrong = np.concatenate([errors_of(pipeline.enhance(coarse), truth) for coarse, truth in everything])
     return np.median(wrong[score > limit]) / np.median(wrong[score <= limit])
 
 
@@ -324,7 +317,7 @@ check_answer(
 # share = {mode: np.mean(out_of_range(cases[mode, 0.25][0]) > limit) for mode in MODES}
 # for mode in MODES:
 #     coarse, truth = cases[mode, 0.25]
-#     wrong = np.median(errors_of(experiment.simulator.enhance(coarse), truth))
+#     wrong = np.median(errors_of(pipeline.enhance(coarse), truth))
 #     print(f"{mode:14} {share[mode]:4.0%} flagged, error {wrong:.2f}")
 # least_flagged = min(share, key=share.get)
 # ```
@@ -341,7 +334,7 @@ check_answer(
 # def error_ratio():
 #     everything = [pairs["nominal"], *cases.values()]
 #     score = np.concatenate([out_of_range(coarse) for coarse, _ in everything])
-#     wrong = np.concatenate([errors_of(experiment.simulator.enhance(coarse), truth) for coarse, truth in everything])
+#     wrong = np.concatenate([errors_of(pipeline.enhance(coarse), truth) for coarse, truth in everything])
 #     return np.median(wrong[score > limit]) / np.median(wrong[score <= limit])
 #
 #

@@ -15,12 +15,12 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, drawing, open_experiment, open_study, say, slider
+from lesson_tools import check_answer, drawing, open_pipeline, open_study, say, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DASHED, ENHANCED, QUIET, REAL
 
-experiment = open_experiment()  # of the paper's example, only the budget is used here
-is_full = experiment.settings.budget == "full"
+pipeline, budget = open_pipeline()  # of the paper's example, only the budget is used here
+is_full = budget == "full"
 
 # %% [markdown]
 # ## A channel that drifts

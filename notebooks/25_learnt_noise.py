@@ -16,14 +16,14 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, drawing, open_experiment, open_study
+from lesson_tools import check_answer, drawing, open_pipeline, open_study
 
+from enhsim_tf.common import measures, two_sample
 from enhsim_tf.common.plot_style import AVERAGE, GENERATED, QUIET, REAL
-from enhsim_tf.realism import measures, two_sample
 from studies.common.noise_gallery import GALLERY
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
-is_full = open_experiment().settings.budget == "full"  # nothing else of the paper's example is used here
+is_full = open_pipeline().settings.budget == "full"  # nothing else of the paper's example is used here
 number, window = 1_000 if is_full else 60, 500
 
 

@@ -16,13 +16,13 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, drawing, open_experiment, open_study, say, slider
+from lesson_tools import check_answer, drawing, open_pipeline, open_study, say, slider
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
 from enhsim_tf.enhancer import ridge as packaged
 
-experiment = open_experiment()
-is_full = experiment.settings.budget == "full"
+pipeline, budget = open_pipeline()
+is_full = budget == "full"
 
 # %% [markdown]
 # ## Baselines on the paper's example
@@ -49,13 +49,13 @@ small = np.random.default_rng(0).normal(size=(3, 60, 20))
 np.testing.assert_allclose(nearest_mean(*small, 5), packaged.nearest_windows(*small, 5), atol=1e-5)
 
 # %%
-train = experiment.data.windows("train", experiment.settings.telemetry.num_windows, "training windows")
-test = experiment.data.windows("test", None)
+train = pipeline.windows("train", pipeline.settings.num_windows, "training windows")
+test = pipeline.windows("test", None)
 ridge = packaged.fit_ridge(train["coarse"], train["target"], train["start"])
 k = packaged.choose_num_neighbours(train["coarse"], train["target"], train["start"])
 estimates = {
     "coarse simulator": test["coarse"],
-    "network of the paper": experiment.simulator.enhance(test["coarse"]),
+    "network of the paper": pipeline.enhance(test["coarse"]),
     "mean of the nearest windows": nearest_mean(train["coarse"], train["target"], test["coarse"], k),
     "ridge regression": ridge.predict(test["coarse"]),
 }
@@ -89,18 +89,18 @@ coarse, residual_windows = train["coarse"], np.empty_like(train["target"])
 for learnt, held_out in packaged.time_blocks(train["start"], 5, coarse.shape[1]):
     fitted = packaged.fit_ridge(coarse[learnt], train["target"][learnt], train["start"][learnt])
     residual_windows[held_out] = train["target"][held_out] - fitted.predict(coarse[held_out])
-number = experiment.settings.detectors.num_windows
-more = experiment.data.windows("train", 2 * number, "strong baselines")["coarse"]
+number = pipeline.settings.detector_windows
+more = pipeline.windows("train", 2 * number, "strong baselines")["coarse"]
 rng = np.random.default_rng(3)
 drawn = residual_windows[rng.integers(0, len(residual_windows), 2 * number)]
 generated = {
-    "two networks (the paper)": experiment.simulator.enhance(more)
-    + experiment.simulator.noise.generate(2 * number, seed=3),
+    "two networks (the paper)": pipeline.enhance(more)
+    + pipeline.generate_noise(2 * number, np.random.default_rng(3)),
     "no network (ridge + residual windows)": ridge.predict(more) + drawn,
 }
 alarms = {}
 for name, windows in generated.items():
-    detector = PCAResidual(experiment.settings.detectors.num_components).fit(windows[:number])
+    detector = PCAResidual(pipeline.settings.num_components).fit(windows[:number])
     limit = metrics.finite_threshold(detector.score(windows[number:]), 0.01)[0]
     alarms[name] = np.mean(detector.score(test["target"]) > limit)
 say(
@@ -265,7 +265,7 @@ with drawing(alt, height=1.8, title=title) as panel:
 # The network need not learn what a matrix can. Fit the matrix, and train a small network on what it leaves. This is the whole enhancer:
 
 # %%
-from enhsim_tf.keras_tools.backend import keras
+from enhsim_tf.common.backend import keras
 
 num_epochs = 12 if is_full else 2
 

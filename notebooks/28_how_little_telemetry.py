@@ -18,7 +18,7 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, drawing, open_experiment, open_study, say, slider
+from lesson_tools import check_answer, drawing, open_pipeline, open_study, say, slider
 
 from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 from enhsim_tf.detection import metrics
@@ -27,7 +27,7 @@ from enhsim_tf.enhancer import ridge as packaged
 from studies.common.settings import make_settings
 from studies.few_windows.cells import World
 
-budget = open_experiment().settings.budget  # nothing else of the paper's example is used here
+budget = open_pipeline().settings.budget  # nothing else of the paper's example is used here
 is_full = budget == "full"
 
 # %% [markdown]

@@ -1,4 +1,4 @@
-"""What the lessons share: the paper's experiment, its figures and claims, published results of studies, pictures, and answers.
+"""What the lessons share: the paper's pipeline, its figures and claims, published results of studies, pictures, and answers.
 
 Jupyter starts the kernel of a lesson in the folder of the lesson, where it finds this module. Importing it puts the clone on the path, so
 that a lesson finds `enhsim_tf` and `studies` beside it. A lesson takes the paper's pipeline from here only.
@@ -28,17 +28,18 @@ from enhsim_tf.common import figure
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.plot_style import STYLE
 from enhsim_tf.common.stages import Stages, default_cache
-from enhsim_tf.reproduce.caption import figure_caption
-from enhsim_tf.reproduce.paper.claims import CLAIMS, judge
-from enhsim_tf.reproduce.paper.figures import FIGURES
-from enhsim_tf.reproduce.paper.pipeline import Experiment
-from enhsim_tf.reproduce.settings import make_settings
+from enhsim_tf.paper.claims import CLAIMS, degraded_windows, judge
+from enhsim_tf.paper.figures import DRAWINGS, FIGURES
+from enhsim_tf.paper.pipeline import Pipeline
+from enhsim_tf.paper.report import needed, short
+from enhsim_tf.paper.settings import make_settings
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
 FULL, SMOKE = "full", "smoke"
-BUDGET = "ENHSIM_TF_BUDGET"  # environment variable with the budget of the experiment
+BUDGET = "ENHSIM_TF_BUDGET"  # environment variable with the budget of the pipeline
 STATIC = (
     "ENHSIM_TF_STATIC"  # set while a lesson is executed to be read: it then holds pictures instead of sliders
 )
@@ -47,50 +48,59 @@ _SCREEN = 120 / 200  # pixels of the page for a pixel of the picture
 _LEDGER = {known.id: known for known in CLAIMS}
 
 
-# -- the experiment ----------------------------------------------------------------------------------------------------------
+# -- the pipeline ------------------------------------------------------------------------------------------------------------
 
 
-def open_experiment(budget: str | None = None) -> Experiment:
-    """Opens the paper's experiment with seed 0.
+def open_pipeline() -> tuple[Pipeline, str]:
+    """Opens the paper's pipeline with seed 0, at the budget in the environment variable `ENHSIM_TF_BUDGET`, or at full budget.
 
     A stage runs when a cell first asks for it, and is kept for all lessons and for `python -m enhsim_tf.reproduce`.
 
-    Args:
-        budget: `full` or `smoke`; None takes it from the environment variable `ENHSIM_TF_BUDGET`, or `full`.
+    Returns:
+        The pipeline and its budget.
 
     Raises:
         InputError: If there is no such budget.
     """
-    from enhsim_tf.keras_tools import backend  # noqa: F401  a lesson that imports Keras itself then has the package's settings
-
-    budget = budget or os.environ.get(BUDGET, FULL)
+    budget = os.environ.get(BUDGET, FULL)
     if budget not in (FULL, SMOKE):
         raise InputError(f"Expected {BUDGET} to be {FULL} or {SMOKE}. Received: {budget!r}.")
-    settings = make_settings(budget)
-    print(f"{budget.capitalize()} budget, seed {settings.seed}.")
+    print(f"{budget.capitalize()} budget, seed 0.")
     stages = Stages(
         default_cache(), tell=lambda line: None if line.endswith("(from the cache)") else print(line)
     )
-    return Experiment(settings, stages, verbose=1)
+    return Pipeline(make_settings(budget), stages), budget
 
 
-def show(experiment: Experiment, name: str) -> dict[str, Any]:
+def show(pipeline: Pipeline, name: str) -> None:
     """Shows a figure of the paper as `figures/` holds it.
 
     Args:
-        experiment: As `open_experiment` returns it.
+        pipeline: As `open_pipeline` returns it.
         name: One of `FIGURES`.
-
-    Returns:
-        The arrays behind the figure.
     """
-    arrays, is_smoke = FIGURES[name].arrays(experiment), experiment.settings.budget == SMOKE
+    if FIGURES[name].drawn_by is None:
+        _show_picture((DRAWINGS / f"{name}.png").read_bytes(), FIGURES[name].alt)
+        return
+    is_smoke = pipeline.settings.iterations < make_settings().iterations
+    caption = f"seed {pipeline.settings.seed} · python -m enhsim_tf.reproduce --only {name.split('_')[0]}"
     with tempfile.TemporaryDirectory() as folder:
-        (path,) = figure.save(
-            name, arrays, folder, figure_caption(name, experiment), is_smoke, ("png",), figures=FIGURES
-        )
+        (path,) = figure.save(name, pipeline, folder, caption, is_smoke, ("png",), figures=FIGURES)
         _show_picture(path.read_bytes(), FIGURES[name].alt)
-    return arrays
+
+
+def degraded(pipeline: Pipeline, mode: str, severity: float) -> "tuple[np.ndarray, np.ndarray]":
+    """Windows of the simulation and of the true signal in a degraded mode, of the same times; both have the shape `(windows, samples)`.
+
+    Args:
+        pipeline: As `open_pipeline` returns it.
+        mode: One of `enhsim_tf.paper.square_wave.MODES`, or `nominal`.
+        severity: From 0 to 1.
+    """
+    coarse, truth = (
+        degraded_windows(pipeline, mode, signal, severity) for signal in (pipeline.simulator, pipeline.truth)
+    )
+    return coarse, truth
 
 
 def claim(*ids: str) -> None:
@@ -100,21 +110,19 @@ def claim(*ids: str) -> None:
         display(Markdown(f"> **{known.id}** (paper, {place}): {known.sentence}"))
 
 
-def verdict(experiment: Experiment, *ids: str) -> list[dict[str, Any]]:
-    """Evaluates claims, and displays each verdict with its finding and what the claim is held to.
+def verdict(pipeline: Pipeline, *ids: str) -> list[dict[str, Any]]:
+    """Evaluates claims, and displays each verdict with the limits that decide it.
 
     Returns:
         The records as `results.json` stores them.
     """
-    records = judge(tuple(_LEDGER[id] for id in ids), experiment)
+    records = [judge(_LEDGER[id], _LEDGER[id].measure(pipeline)) for id in ids]
     for record in records:
-        known, finding = _LEDGER[record["id"]], record["finding"]
-        display(
-            Markdown(
-                f"> **{known.id}: {record['verdict']}.** {finding[0].upper()}{finding[1:]}.\n>\n"
-                f"> *Held to:* {known.statistic}; {known.tolerance}."
-            )
+        limits = "".join(
+            f"\n> - {limit['words']}: {short(limit['value'])}, needed {needed(limit)}"
+            for limit in record["limits"]
         )
+        display(Markdown(f"> **{record['id']}: {record['verdict']}.**\n{limits}"))
     return records
 
 

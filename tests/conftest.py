@@ -1,19 +1,15 @@
-"""Shared configuration and fixtures: TensorFlow settings, the smoke run, and the check of error messages."""
+"""Shared configuration and fixtures: TensorFlow settings, and the check of error messages."""
 
 import contextlib
 import ctypes
 import functools
 import gc
-import json
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
-from filelock import FileLock
 
 if (
     signal.getsignal(signal.SIGINT) is signal.SIG_IGN
@@ -25,7 +21,7 @@ for threads in ("TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS", "OMP_NUM_THR
     os.environ.setdefault(threads, "1")  # two test processes run at a time, and waiting threads would also use CPU time
 
 from enhsim_tf.common.errors import InputError  # noqa: E402
-from enhsim_tf.keras_tools.tensorflow_settings import apply_settings  # noqa: E402
+from enhsim_tf.common.tensorflow_settings import apply_settings  # noqa: E402
 
 apply_settings()  # tests that import Keras directly use the package's settings
 
@@ -59,37 +55,6 @@ def memory_given_back():
     gc.collect()
     if sys.platform == "linux":
         ctypes.CDLL(None).malloc_trim(0)
-
-
-@pytest.fixture(scope="session")
-def smoke_run(tmp_path_factory):
-    """One undisturbed smoke run of the reproduction, shared by all test processes and made by the first that needs it.
-
-    Returns:
-        The folders `out` and `cache`, the output and exit code of the command, `touched`, which says whether it changed
-        committed files, and the function `committed`, with which other runs can be checked.
-    """
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "smoke-run"
-    with FileLock(f"{folder}.lock"):
-        if not (folder / "said.json").is_file():
-            before = committed()
-            options = ["--budget", "smoke", "--out", folder / "out", "--cache", folder / "cache"]
-            done = subprocess.run(
-                [sys.executable, "-m", "enhsim_tf.reproduce", *options], cwd=ROOT, capture_output=True, text=True, timeout=600
-            )
-            said = {"returncode": done.returncode, "stdout": done.stdout, "stderr": done.stderr, "touched": before != committed()}
-            folder.mkdir(exist_ok=True)
-            (folder / "said.json").write_text(json.dumps(said), encoding="utf-8")
-    said = json.loads((folder / "said.json").read_text(encoding="utf-8"))
-    assert said["returncode"] == 0, said["stderr"]
-    return SimpleNamespace(out=folder / "out", cache=folder / "cache", committed=committed, **said)
-
-
-def committed():
-    """Modification times and sizes of the figures and the README, which no smoke run may change."""
-    files = [ROOT / "README.md", *sorted((ROOT / "figures").rglob("*"))]
-    return [(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
 
 
 @pytest.fixture(scope="module")

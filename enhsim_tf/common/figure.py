@@ -71,7 +71,7 @@ def save(
     figure = figures[name].draw(data)
     width, height = figure.get_size_inches()
     lines = textwrap.wrap(caption, int((width - 2 * EDGE) * 20.5))
-    small = {"size": 7, "color": QUIET, "linespacing": 1.05}
+    small = {"size": 7, "color": QUIET, "linespacing": 1.05, "parse_math": False}
     figure.text(EDGE / width, 0.06 / height, "\n".join(lines), **small, va="bottom", gid="caption")
     if is_smoke:
         mark = {"size": 6.2 * width, "weight": "bold", "color": GENERATED, "alpha": 0.22, "rotation": 15}

@@ -40,7 +40,7 @@ def new_sheet(width: float, height: float, title: str, subtitle: str = "") -> tu
     down = 0.10
     for text, size, weight, color, letters_an_inch in ((title, 9, "bold", REAL, 13.5), (subtitle, 7.5, "normal", QUIET, 18.5)):
         for line in textwrap.wrap(text, int((width - 2 * EDGE) * letters_an_inch)):
-            figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color)
+            figure.text(EDGE / width, 1 - (down + size / 72) / height, line, size=size, weight=weight, color=color, parse_math=False)
             down += 1.35 * size / 72
         down += 0.04
     return figure, down

@@ -23,7 +23,7 @@ class DenseAutoencoder:
 
     def fit(self, windows: np.ndarray) -> "DenseAutoencoder":
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
-        from enhsim_tf.keras_tools.training import dense_stack, fit_windows
+        from enhsim_tf.common.training import dense_stack, fit_windows
 
         windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
@@ -63,7 +63,7 @@ class ConvolutionalAutoencoder:
 
     def fit(self, windows: np.ndarray) -> "ConvolutionalAutoencoder":
         """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
-        from enhsim_tf.keras_tools.training import fit_windows
+        from enhsim_tf.common.training import fit_windows
 
         windows = flat(windows)
         self._mean, self._scale = np.mean(windows), np.std(windows)
@@ -74,14 +74,14 @@ class ConvolutionalAutoencoder:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
-        from enhsim_tf.keras_tools.training import predict_windows
+        from enhsim_tf.common.training import predict_windows
 
         scaled = self._scaled(flat(windows))
         return np.mean((predict_windows(self._network, scaled, 1_024) - scaled) ** 2, axis=1)
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
-        from enhsim_tf.keras_tools.backend import keras
-        from enhsim_tf.keras_tools.training import seeded_initialiser
+        from enhsim_tf.common.backend import keras
+        from enhsim_tf.common.training import seeded_initialiser
 
         missing = -samples % self.stride**2  # number of zeros that are appended to a window and removed from the output
         layers, kernels = keras.layers, [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)]

@@ -8,7 +8,7 @@ given in units of their standard deviations. `registry` lists all detectors by n
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.realism.window_features import window_features
+from enhsim_tf.common.window_features import window_features
 
 
 def flat(windows: np.ndarray) -> np.ndarray:

@@ -25,8 +25,7 @@ BUILT_IN = {
     "dense autoencoder": "enhsim_tf.detection.autoencoders:DenseAutoencoder",
     "convolutional autoencoder": "enhsim_tf.detection.autoencoders:ConvolutionalAutoencoder",
 }
-"""Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last.
-"""
+"""Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last."""
 
 BUILT_IN_CONTROLS = {
     "random score": "enhsim_tf.detection.detectors:RandomScore",
@@ -76,8 +75,7 @@ def register(name: str, factory: Callable[[int], Any]) -> None:
     - PyOD: `fit(X)` and `decision_function(X)`, where higher is more anomalous.
 
     An estimator that has `score_samples` is taken for one of scikit-learn, whose outlier detectors also have a
-    `decision_function` of the opposite sign. The experiments of `enhsim_tf.reproduce` keep their results by the code of the
-    built-in detectors, so add a detector that is to take part in them to `BUILT_IN` instead.
+    `decision_function` of the opposite sign. The studies run the detectors of `BUILT_IN`.
 
     Args:
         name: The detector's name in tables, and the value of `ScoreOptions.detector`.

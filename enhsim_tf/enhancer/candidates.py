@@ -239,8 +239,8 @@ def _keeping_the_shape(name: str, inputs: np.ndarray, targets: np.ndarray, centr
 
 def _train(name: str, rows: np.ndarray, wanted: np.ndarray, outputs: int, seed: int, epochs: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Trains the paper's network, or a small one on what ridge regression leaves; returns kernel and bias of each layer."""
-    from enhsim_tf.keras_tools.backend import keras
-    from enhsim_tf.keras_tools.training import dense_stack, fit_windows
+    from enhsim_tf.common.backend import keras
+    from enhsim_tf.common.training import dense_stack, fit_windows
 
     units = (outputs, 3_200, 3_200, outputs) if name == NETWORK else (_SMALL_UNITS, _SMALL_UNITS, outputs)
     network = dense_stack(rows.shape[1], units, seed, "enhancer")

@@ -5,8 +5,8 @@ The functions work on arrays of windows. They do not depend on the noise, or on 
 
 import numpy as np
 
-from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import dense_stack, predict_windows
+from enhsim_tf.common.backend import keras
+from enhsim_tf.common.training import dense_stack, predict_windows
 
 
 def build_enhancer(

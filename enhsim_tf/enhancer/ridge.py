@@ -44,11 +44,6 @@ class Ridge:
     factors: tuple[np.ndarray, np.ndarray] | None = None
     chosen: tuple[float, ...] = ()
 
-    @property
-    def is_at_edge(self) -> bool:
-        """Whether the chosen penalty is the smallest or the largest one tried, so that another may be better."""
-        return self.penalty in (self.penalties.min(), self.penalties.max())
-
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Predicts the targets of input windows.
 

@@ -32,7 +32,7 @@ def state_of(model: NoiseModel) -> NoiseState:
         model: A noise model of `candidates`.
 
     Raises:
-        InputError: If it is a model of another class, such as a GAN, whose networks are not saved.
+        InputError: If it is a model of another class, which is not saved.
     """
     match model:
         case GaussianNoise():

@@ -15,11 +15,11 @@ from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.neighbors import KNeighborsRegressor
 
+from enhsim_tf.common import measures
+from enhsim_tf.common.two_sample import two_sample_auc
 from enhsim_tf.paper.detectors import DETECTORS, threshold
 from enhsim_tf.paper.pipeline import Pipeline
 from enhsim_tf.paper.square_wave import MODES, Signal, degrade
-from enhsim_tf.realism import measures
-from enhsim_tf.realism.two_sample import two_sample_auc
 
 REPRODUCED, PARTLY, NOT_REPRODUCED, NOT_MEASURED = "reproduced", "partly", "not reproduced", "not measured"
 OF_UNTESTED = {REPRODUCED: "holds", PARTLY: "holds in part", NOT_REPRODUCED: "does not hold"}
@@ -296,12 +296,13 @@ def sum_resemblance(pipeline: Pipeline) -> Measured:
 # -- C9 ----------------------------------------------------------------------------------------------------------------
 
 
-def degraded_windows(pipeline: Pipeline, mode: str, signal: Signal) -> np.ndarray:
+def degraded_windows(pipeline: Pipeline, mode: str, signal: Signal, severity: float | None = None) -> np.ndarray:
     """Windows of a signal in a degraded mode; the true signal and the simulation get the same times and draws."""
     settings = pipeline.settings
+    severity = settings.severity if severity is None else severity
     begins = pipeline.draw("degraded windows").integers(0, 10**6, settings.detector_windows)
     times = settings.interval * (begins[:, None] + np.arange(settings.window, dtype=np.float64))
-    return degrade(signal, times, mode, settings.severity, settings, pipeline.draw(f"degraded {mode}")).astype(np.float32)
+    return degrade(signal, times, mode, severity, settings, pipeline.draw(f"degraded {mode}")).astype(np.float32)
 
 
 def degraded_errors(pipeline: Pipeline) -> Measured:

@@ -7,10 +7,10 @@ from sklearn.decomposition import PCA
 from sklearn.ensemble import IsolationForest
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.keras_tools.backend import keras
+from enhsim_tf.common.backend import keras
+from enhsim_tf.common.window_features import window_features
 from enhsim_tf.paper.enhancer import Pairs
 from enhsim_tf.paper.settings import Settings
-from enhsim_tf.realism.window_features import window_features
 
 Score = Callable[[np.ndarray], np.ndarray]
 """From windows of shape `(windows, samples)` to one number for each; a higher number is more anomalous."""

@@ -14,6 +14,7 @@ import matplotlib.figure
 import numpy as np
 
 from enhsim_tf.common.atomic_files import replace_file
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.figure import Figure, save
 from enhsim_tf.common.plot_style import (
     AVERAGE,
@@ -35,7 +36,6 @@ from enhsim_tf.common.plot_style import (
     panels,
     title_words,
 )
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.paper.claims import measured
 from enhsim_tf.paper.enhancer import build_enhancer
 from enhsim_tf.paper.noise import build_discriminator, build_generator, extract_noise
@@ -176,14 +176,14 @@ def accuracy_and_loss(pipeline: Pipeline) -> matplotlib.figure.Figure:
     axes = panels(figure, down + 0.2, 1, 2, right=0.8, gap=(0.24, 1.25))[0]
     for panel, key, chance, words in (
         (axes[0], "accuracy", 0.5, "share classified correctly"),
-        (axes[1], "loss", np.log(2), "binary cross-entropy (nats)"),
+        (axes[1], "loss", np.log(2), "cross-entropy (nats)"),
     ):
         panel.axhline(chance, color=LINE, linestyle=":", linewidth=1)
         lines = {name: history[f"{key}_{name}"][chosen] for name in ("real", "generated")}
         panel.plot(history["iteration"][chosen], lines["real"], color=REAL, marker="o", markersize=3.5)
         style = {"linestyle": DASHED, "marker": "s", "markersize": 3.5, "markerfacecolor": "white"}
         panel.plot(history["iteration"][chosen], lines["generated"], color=GENERATED, **style)
-        panel.set_ylim(0, 1.02 if key == "accuracy" else None)
+        panel.set_ylim(0, 1.02 if key == "accuracy" else max(1.02, 1.05 * np.max(list(lines.values()))))
         panel.margins(x=0.03)
         panel.set(xlabel="iteration", ylabel=words)
         panel.xaxis.set_major_formatter("{x:,.0f}")
@@ -237,7 +237,7 @@ def stored_telemetry(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 def layer_table(network: keras.Sequential, title: str) -> matplotlib.figure.Figure:
     """Figures 3, 9 and 10: the layers of a network with their output shapes and numbers of parameters."""
-    height = 0.84 + 0.3 * (len(network.layers) + 1) + FOOT
+    height = 0.9 + 0.3 * (len(network.layers) + 1) + FOOT
     figure, down = new_sheet(SINGLE, height, title)
     axes = figure.add_axes((0, 0, 1, 1), xlim=(0, SINGLE), ylim=(0, height))
     axes.axis("off")
@@ -259,7 +259,7 @@ def layer_table(network: keras.Sequential, title: str) -> matplotlib.figure.Figu
         is_named = layer.name.startswith(("Input", "Hidden", "Output"))
         row(y, (f"{layer.name} ({kind})" if is_named else kind, str(tuple(layer.output.shape)), f"{layer.count_params():,}"), size=8)
         axes.text(EDGE, y - 0.125, layer_details(layer), size=7, color=QUIET)
-    y -= 0.3
+    y -= 0.36
     rule(y + 0.12, 0.5)
     row(y - 0.04, (f"Total, input {network.input_shape}", "", f"{network.count_params():,}"), size=8, weight="bold")
     rule(y - 0.14, 1.0)

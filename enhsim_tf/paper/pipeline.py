@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.measures import autocorrelation
 from enhsim_tf.common.stages import Stages, load_arrays, save_arrays
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.paper import noise, square_wave
 from enhsim_tf.paper.enhancer import build_enhancer, enhance, train_enhancer
 from enhsim_tf.paper.settings import Settings
@@ -27,7 +28,6 @@ from enhsim_tf.paper.telemetry import (
     split,
     true_signal,
 )
-from enhsim_tf.realism.measures import autocorrelation
 
 VERSION = {"telemetry": 1, "enhancer": 1, "noise GAN": 1}
 """Raised when the code of a stage gives other results for the same settings."""
@@ -154,10 +154,13 @@ class Pipeline:
         """The unit of the noise in the GAN: 1 for the example; for other telemetry such that its standard deviation is 0.1 there."""
         if self.own is None:
             return 1.0
-        sd = float(np.std(self.noise_windows("train"), dtype=np.float64))
-        if not sd > 1e-5 * np.std(self.parts["train"].values, dtype=np.float64):  # 32-bit telemetry resolves no less
-            raise InputError(f"Expected noise around the moving average of {self.own.name}. Received: none. Choose another channel.")
-        return 10 * sd
+        sd = {name: float(np.std(self.noise_windows(name), dtype=np.float64)) for name in self.parts}
+        for name, part in self.parts.items():
+            if not sd[name] > 1e-5 * np.std(part.values, dtype=np.float64):  # 32-bit telemetry resolves no less
+                raise InputError(
+                    f"Expected noise around the moving average of {self.own.name}. Received: none in its {name} part. Choose another channel."
+                )
+        return 10 * sd["train"]
 
     # -- 7 and 8: latent space; train generative adversarial model (GAN) -----------------------------------------------
 

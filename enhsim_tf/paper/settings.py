@@ -208,14 +208,17 @@ def make_settings(budget: str = "full", **changed: Any) -> Settings:
 def _converted(field: dataclasses.Field, value: Any) -> Any:
     kind, choices = type(field.default), field.metadata["choices"]
     least = 1 if kind is int and field.name not in ("seed", "num_hidden") else 0
+    end = 2**32 if field.name == "seed" else 1e12
     try:
         converted = {"yes": True, "no": False, True: True, False: False}[value] if kind is bool else kind(value)
-        if (choices and converted not in choices) or (kind in (int, float) and not least <= converted < 1e12):
+        if (choices and converted not in choices) or (kind in (int, float) and not least <= converted < end):
             raise ValueError
     except (KeyError, TypeError, ValueError):
-        expected = " or ".join(choices) or {bool: "yes or no", int: f"a whole number from {least}", float: "a number from 0"}.get(
-            kind, "a word"
-        )
+        expected = " or ".join(choices) or {
+            bool: "yes or no",
+            int: f"a whole number from {least} to below {end:g}",
+            float: "a number from 0",
+        }.get(kind, "a word")
         raise InputError(f"Expected {field.name} to be {expected}. Received: {value!r}.") from None
     return converted
 

@@ -113,13 +113,18 @@ def split(telemetry: Telemetry, window: int, average: int) -> dict[str, Telemetr
     for name, share in PARTS.items():
         stop = first + int(usable * share)
         if stop - first < window + average + 9:
-            needed = 4 * (window + average + 10) + 2 * window
             raise InputError(
-                f"Expected at least {needed:,} samples of telemetry. Received: {len(telemetry.values):,}. Use a longer series."
+                f"Expected at least {samples_needed(window, average):,} samples of telemetry. Received: {len(telemetry.values):,}. "
+                "Use a longer series."
             )
         parts[name] = telemetry.part(first, stop)
         first = stop + window
     return parts
+
+
+def samples_needed(window: int, average: int) -> int:
+    """Number of samples with which `split` makes every part long enough."""
+    return 4 * (window + average + 10) + 2 * window
 
 
 def random_starts(num_samples: int, window: int, number: int, rng: np.random.Generator) -> np.ndarray:
@@ -128,7 +133,12 @@ def random_starts(num_samples: int, window: int, number: int, rng: np.random.Gen
 
 
 def disjoint_starts(num_samples: int, window: int) -> np.ndarray:
-    """First samples of all windows of a series that share no sample, in the order of time."""
+    """First samples of all windows of a series that share no sample, in the order of time.
+
+    Of telemetry of one's own that is so short that there are fewer than 20, up to 200 windows overlap.
+    """
+    if num_samples < 20 * window:
+        return np.unique(np.linspace(0, num_samples - window, 200).astype(int))
     return window * np.arange(num_samples // window)
 
 

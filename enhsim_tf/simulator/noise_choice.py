@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.two_sample import boosted_trees
+from enhsim_tf.common.window_features import DECIMALS, signal_edges, signal_features, window_features
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.noise.candidates import NoiseModel, fit_candidate
 from enhsim_tf.noise.names import CANDIDATES
-from enhsim_tf.realism.two_sample import boosted_trees
-from enhsim_tf.realism.window_features import DECIMALS, signal_edges, signal_features, window_features
 from enhsim_tf.telemetry.quantisation import Levels
 from enhsim_tf.telemetry.windows import disjoint_rows
 

@@ -5,22 +5,30 @@ The scores and flags of the samples stay as they are, because a lasting shift ca
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.simulator.joint import cut, telemetry_of
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
-
-if TYPE_CHECKING:
-    from enhsim_tf.simulator.scoring import Scorer
 
 LEAST_WINDOWS = 8  # least length of a departure, in windows
 LEAST_FLAGGED = 0.9  # share of its samples that are flagged
 _CLEAR = 3.0  # change of a property, in widths of its nominal middle half, from which it is named
 _NUM_WINDOWS = 400  # windows of which properties are measured
+
+
+class Judge(Protocol):
+    """What is needed of a detector, see `scoring.Scorer`."""
+
+    simulator: EnhancedSimulator
+    window: int
+
+    def score_series(self, series: np.ndarray) -> np.ndarray:
+        """Scores every sample of a series of shape `(samples, channels)`."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,7 +49,7 @@ class Departure:
 
 
 def find_departure(
-    scorer: "Scorer", telemetry: Recording, scores: Sequence[np.ndarray], judged: Sequence[tuple[int, int, np.ndarray]]
+    scorer: Judge, telemetry: Recording, scores: Sequence[np.ndarray], judged: Sequence[tuple[int, int, np.ndarray]]
 ) -> Departure | None:
     """Finds a departure that lasts until the end of the telemetry.
 
@@ -180,7 +188,7 @@ def properties(windows: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def _nominal_of(scorer: "Scorer") -> list[np.ndarray]:
+def _nominal_of(scorer: Judge) -> list[np.ndarray]:
     """What the detector sees of the nominal telemetry of the fit."""
     simulator, nominal = scorer.simulator, scorer.simulator.nominal
     if nominal is None:

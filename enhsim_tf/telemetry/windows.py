@@ -14,32 +14,6 @@ from enhsim_tf.telemetry.series import Telemetry
 _LEAST_SHARE = 0.25  # of the windows outside a block that must remain where those that overlap the block are left out
 
 
-def split_by_time(telemetry: Telemetry, fractions: Sequence[float], gap: int) -> list[Telemetry]:
-    """Splits a series into consecutive parts with gaps between them, so that windows of different parts do not overlap.
-
-    Args:
-        telemetry: The series.
-        fractions: Fraction of the samples in each part. They add up to 1.
-        gap: Number of samples left out between two parts, at least one window.
-
-    Returns:
-        The parts in chronological order.
-
-    Raises:
-        InputError: If the fractions are not positive or do not add up to 1, or the series is too short.
-    """
-    if abs(sum(fractions) - 1) > 1e-9 or min(fractions) <= 0:
-        raise InputError(f"Expected positive fractions that add up to 1. Received: fractions={tuple(fractions)}. Correct them.")
-    usable = len(telemetry) - gap * (len(fractions) - 1)
-    lengths = [int(usable * fraction) for fraction in fractions]
-    if min(lengths) < 1:
-        raise InputError(
-            f"Expected a series longer than its gaps. Received: {len(telemetry)} samples with gaps of {gap}. Give a longer one."
-        )
-    starts = np.cumsum([0] + [length + gap for length in lengths[:-1]])
-    return [telemetry.part(start, start + length) for start, length in zip(starts.tolist(), lengths, strict=True)]
-
-
 def num_window_starts(parts: Sequence[Sized], window: int) -> int:
     """Returns the number of samples at which a complete window can start.
 

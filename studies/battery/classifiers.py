@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from enhsim_tf.realism.window_features import window_features
+from enhsim_tf.common.window_features import window_features
 from studies.battery.detectors import COARSE, ENHANCED_RUN, NUM, WITH_RESIDUALS, Judge, Rows, alarm_rows, apart
 from studies.battery.faults import ALL
 from studies.battery.orbits import Regime, draw_load

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from enhsim_tf.enhancer.ladder import fit_rung
 
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
-from enhsim_tf.enhancer.ladder import fit_rung
 from studies.battery.errors import about
 from studies.battery.faults import ALL, Fault
 from studies.battery.orbits import ORBIT_SAMPLES

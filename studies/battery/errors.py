@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, fit_ladder, fit_rung
+from enhsim_tf.enhancer.scaling import Scaling
 
 from enhsim_tf.detection.metrics import threshold
-from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, fit_ladder, fit_rung
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
-from enhsim_tf.enhancer.scaling import Scaling
 from studies.battery.faults import ALL, Fault
 from studies.battery.record import Recorded
 from studies.battery.windows import NUM_FAULT, NUM_TEST, PairWindows, coarse_windows, judged_windows

@@ -53,7 +53,7 @@ def collect(
         for each, table in replicate(stages).items():
             parts.setdefault(each, []).append(table)
         turns.end(stages)
-        from enhsim_tf.keras_tools.backend import keras
+        from enhsim_tf.common.backend import keras
 
         keras.backend.clear_session()  # frees the memory of the replicate's networks
     return {name: pd.concat(tables, ignore_index=True) for name, tables in parts.items()}

@@ -1,32 +1,25 @@
-"""The settings of the studies, each with its unit and the reason for its value; see `enhsim_tf.reproduce.settings`."""
+"""The settings of the studies, each with its unit and the reason for its value, beside those of the paper's pipeline."""
 
 import dataclasses
 from typing import Any
 
-import numpy as np
-
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.reproduce import settings as of_paper
-from enhsim_tf.reproduce.settings import OUR_CHOICE, TelemetrySettings, setting
-from studies.common.noise_gallery import GALLERY
+from enhsim_tf.paper import settings as of_paper
+
+OUR_CHOICE = "our choice"
 
 
-@dataclasses.dataclass(frozen=True)
-class StudyTelemetrySettings(TelemetrySettings):
-    """The example telemetry with one of several noise processes."""
+def setting(value: Any, unit: str, source: str, paper: str = "-", smoke: Any = None) -> Any:
+    """A field of a group of settings.
 
-    noise: str = setting("white", "process", f"{OUR_CHOICE}: the simplest process; `noise_gallery` has others", '"noise"')
-
-    def draw_noise(self, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Draws noise of the process, float64 of the shape of the noiseless `signal`, on which one of the processes depends.
-
-        Raises:
-            InputError: If there is no process of that name.
-        """
-        if self.noise not in GALLERY:
-            raise InputError(f"Expected telemetry.noise to be one of {', '.join(GALLERY)}. Received: {self.noise!r}.")
-        process = GALLERY[self.noise]
-        return self.noise_sd / process.standard_deviation * process.draw(len(signal), rng, signal)
+    Args:
+        value: Its value at the full budget.
+        unit: Its unit.
+        source: Where the value comes from, and the reason if it is this project's choice.
+        paper: What the paper says; `-` if it says nothing.
+        smoke: The value at the smoke budget, if it differs.
+    """
+    return dataclasses.field(default=value, metadata={"unit": unit, "source": source, "paper": paper, "smoke": smoke})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,10 +151,11 @@ class BatterySettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class Settings(of_paper.Settings):
-    """The settings of the paper's pipeline and those of the studies."""
+class Settings:
+    """The settings of the paper's pipeline, the kind of noise in its telemetry, and the settings of each study."""
 
-    telemetry: StudyTelemetrySettings = StudyTelemetrySettings()
+    paper: of_paper.Settings
+    noise: str = setting("white", "kind of noise", f"{OUR_CHOICE}: the simplest; `environments.FAMILIES` has others")
     second: SecondSettings = SecondSettings()
     robustness: RobustnessSettings = RobustnessSettings()
     modes: ModesSettings = ModesSettings()
@@ -171,8 +165,42 @@ class Settings(of_paper.Settings):
     classifiers: ClassifierSettings = ClassifierSettings()
     labelled: LabelledSettings = LabelledSettings()
     battery: BatterySettings = BatterySettings()
+    budget: str = "full"
+
+    @property
+    def seed(self) -> int:
+        """Seed of all random draws."""
+        return self.paper.seed
+
+    def of(self, noise: str, seed: int) -> "Settings":
+        """The same settings with another kind of noise and another seed."""
+        return dataclasses.replace(self, noise=noise, paper=dataclasses.replace(self.paper, seed=seed))
 
 
-def make_settings(budget: str = "full", seed: int = 0, **turned: Any) -> Settings:
-    """The settings at a budget, with some of them changed; see `enhsim_tf.reproduce.settings.make_settings`."""
-    return of_paper.make_settings(budget, seed, Settings, **turned)
+def make_settings(budget: str = "full", **changed: Any) -> Settings:
+    """The settings at a budget, with some of them changed.
+
+    Args:
+        budget: `full`, or `smoke` for smaller counts.
+        **changed: Values as `group__field=value`, for example `robustness__num_seeds=2` or `paper__seed=1`.
+
+    Raises:
+        InputError: If the budget, a group, a field or a value cannot be used.
+    """
+    values: dict[str, dict[str, Any]] = {}
+    for name, value in changed.items():
+        group, _, field = name.partition("__")
+        values.setdefault(group, {})[field] = value
+    # only claim C4 looks beyond the paper's number of iterations
+    made: dict[str, Any] = {"paper": of_paper.make_settings(budget, **{"rounds": 1} | values.pop("paper", {}))}
+    groups = {field.name: field.type for field in dataclasses.fields(Settings) if dataclasses.is_dataclass(field.default)}
+    for name, kind in groups.items():
+        fields = {field.name: field.metadata["smoke"] for field in dataclasses.fields(kind)}
+        smaller = {field: count for field, count in fields.items() if budget == "smoke" and count is not None}
+        chosen = values.pop(name, {})
+        if unknown := sorted(set(chosen) - set(fields)):
+            raise InputError(f"Expected one of the settings {', '.join(fields)} of {name}. Received: {unknown[0]!r}.")
+        made[name] = kind(**smaller | chosen)
+    if values:
+        raise InputError(f"Expected settings of one of the groups paper, {', '.join(groups)}. Received: {min(values)!r}.")
+    return Settings(**made, budget=budget)

@@ -32,7 +32,7 @@ from studies.robustness.replicate import Replicate
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enhsim_tf.noise.gan import NoiseGAN
+    from studies.common.paper_gan import PaperGAN
     from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN
 
 Enhance = Callable[[np.ndarray], np.ndarray]
@@ -49,8 +49,8 @@ class Pipelines:
 
     def __init__(self, replicate: Replicate):
         self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
-        self.data, self.train = replicate.experiment.data, replicate.experiment.data.channels[0].train
-        self.window, self.seed = self.settings.telemetry.window, self.settings.seed
+        self.example = replicate.example
+        self.window, self.seed = self.settings.paper.window, self.settings.seed
         self.enhancer = functools.cache(self._enhancer)
         self.extracted = functools.lru_cache(maxsize=1)(self._extracted)
         self._model: tuple[tuple[object, ...], object] | None = None
@@ -59,8 +59,8 @@ class Pipelines:
         """The table `cells`. The cells whose noise is learnt from the same windows are a stage, so that an interrupted run goes on."""
         import pandas as pd
 
-        chosen = self.settings
-        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.noise, chosen.adversarial, chosen.second, chosen.seed)
+        _, chosen = self.example.telemetry, self.settings
+        depends = (chosen.paper.of("windows", "enhancer", "noise", "noise GAN"), chosen.second)
         depends += (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.robustness.max_order)
         parts = {"references": list(REFERENCES)} | {" ".join(filter(None, source)): cells for source, cells in cells_by_source().items()}
         found = []
@@ -73,7 +73,7 @@ class Pipelines:
     def _make(self, cells: list[str | Cell], folder: Path) -> None:
         import pandas as pd
 
-        about = {"environment": self.settings.telemetry.noise, "seed": self.seed}
+        about = {"environment": self.settings.noise, "seed": self.seed}
         rows = [{**about, "cell": getattr(cell, "name", cell), **row} for cell in cells for row in self.judged(cell)]
         pd.DataFrame(rows).to_parquet(folder / "cells.parquet")
 
@@ -108,50 +108,43 @@ class Pipelines:
         number = self.settings.robustness.num_windows
         if cell == "real":
             part = "train" if purpose == TRAINING else "calibration"
-            return self.data.windows(part, number, f"{purpose}, real")["target"]
-        coarse = self.data.windows("train", number, purpose)["coarse"]
+            return self.example.windows(part, number, f"{purpose}, real")["target"]
+        coarse = self.example.windows("train", number, purpose)["coarse"]
         if cell == "coarse":
             return coarse
-        rng = np.random.default_rng(int(self.data.draw(purpose).integers(2**31)))
+        rng = np.random.default_rng(int(self.example.draw(purpose).integers(2**31)))
         return self.enhancer(cell.enhancer, cell.windows)(coarse) + self.generator(cell).generate(number, rng)
 
     def number(self, windows: str) -> int:
         """Number of windows that a level of the factor `windows` stands for."""
-        return {FEW: self.settings.telemetry.num_windows, MANY: self.settings.second.num_windows}[windows]
+        return {FEW: self.settings.paper.num_windows, MANY: self.settings.second.num_windows}[windows]
 
     def training_starts(self, windows: str) -> np.ndarray:
         """Start of each training window of the enhancers: those of the paper's network, and those of the residual pipeline."""
-        rng = self.data.draw("training windows") if windows == FEW else np.random.default_rng(self.seed)
-        return random_window_starts([self.train], self.window, self.number(windows), rng)
+        rng = self.example.draw("training windows") if windows == FEW else np.random.default_rng(self.seed)
+        return random_window_starts([self.example.train], self.window, self.number(windows), rng)
 
     def pairs(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coarse windows and telemetry of the training part."""
-        return paired_windows(self.train, self.data.channels[0].coarse, starts, self.window)
+        return paired_windows(self.example.train, self.example.coarse, starts, self.window)
 
     def _enhancer(self, enhancer: str, windows: str) -> Enhance:
         """The function that maps coarse windows to the signal of an enhancer."""
         if enhancer == RIDGE:
             starts = self.training_starts(windows)
             return fit_ridge(*self.pairs(starts), starts).predict
-        return self._paper_network() if windows == FEW else self.replicate.second.simulator.enhance
-
-    def _paper_network(self) -> Enhance:
-        from enhsim_tf.enhancer.network import enhance
-        from enhsim_tf.keras_tools.backend import keras
-
-        path = self.replicate.experiment.enhancer_folder / "enhancer.keras"
-        return functools.partial(enhance, keras.saving.load_model(path, compile=False, safe_mode=True))
+        return self.example.enhance if windows == FEW else self.replicate.second.simulator.enhance
 
     def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
         """Windows of the noise that a generator learns, of shape `(windows, samples)`; the arguments are `Cell.source`."""
         number = self.number(windows)
         if extraction == MOVING_AVERAGE:
-            return self.data.noise_windows("train", number, "noise windows")
-        starts = random_window_starts([self.train], self.window, number, np.random.default_rng([self.seed, 1]))
+            return self.example.noise_windows("train", number, "noise windows")
+        starts = random_window_starts([self.example.train], self.window, number, np.random.default_rng([self.seed, 1]))
         coarse, target = self.pairs(starts)
         return target - self.enhancer(enhancer, windows)(coarse)
 
-    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | NoiseGAN | ConvolutionalGAN":
+    def generator(self, cell: Cell) -> "WindowBootstrap | GaussianAutoregression | PaperGAN | ConvolutionalGAN":
         """The fitted noise model of a cell. The last one is kept, because both purposes and some cells share it."""
         key = (*cell.source, cell.generator)
         if self._model is None or self._model[0] != key:
@@ -170,21 +163,9 @@ class Pipelines:
     def _convolutional_gan(self, noise: np.ndarray) -> "ConvolutionalGAN":
         from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
 
-        return fit_convolutional_gan(noise, self.settings.adversarial.num_iterations, self.seed)
+        return fit_convolutional_gan(noise, self.settings.paper.iterations, self.seed)
 
-    def _paper_gan(self, noise: np.ndarray) -> "NoiseGAN":
-        from enhsim_tf.noise.gan import NoiseGAN
+    def _paper_gan(self, noise: np.ndarray) -> "PaperGAN":
+        from studies.common.paper_gan import fit_paper_gan
 
-        training = self.settings.adversarial
-        gan = NoiseGAN(
-            *self.replicate.experiment.untrained_noise_networks(),
-            batch_size=training.batch_size,
-            learning_rate=training.learning_rate,
-            latent_span=self.settings.noise.latent_span,
-            mixed_batch=training.mixed_batch,
-            generated_in_training_mode=training.generated_in_training_mode,
-            scale=self.data.units[2],
-            seed=self.seed,
-        )
-        gan.fit(noise, training.num_iterations, training.record_every, verbose=False)
-        return gan
+        return fit_paper_gan(noise, self.settings.paper)

@@ -1,6 +1,5 @@
 """Runs all replicates of the factorial study and writes its table, findings and figure."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,8 +34,7 @@ def run(
     from studies.robustness.replicate import Replicate
 
     def tables_of(environment: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
-        telemetry = dataclasses.replace(settings.telemetry, noise=environment)
-        return Pipelines(Replicate(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages)).tables()
+        return Pipelines(Replicate(settings.of(environment, seed), stages)).tables()
 
     first = settings.robustness.first_seed
     replicates = seed_by_seed(tables_of, environments, range(first, first + settings.factorial.num_seeds))

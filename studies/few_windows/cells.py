@@ -2,22 +2,22 @@
 
 import dataclasses
 import functools
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.reproduce.paper.data import draw, waves_of
-from enhsim_tf.reproduce.paper.signals import sines
+from enhsim_tf.paper.telemetry import true_signal
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, time_blocks
+from studies.common.example import coarse_simulator, draw_noise
 from studies.common.settings import Settings
 from studies.few_windows.record import (
     ADVERSARIAL,
@@ -53,25 +53,24 @@ class World:
     """The telemetry of one environment and seed: a long record to learn from, and later windows on which everything is judged.
 
     Args:
-        settings: All settings; `telemetry.noise` is the environment.
+        settings: All settings; `noise` is the environment.
     """
 
     def __init__(self, settings: Settings):
-        self.settings, self.window = settings, settings.telemetry.window
-        counts, chosen = settings.few_windows, settings.telemetry
+        self.settings, self.window = settings, settings.paper.window
+        counts, chosen = settings.few_windows, settings.paper
         self.length = max(counts.num_real) * self.window
         number = self.length + (2 * counts.num_judged + 1) * self.window
-        ((periods, amplitudes),) = waves_of(settings).values()
-        clean = sines(chosen.interval_s * np.arange(number), periods, amplitudes)
-        noise = settings.telemetry.draw_noise(clean, draw(settings, "learning curve"))
+        clean = true_signal(chosen)(chosen.interval * np.arange(number))
+        rng = np.random.default_rng([settings.seed, zlib.crc32(b"learning curve")])  # the draw of the published table
+        noise = draw_noise(settings.noise, clean, chosen.noise_sd, rng)
         self.noise_sd = float(np.std(noise))
         self.values = (clean + noise).astype(np.float32)
-        waves = [SquareWave(period, low=-size, high=size) for period, size in zip(periods, amplitudes, strict=True)]
-        self.coarse = SquareWaveSimulator(waves)
+        self.coarse = coarse_simulator(chosen)
 
     def record(self, num_real: int) -> Record:
         """The last `num_real` windows before a gap of one window, after which the judged windows begin."""
-        interval_s = self.settings.telemetry.interval_s
+        interval_s = self.settings.paper.interval
         first = self.length - num_real * self.window
         telemetry = Telemetry(self.values[first : self.length], interval_s, name="record", offset_s=first * interval_s)
         return Record(telemetry, self.coarse, self.window, self.settings.few_windows.num_windows, self.settings.seed)
@@ -103,7 +102,7 @@ class Cell:
 
     def __init__(self, world: World, num_real: int):
         self.world, self.num_real, self.record = world, num_real, world.record(num_real)
-        self.rate = world.settings.detectors.false_alarm_rate
+        self.rate = world.settings.paper.false_alarm_rate
         self.number, self.seed = world.settings.few_windows.num_windows, world.settings.seed
 
     def rows(self, stages: Stages) -> "pd.DataFrame":
@@ -124,14 +123,14 @@ class Cell:
         # which seeds and numbers are computed does not affect a cell
         same = dataclasses.replace(counts, num_seeds=0, first_seed=0), classifiers.num_steps
         for name, compute in groups.items():
-            depends = (name, self.num_real, chosen.telemetry, same, chosen.seed, self.rate)
+            depends = (name, self.num_real, chosen.paper.of("telemetry"), self.world.window, chosen.noise, same, self.rate)
 
             def make(folder: Path, compute: Callable[[], list[dict]] = compute) -> None:
                 pd.DataFrame(compute()).to_parquet(folder / "rows.parquet")
 
             folder = stages.run(f"few windows {self.num_real} {name}", make, depends)
             frames.append(pd.read_parquet(folder / "rows.parquet"))
-        return pd.concat(frames, ignore_index=True).assign(num_real=self.num_real, seed=self.seed, environment=chosen.telemetry.noise)
+        return pd.concat(frames, ignore_index=True).assign(num_real=self.num_real, seed=self.seed, environment=chosen.noise)
 
     def _simulated(self) -> list[dict]:
         found = []

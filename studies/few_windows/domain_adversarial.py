@@ -7,8 +7,8 @@ of anomalies on which it is judged, which the detectors of the other arms do not
 
 import numpy as np
 
-from enhsim_tf.keras_tools.backend import keras, tf
-from enhsim_tf.keras_tools.training import predict_windows, seeded_initialiser
+from enhsim_tf.common.backend import keras, tf
+from enhsim_tf.common.training import predict_windows, seeded_initialiser
 
 _FILTERS, _WIDTHS, _STRIDE = (24, 32), (15, 9), 4  # of both convolutions
 _UNITS = 64

@@ -1,6 +1,5 @@
 """Runs the study of few windows and writes table, findings and figure."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,8 +35,7 @@ def run(
     from studies.few_windows.summary import KEPT, summarise
 
     def tables_of(environment: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
-        telemetry = dataclasses.replace(settings.telemetry, noise=environment)
-        world = World(dataclasses.replace(settings, telemetry=telemetry, seed=seed))
+        world = World(settings.of(environment, seed))
         return {"rows": pd.concat([Cell(world, number).rows(stages) for number in settings.few_windows.num_real], ignore_index=True)}
 
     first = settings.few_windows.first_seed

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseWindows
 
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhanced_simulator.noise_fitting import MOST_JUDGED, HeldOutJudge, NoiseWindows
 from enhsim_tf.noise.candidates import NoiseModel
 from enhsim_tf.noise.names import CANDIDATES
 from studies.common.settings import Settings
@@ -39,22 +39,22 @@ class Cell:
     """A family of noise and a seed.
 
     Args:
-        settings: All settings; `telemetry.noise` is the family.
+        settings: All settings; `noise` is the family.
         stages: Runs stages and caches their results.
     """
 
     def __init__(self, settings: Settings, stages: Stages):
         self.settings, self.stages = settings, stages
         self.one = Replicate(settings, stages)
-        self.data = self.one.experiment.data
+        self.example = self.one.example
 
     def tables(self, models: Sequence[str] = (REAL, *MODELS)) -> "dict[str, pd.DataFrame]":
         """The tables of models, or of real windows; each model is a stage of its own, so that an interrupted run goes on."""
         import pandas as pd
 
-        chosen = self.settings
+        _, chosen = self.example.telemetry, self.settings
         counts = (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.noise_models)
-        depends = (chosen.telemetry, chosen.split, *counts, chosen.seed)
+        depends = (chosen.paper.of("windows"), *counts)
         parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
         for model in models:
             name = "noise model " + model.replace(" ", "_")
@@ -69,12 +69,12 @@ class Cell:
         floor, held_out = self.one.floor()
         if model == REAL:
             number = self.settings.robustness.num_windows
-            arms = [self.data.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
+            arms = [self.example.windows(part, number, f"ladder, real, {part}")["target"] for part in ("train", "calibration")]
             compared, choice = [held_out], []
         else:
             arms, compared, choice = self._generated(model, len(held_out))
         for name, rows in {"detectors": self._detected(arms), "realism": _measured(floor, compared), "choice": choice}.items():
-            table = pd.DataFrame(rows).assign(family=self.settings.telemetry.noise, seed=self.settings.seed, model=model)
+            table = pd.DataFrame(rows).assign(family=self.settings.noise, seed=self.settings.seed, model=model)
             table.to_parquet(folder / f"{name}.parquet")
 
     def _generated(self, name: str, number: int) -> tuple[list[np.ndarray], list[np.ndarray], list[dict]]:
@@ -82,9 +82,9 @@ class Cell:
         model, seed = self._fit(name), self.settings.seed
         rng = np.random.default_rng([seed, _STREAMS[name], _DRAW])
         purposes = ("ladder, training", "ladder, threshold")
-        waves = [self.data.windows("train", self.settings.robustness.num_windows, purpose)["truth"] for purpose in purposes]
+        waves = [self.example.windows("train", self.settings.robustness.num_windows, purpose)["truth"] for purpose in purposes]
         arms = [clean + model.generate(len(clean), rng, clean) for clean in waves]
-        more = self.data.windows("calibration", number, "ladder, realism")["truth"]
+        more = self.example.windows("calibration", number, "ladder, realism")["truth"]
         # the noise of generated telemetry, with the rounding errors of 32-bit sums that the noise of real telemetry has
         compared = [more + model.generate(number, rng, more) - more for _ in range(_NUM_DRAWS)]
         judgement = self._judge.judge(name, model, np.random.default_rng([seed, _DRAW_OF_JUDGE, _STREAMS[name]]))
@@ -113,7 +113,7 @@ class Cell:
         return self._with_noise("train", self.settings.noise_models.num_windows, "ladder, learnt")
 
     def _with_noise(self, part: str, number: int, purpose: str) -> NoiseWindows:
-        windows = self.data.windows(part, number, purpose)
+        windows = self.example.windows(part, number, purpose)
         return NoiseWindows(windows["target"] - windows["truth"], windows["truth"], windows["start"])
 
     @functools.cached_property

@@ -1,6 +1,5 @@
 """Runs the study of noise models and writes tables, findings and the figure."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,10 +41,7 @@ def run(
         raise InputError(f"Expected --model among {', '.join(MODELS)}. Received: {model!r}.")
 
     def tables_of(family: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
-        telemetry = dataclasses.replace(settings.telemetry, noise=family)
-        return Cell(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages).tables(
-            (REAL, *MODELS) if model is None else (model,)
-        )
+        return Cell(settings.of(family, seed), stages).tables((REAL, *MODELS) if model is None else (model,))
 
     first = settings.noise_models.first_seed
     tables = collect("noise", seed_by_seed(tables_of, families, range(first, first + settings.noise_models.num_seeds)), cache, fresh, tell)

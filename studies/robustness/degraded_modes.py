@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
+from enhsim_tf.common import measures
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, fit_ridge, nearest_windows
-from enhsim_tf.realism import measures
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enhsim_tf.keras_tools.backend import keras
+    from enhsim_tf.common.backend import keras
 
 SEVERITIES = (0.1, 0.25, 0.5, 0.75, 1.0)
 LARGEST_TRAINED = 0.5  # largest severity in the training of the randomised methods
@@ -52,16 +52,15 @@ class DegradedModes:
 
     def __init__(self, replicate: Replicate):
         self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
-        self.data = replicate.experiment.data
+        self.example = replicate.example
 
     @functools.cached_property
     def table(self) -> "pd.DataFrame":
         """The error of each method, mode and severity, in standard deviations of the nominal signal, and the out-of-range score."""
         import pandas as pd
 
-        _ = self.replicate.experiment.enhancer_folder, self.replicate.second.simulator
-        chosen = self.settings
-        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.modes, chosen.second, chosen.seed)
+        _ = self.example.enhancer_folder, self.replicate.second.simulator
+        depends = (self.settings.paper.of("windows"), self.settings.modes)
         folder = self.stages.run("degraded modes", self._make, depends, ("telemetry", "enhancer", "second network"))
         return pd.read_parquet(folder / "degraded.parquet")
 
@@ -89,22 +88,22 @@ class DegradedModes:
 
     def _pairs(self, scenario: Degraded | None, num_windows: int, purpose: str) -> tuple[np.ndarray, np.ndarray]:
         """Coarse windows in a mode, and the true noiseless signal at the same times and with the same draws."""
-        channel, chance = self.data.channels[0], int(self.data.draw(purpose).integers(2**31))
+        chosen, chance = self.settings.paper, int(self.example.draw(purpose).integers(2**31))
         begins = np.random.default_rng(chance).integers(0, 10**6, num_windows)
-        times = self.settings.telemetry.interval_s * (begins[:, None] + np.arange(self.data.window, dtype=np.float64))
-        size, shortest = sum(channel.amplitudes), min(channel.periods_s)
-        coarse = channel.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
-        truth = degrade(channel.truth, times, scenario, (-size, size), shortest, np.random.default_rng(chance + 1))
+        times = chosen.interval * (begins[:, None] + np.arange(chosen.window, dtype=np.float64))
+        size, shortest = chosen.orbit_amplitude + chosen.rotation_amplitude, min(chosen.orbit_period, chosen.rotation_period)
+        coarse = self.example.coarse.simulate(times, scenario, np.random.default_rng(chance + 1))
+        truth = degrade(self.example.truth, times, scenario, (-size, size), shortest, np.random.default_rng(chance + 1))
         return coarse, truth.astype(np.float32)
 
     def _nominal_windows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coarse windows and telemetry of the training part, and the first sample of each."""
-        windows = self.data.windows("train", self.settings.second.num_windows, "nominal configurations")
+        windows = self.example.windows("train", self.settings.second.num_windows, "nominal configurations")
         return windows["coarse"], windows["target"], windows["start"]
 
     def _randomised_pairs(self) -> tuple[np.ndarray, np.ndarray]:
         """Coarse and noisy true windows of random configurations: one seventh nominal, the others degraded."""
-        chosen, draws = self.settings, self.data.draw("configurations")
+        chosen, draws = self.settings, self.example.draw("configurations")
         per_configuration = chosen.modes.windows_per_configuration
         parts = []
         for number in range(chosen.second.num_windows // per_configuration):
@@ -113,7 +112,7 @@ class DegradedModes:
             scenario = None if mode is None else Degraded(mode, severity, onset)
             parts.append(self._pairs(scenario, per_configuration, f"configuration {number}"))
         coarse, truth = (np.concatenate(each) for each in zip(*parts, strict=True))
-        noise = draws.normal(0, chosen.telemetry.noise_sd, truth.shape).astype(np.float32)
+        noise = draws.normal(0, chosen.paper.noise_sd, truth.shape).astype(np.float32)
         return coarse, truth + noise
 
     def _methods(
@@ -138,19 +137,19 @@ class DegradedModes:
             "ridge, randomised": fit_ridge(*randomised).predict,
             "nearest windows": nearest(*nominal),
             "nearest windows, randomised": nearest(*randomised),
-            "paper": self.replicate.experiment.simulator.enhance,
+            "paper": self.example.enhance,
             "more windows": self.replicate.second.simulator.enhance,
             "randomised": functools.partial(enhance, self._train(*randomised)),
         }
 
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """Trains the enhancer of the residual pipeline on other windows."""
+        from enhsim_tf.common.backend import keras
+        from enhsim_tf.common.training import EpochProgress, fit_windows
         from enhsim_tf.enhancer.network import build_enhancer
-        from enhsim_tf.keras_tools.backend import keras
-        from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 
-        seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.enhancer.batch_size
-        network = build_enhancer(self.data.window, seed=seed)
+        seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.paper.batch_size
+        network = build_enhancer(self.settings.paper.window, seed=seed)
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
         callbacks = [EpochProgress(self.stages.progress.loop("enhancer, epoch", epochs))]
         fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=callbacks, verbose=0)

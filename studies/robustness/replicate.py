@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import types
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,9 +12,9 @@ import numpy as np
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.noise import real_floor
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
-from enhsim_tf.realism import real_floor
-from enhsim_tf.reproduce.paper.pipeline import Experiment
+from studies.common.example import Example
 from studies.common.settings import Settings
 from studies.robustness.second_pipeline import SecondPipeline
 
@@ -48,31 +49,29 @@ class Replicate:
     """One replicate of the study.
 
     Args:
-        settings: All settings; `telemetry.noise` is the environment, `seed` covers data, networks and detectors.
+        settings: All settings; `noise` is the environment, the seed covers data, networks and detectors.
         stages: Runs stages and caches their results.
     """
 
     def __init__(self, settings: Settings, stages: Stages):
         self.settings, self.stages = settings, stages
-        once = dataclasses.replace(settings.adversarial, num_rounds=1)  # only claim C4 looks beyond the paper's number of iterations
-        self.experiment = Experiment(dataclasses.replace(settings, adversarial=once), stages)
+        self.example = Example(settings, stages)
 
     @functools.cached_property
     def second(self) -> SecondPipeline:
         """The residual pipeline."""
-        return SecondPipeline(self.experiment.data, self.settings, self.stages)
+        return SecondPipeline(self.example, self.settings, self.stages)
 
     @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The tables `alarms` and `recall`."""
         import pandas as pd
 
-        _ = self.experiment.enhancer_folder, self.experiment.noise_folder, self.second.simulator
+        _ = self.example.enhancer_folder, self.example.gan_folder, self.second.simulator
         after = ("telemetry", "enhancer", "noise GAN", "second network")
-        chosen = self.settings
-        which = dataclasses.replace(chosen.robustness, num_seeds=0, first_seed=0)  # the number of replicates does not affect a replicate
-        depends = (chosen.telemetry, chosen.split, chosen.enhancer, chosen.noise, chosen.adversarial, which, chosen.seed)
-        folder = self.stages.run("arms", self._make_arms, depends, after)
+        # the number of replicates does not affect a replicate
+        which = dataclasses.replace(self.settings.robustness, num_seeds=0, first_seed=0)
+        folder = self.stages.run("arms", self._make_arms, (self.settings.paper.of("windows"), which), after)
         return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
 
     def _make_arms(self, folder: Path) -> None:
@@ -92,7 +91,7 @@ class Replicate:
             self.stages.tell(f"  {arm:28} false alarms " + ", ".join(f"{rate:.1%}" for rate in rates))
         for name, each in rows.items():
             table = pd.DataFrame(each, columns=TABLES[name])
-            table.assign(environment=self.settings.telemetry.noise, seed=seed).to_parquet(folder / f"{name}.parquet")
+            table.assign(environment=self.settings.noise, seed=seed).to_parquet(folder / f"{name}.parquet")
 
     def trial(self, num_anomalous: int | None = None) -> evaluation.Trial:
         """The test data: held-out nominal windows, and the same windows with anomalies.
@@ -101,12 +100,12 @@ class Replicate:
             num_anomalous: Anomalous windows of each kind and severity; None for the number in the settings.
         """
         chosen = self.settings.robustness
-        nominal, reference = (self.experiment.data.windows(part, None)["target"] for part in ("test", "calibration"))
+        nominal, reference = (self.example.windows(part, None)["target"] for part in ("test", "calibration"))
         return evaluation.make_trial(
             nominal,
             reference,
             None,
-            self.settings.telemetry.noise_sd,
+            self.settings.paper.noise_sd,
             self.settings.seed,
             chosen.num_anomalous if num_anomalous is None else num_anomalous,
             rate=chosen.false_alarm_rate,
@@ -114,7 +113,7 @@ class Replicate:
 
     def floor(self) -> tuple[real_floor.RealFloor, np.ndarray]:
         """The real-vs-real baseline of two samples of true noise, and held-out windows of a third sample, for measures of realism."""
-        every = (self.experiment.data.windows(part, None) for part in ("test", "train", "calibration"))
+        every = (self.example.windows(part, None) for part in ("test", "train", "calibration"))
         real, again, held_out = (windows["target"] - windows["truth"] for windows in every)
         number = min(self.settings.robustness.num_windows, len(real), len(again), len(held_out))
         floor = real_floor.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
@@ -126,10 +125,10 @@ class Replicate:
         from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
 
         chosen, residual = self.settings, self.second.residuals()
-        averaged = self.experiment.data.noise_windows("train", chosen.telemetry.num_windows, "noise windows")
-        gan = fit_convolutional_gan(residual, chosen.adversarial.num_iterations, chosen.seed)
+        averaged = self.example.noise_windows("train", chosen.paper.num_windows, "noise windows")
+        gan = fit_convolutional_gan(residual, chosen.paper.iterations, chosen.seed)
         return {
-            "enhanced": {"GAN": self.experiment.simulator.noise, **self._fitted(averaged)},
+            "enhanced": {"GAN": types.SimpleNamespace(generate=self.example.generate_noise), **self._fitted(averaged)},
             "residual": {"convolutional GAN": gan, **self._fitted(residual)},
         }
 
@@ -147,18 +146,18 @@ class Replicate:
         Args:
             purpose: `arms, training` for the windows that train detectors, `arms, threshold` for those that set thresholds.
         """
-        data, number = self.experiment.data, self.settings.robustness.num_windows
-        simulated = data.windows("train", number, purpose)
+        example, number = self.example, self.settings.robustness.num_windows
+        simulated = example.windows("train", number, purpose)
         coarse = simulated["coarse"]
         part = "train" if purpose == "arms, training" else "calibration"
         arms = {
             "coarse": coarse,
             "truth": simulated["truth"],
-            "enhanced": self.experiment.simulator.enhance(coarse),
+            "enhanced": example.enhance(coarse),
             "residual, no noise": self.second.simulator.enhance(coarse),
-            "real": data.windows(part, number, f"{purpose}, real")["target"],
+            "real": example.windows(part, number, f"{purpose}, real")["target"],
         }
-        seed = int(data.draw(purpose).integers(2**31))
+        seed = int(example.draw(purpose).integers(2**31))
         for pipeline, clean in (("enhanced", "enhanced"), ("residual", "residual, no noise")):
             for noise, model in self.noises[pipeline].items():
                 arms[f"{pipeline} + {noise}"] = arms[clean] + model.generate(number, np.random.default_rng(seed))

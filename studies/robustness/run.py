@@ -1,6 +1,5 @@
 """Runs all replicates of the study of robustness and writes tables, findings and figures."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,8 +34,7 @@ def run(
     from studies.robustness.summary import KEPT, summarise
 
     def tables_of(environment: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
-        telemetry = dataclasses.replace(settings.telemetry, noise=environment)
-        one = Replicate(dataclasses.replace(settings, telemetry=telemetry, seed=seed), stages)
+        one = Replicate(settings.of(environment, seed), stages)
         return one.tables | ({"degraded": DegradedModes(one).table} if environment == environments[0] else {})
 
     first = settings.robustness.first_seed

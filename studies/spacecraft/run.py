@@ -1,6 +1,5 @@
 """The cells of the study, one for each channel and seed, and the tables that they fill."""
 
-import dataclasses
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ from studies.common.settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
-
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 TABLES = ("channels", "enhancement", "detectors")
@@ -56,7 +54,7 @@ def run(
 
     def tables_of(name: str, seed: int, stages: Stages) -> "Mapping[str, pd.DataFrame]":
         try:
-            return tables_of_channel(load_channel(data, name), dataclasses.replace(settings, seed=seed), stages)
+            return tables_of_channel(load_channel(data, name), settings.of(settings.noise, seed), stages)
         except InputError as error:  # a channel that cannot be used
             skipped[name] = str(error)
             tell(f"left out: {error}")

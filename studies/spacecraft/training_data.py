@@ -5,12 +5,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from enhsim_tf.enhanced_simulator.checks import check_finite
 
 from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.enhanced_simulator.checks import check_finite
-from enhsim_tf.noise.extraction import noise_unit
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
@@ -75,14 +74,12 @@ def generators(
 
 
 def _fit_paper_gan(residuals: np.ndarray, num_iterations: int, seed: int, progress: Progress) -> Any:
-    from enhsim_tf.noise.discriminator import build_discriminator
-    from enhsim_tf.noise.gan import NoiseGAN
-    from enhsim_tf.noise.generator import build_generator
+    from enhsim_tf.paper.settings import make_settings
+    from studies.common.paper_gan import fit_paper_gan
 
-    window = residuals.shape[1]
-    gan = NoiseGAN(build_generator(window, seed=seed), build_discriminator(window, seed=seed), scale=noise_unit(residuals), seed=seed)
-    gan.fit(residuals, num_iterations, verbose=False, on_iteration=progress.loop("noise GAN, iteration", num_iterations))
-    return gan
+    told = progress.loop("noise GAN, iteration", num_iterations)
+    chosen = make_settings(seed=seed, window=residuals.shape[1], iterations=num_iterations, record_every=min(100, num_iterations))
+    return fit_paper_gan(residuals, chosen, 10 * float(np.std(residuals, dtype=np.float64)), told)
 
 
 def source_rows(

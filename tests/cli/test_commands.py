@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from enhsim_tf.enhanced_simulator import fit_many, report_measure
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
@@ -20,8 +22,6 @@ from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.enhanced_simulator import fit_many, report_measure
-from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.noise.surrogates import GaussianNoise
 

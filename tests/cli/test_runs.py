@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-
-from enhsim_tf.__main__ import main
-from enhsim_tf.cli.options import load
-from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.enhanced_simulator.fit_many import CoarseRun, fit_channels
 from enhsim_tf.enhanced_simulator.runs import fitting
 from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 from enhsim_tf.enhancer.ladder import COARSE, RIDGE
+
+from enhsim_tf.__main__ import main
+from enhsim_tf.cli.options import load
+from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.sources import read_source
 

@@ -11,7 +11,6 @@ from enhsim_tf.coarse_simulator.period_search import fit_box
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.enhancer.training_pairs import paired_windows
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import split_by_time
 
 TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
 TIMES = 10.0 + np.arange(400.0) + np.array([[0.0], [37.0], [1_000.0]])
@@ -122,7 +121,7 @@ def test_fit_recovers_a_noisy_wave(shape, period_s, interval_s, offset_s):
         times = offset_s + interval_s * np.arange(number)
         values = mean + amplitude * (wave(np.mod(times / period_s + ahead, 1.0)) + 0.2 * rng.standard_normal(number))
         telemetry = Telemetry(values.astype(np.float32), interval_s=interval_s, offset_s=offset_s)
-        train, test = split_by_time(telemetry, (0.7, 0.3), gap=100)
+        train, test = telemetry.part(0, 2_100), telemetry.part(2_200, number)
 
         (fitted,) = SquareWaveSimulator.fit(train).waves
         assert fitted.period_s == pytest.approx(period_s, rel=0.005)

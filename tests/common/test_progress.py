@@ -2,7 +2,6 @@
 
 import os
 import re
-import select
 import subprocess
 import sys
 from pathlib import Path
@@ -15,9 +14,7 @@ import pytest
 from enhsim_tf.common import console
 from enhsim_tf.common.console import SILENT, Progress, time_left
 from enhsim_tf.common.stages import Stages, Turns
-from enhsim_tf.reproduce.paper import measurements
-from enhsim_tf.reproduce.paper.pipeline import Experiment
-from enhsim_tf.reproduce.settings import make_settings
+from tests.paper.conftest import TINY_OPTIONS, tiny_settings
 
 ROOT = Path(__file__).parents[2]
 SPOKEN = re.compile(r"(.*) ([\d,]+) of ([\d,]+), (\d+) %(, about [\d.]+ (s|min|h) left)?")
@@ -125,25 +122,18 @@ def test_the_remaining_time_as_text(seconds, words):
 
 
 def test_the_enhancer_reports_finished_epochs():
+    from enhsim_tf.common.training import EpochProgress, fit_windows
     from enhsim_tf.enhancer.network import build_enhancer
-    from enhsim_tf.keras_tools.training import EpochProgress, fit_windows
 
     windows, done = np.random.default_rng(0).standard_normal((5, 8)).astype(np.float32), []
     fit_windows(build_enhancer(8, 4), windows, windows, 2, batch_size=2, seed=0, callbacks=[EpochProgress(done.append)], verbose=0)
     assert done == pytest.approx([1 / 3, 2 / 3, 1, 4 / 3, 5 / 3, 2])
 
 
-def test_the_adversarial_loop_reports_finished_iterations():
-    from tests.noise.test_gan import fit, small
-
-    done = []
-    fit(small(), num_iterations=4, on_iteration=done.append)
-    assert done == [1, 2, 3, 4]
-
-
 @pytest.mark.parametrize("follow", [False, True])
 def test_a_fit_counts_the_epochs_of_all_training_rounds(at_once, follow, monkeypatch, capsys):
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
     from enhsim_tf.enhancer import network
     from enhsim_tf.telemetry.series import Telemetry
 
@@ -159,27 +149,6 @@ def test_a_fit_counts_the_epochs_of_all_training_rounds(at_once, follow, monkeyp
     epochs = [int(number) for what, number, total in found if (what, total) == ("volts: enhancer, epoch", "3")]
     assert epochs == sorted(epochs) and set(epochs) == {1, 2, 3}
     assert all("epoch" in what for what, *_ in found)
-
-
-def test_false_alarms_are_counted_by_arm_and_detector(clock, monkeypatch):
-    class Slow:
-        def fit(self, windows):
-            clock.now += 16
-            return self
-
-        def score(self, windows):
-            return windows[:, 0]
-
-    monkeypatch.setattr(measurements, "make_detectors", lambda settings, seed: {"a": Slow(), "b": Slow()})
-    windows, told = np.zeros((4, 3)), []
-    arms = dict.fromkeys(("coarse", "real"), (windows, windows))
-    progress = Progress(told.append, "false alarms ", clock)
-    measurements.false_alarms(arms, windows, {"stuck": windows}, make_settings("smoke").detectors, 0, progress)
-    assert told == [
-        "false alarms arm 1 of 2, 25 %",
-        "false alarms arm 1 of 2, 50 %, about 32 s left",
-        "false alarms arm 2 of 2, 75 %, about 16 s left",
-    ]
 
 
 # -- stages, replicates and channels ---------------------------------------------------------------------------------------
@@ -210,9 +179,11 @@ def test_a_failed_stage_stops_reporting(tmp_path):
     assert stages.progress is SILENT
 
 
-def test_an_experiment_called_from_python_is_silent(tmp_path, at_once, capsys):
+def test_the_papers_pipeline_called_from_python_is_silent(tmp_path, at_once, capsys):
+    from enhsim_tf.paper.pipeline import Pipeline
+
     told = []
-    _ = Experiment(make_settings("smoke", noise__filters=4), Stages(tmp_path, tell=told.append)).noise_folder
+    _ = Pipeline(tiny_settings(), Stages(tmp_path, tell=told.append)).gan_folder
     assert [line.split()[:2] for line in told if not line.startswith("telemetry")] == [["noise", "GAN"]] * 2
     assert capsys.readouterr() == ("", "")
 
@@ -262,48 +233,12 @@ def spoken_in(text):
 
 
 def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
-    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke"]
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", *TINY_OPTIONS, "--only", "fig13"]
     command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment, timeout=600)
     assert done.returncode == 0, done.stderr
-    assert spoken_in(done.stdout) == {
-        "enhancer     epoch": (2, 2),
-        "noise GAN    iteration": (39, 40),  # the last iteration is reported by the end of the stage
-        "false alarms arm": (5, 5),
-        "resemblance  comparison": (3, 4),
-    }
-    lines = done.stdout.splitlines()
-    early = lines.index(f"figures 2, 3, 8, 9, 10, 11 and 14 drawn in {tmp_path / 'out'}/ before any training")
-    assert early < lines.index("enhancer     ...") < lines.index("noise GAN    ...")
-    assert not any(SPOKEN.fullmatch(line) for line in lines[:early])
-
-
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
-def test_a_terminal_shows_bars_and_no_lines(tmp_path, environment):
-    import fcntl
-    import pty
-    import struct
-    import termios
-
-    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", "--only", "fig13"]
-    command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))  # bars need the width of the terminal
-    process = subprocess.Popen(command, cwd=ROOT, stdin=theirs, stdout=theirs, stderr=theirs, env=environment)
-    os.close(theirs)
-    shown = b""
-    while select.select([ours], [], [], 300)[0]:
-        try:
-            if not (part := os.read(ours, 65_536)):
-                break
-        except OSError:  # Linux says so that nobody is left on the other side
-            break
-        shown += part
-    os.close(ours)
-    text = shown.decode("utf-8", "replace")
-    assert process.wait(60) == 0, text
-    assert "Epoch 2/2" in text and "/step" in text and re.search(r"noise GAN: .*20/20", text)
-    assert " left" not in text and not spoken_in(text)
+    # the last epoch and the last records are reported by the end of the stage
+    assert spoken_in(done.stdout) == {"enhancer     epoch": (1, 2), "noise GAN    iteration": (35, 40)}
 
 
 def table(folder):

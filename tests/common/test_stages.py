@@ -51,11 +51,11 @@ def test_a_stage_is_done_once_and_found_again(work):
 
 
 def test_what_it_depends_on_is_a_value_not_an_object(work):
-    from enhsim_tf.reproduce.settings import make_settings
+    from enhsim_tf.paper.settings import make_settings
 
-    first, _ = work.run(settings=make_settings("smoke", 1))
-    assert work.run(settings=make_settings("smoke", 1)) == (first, True)
-    assert work.run(settings=make_settings("smoke", 2)) != (first, True)
+    first, _ = work.run(settings=make_settings("smoke", seed=1))
+    assert work.run(settings=make_settings("smoke", seed=1)) == (first, True)
+    assert work.run(settings=make_settings("smoke", seed=2)) != (first, True)
 
 
 @pytest.mark.parametrize("changed", ["settings", "name", "version", "upstream"])

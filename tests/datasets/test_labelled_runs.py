@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from enhsim_tf.enhanced_simulator.runs.model import RunModel
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.datasets.labelled_runs import coverage_lines, write_copies
-from enhsim_tf.enhanced_simulator.runs.model import RunModel
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 START = "2024-01-01T00:00:00+00:00"

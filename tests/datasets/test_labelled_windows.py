@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode
@@ -24,7 +25,6 @@ from enhsim_tf.datasets.labelled_windows import (
     write_windows_labelled,
 )
 from enhsim_tf.datasets.mix import make_mix
-from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.noise.surrogates import GaussianNoise
 
 WINDOW = 60

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-
-from enhsim_tf.enhancer import ladder
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, RUNGS, fit_ladder, fit_rung, judge
 from enhsim_tf.enhancer.rung_networks import linear_network, sum_of_networks
 from enhsim_tf.enhancer.scaling import Scaling
-from enhsim_tf.keras_tools.training import dense_stack
+
+from enhsim_tf.common.training import dense_stack
+from enhsim_tf.enhancer import ladder
+from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 
 pytestmark = pytest.mark.usefixtures("narrow_enhancer")
 WINDOW = 16

@@ -4,8 +4,8 @@ import keras
 import numpy as np
 import pytest
 
+from enhsim_tf.common.training import dense_stack, fit_windows
 from enhsim_tf.enhancer.network import build_enhancer, enhance
-from enhsim_tf.keras_tools.training import dense_stack, fit_windows
 
 
 def windows(number, samples=20, seed=0):

@@ -1,7 +1,5 @@
 """The out-of-range score for points computed by hand, and for degraded modes with known errors."""
 
-import functools
-
 import numpy as np
 import pytest
 import scipy.stats
@@ -10,11 +8,12 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection.metrics import threshold
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.reproduce.paper.signals import sines
+from enhsim_tf.paper.settings import make_settings
+from enhsim_tf.paper.telemetry import true_signal
 
 PERIODS, SIZES, WINDOW = (480, 120), (0.5, 0.25), 500
 COARSE = SquareWaveSimulator([SquareWave(period, low=-size, high=size) for period, size in zip(PERIODS, SIZES, strict=True)])
-TRUTH = functools.partial(sines, periods_s=PERIODS, amplitudes=SIZES)
+TRUTH = true_signal(make_settings())
 SEVERITIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 

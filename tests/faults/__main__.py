@@ -1,8 +1,8 @@
 """Fault injection into the real commands with tiny networks: `python -m tests.faults fleet|reproduce --out faults.json`.
 
 Each try starts a command, injects a fault at a random moment, runs the same command again until it succeeds, and
-compares the results with those of an undisturbed run: every byte of the data set of `generate`; every figure's
-arrays, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
+compares the results with those of an undisturbed run: every byte of the data set of `generate`; every
+figure, every stage and the results without times of `reproduce`. It writes a table: fault, tries, outcomes, seed. The suite
 tries the same on a smaller scale; this takes minutes for `fleet` and about an hour for `reproduce`. docs/large_data_sets.md quotes it.
 """
 

@@ -12,13 +12,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput  # noqa: E402
+
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
 from enhsim_tf.datasets.mix import Mix, ScenarioShare  # noqa: E402
 from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
-from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput  # noqa: E402
 from enhsim_tf.noise.surrogates import GaussianNoise  # noqa: E402
 
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])

@@ -22,8 +22,9 @@ PLAN = Plan(
 @functools.cache
 def saved_model() -> dict[str, bytes]:
     """The files of a small saved simulator."""
-    from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
     from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+    from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
     from enhsim_tf.enhancer.network import build_enhancer
     from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 

@@ -7,10 +7,10 @@ import zipfile
 
 import numpy as np
 import pytest
+from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import make_plan
-from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.sources import read_source, read_telemetry
 from tests.hostile.folders import arrays_of_model, npz_of, saved_model, write_model
 

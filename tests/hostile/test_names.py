@@ -1,26 +1,23 @@
 """Hostile names of channels, columns and sources cannot leave their folder, and are printed as one plain line.
 
 The tests use the real writers of models, training data, scores, stores and reports. The page `report.html` is tested in
-`test_page.py`.
+`tests/paper/test_report.py`.
 """
 
-import html.parser
 import json
 import os
-import re
 import string
 import urllib.parse
 
 import numpy as np
 import pandas as pd
 import pytest
+from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.common.atomic_files import encode_name
-from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of
-from enhsim_tf.reproduce.report import write_page
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
@@ -166,27 +163,3 @@ def test_findings_about_hostile_columns_are_plain_lines(tmp_path, name, suffix):
     (series,) = read_source(path).values()
     lines = clean(series).report.lines()
     assert all(line.isprintable() for line in lines) and any("columns without numbers" in line for line in lines)
-
-
-class Tags(html.parser.HTMLParser):
-    """The names of all tags."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags = []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-
-
-def test_control_characters_and_tags_do_not_reach_the_page(tmp_path):
-    from tests.reproduce.test_page import found_of
-
-    plain = Tags(write_page(tmp_path, found_of(source="plain.npy"), []).read_text()).tags
-    assert "table" in plain and "script" not in plain
-    for name in NAMES:
-        text = write_page(tmp_path, found_of(source=f"{name}.npy"), []).read_text()
-        assert Tags(text).tags == plain
-        assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", text) and "<script" not in text
-    assert write_page(tmp_path, found_of(source="\ud800\udfff.npy"), []).read_text()

@@ -6,12 +6,6 @@ import warnings
 
 import numpy as np
 import pytest
-
-from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.datasets.mix import Mix
-from enhsim_tf.datasets.plan import Model, Plan
-from enhsim_tf.datasets.shard import make_windows
 from enhsim_tf.enhanced_simulator import training
 from enhsim_tf.enhanced_simulator.fit_options import FitOptions
 from enhsim_tf.enhanced_simulator.fitting import fit_simulator
@@ -20,8 +14,14 @@ from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 from enhsim_tf.enhanced_simulator.runs.scoring import score_run
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.backend import keras
+from enhsim_tf.datasets.mix import Mix
+from enhsim_tf.datasets.plan import Model, Plan
+from enhsim_tf.datasets.shard import make_windows
 from enhsim_tf.enhancer.network import build_enhancer
-from enhsim_tf.keras_tools.backend import keras
 from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.telemetry.series import Telemetry
 

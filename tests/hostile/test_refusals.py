@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enhsim_tf.reproduce import settings
-from enhsim_tf.reproduce.__main__ import main
+from enhsim_tf.reproduce import main
+from tests.paper.conftest import TINY_OPTIONS
 
 ROOT = Path(__file__).parents[2]
 
 
-def _wave(num_samples=2_000):
+def _wave(num_samples=4_000):
     return np.sin(np.arange(num_samples) / 15) + 0.1 * np.random.default_rng(0).standard_normal(num_samples)
 
 
@@ -34,9 +34,9 @@ BAD_FILES = {  # the content of files is tried in tests/fuzzing
     "unknown kind": ("x.txt", lambda path: path.write_text("1\n2\n"), []),
     "empty": ("x.npy", lambda path: path.touch(), []),
     "no rows": ("x.csv", lambda path: path.write_text("value\n"), []),
-    "not numeric": ("x.npy", _array(np.array(["a"] * 2_000)), []),
-    "constant": ("x.npy", _array(np.full(2_000, 3.0)), []),
-    "nan": ("x.npy", _array(np.where(np.arange(2_000) == 7, np.nan, _wave())), []),
+    "not numeric": ("x.npy", _array(np.array(["a"] * 4_000)), []),
+    "constant": ("x.npy", _array(np.full(4_000, 3.0)), []),
+    "nan": ("x.npy", _array(np.where(np.arange(4_000) == 7, np.nan, _wave())), []),
     "infinite as float32": ("x.npy", _array(1e39 * _wave()), []),
     "true and false": ("x.npy", _array(_wave() > 0), []),
     "one name for two columns": (
@@ -44,19 +44,19 @@ BAD_FILES = {  # the content of files is tried in tests/fuzzing
         lambda path: path.write_text("a,a\n" + "".join(f"{value},{-value}\n" for value in _wave())),
         ["--column", "a"],
     ),
-    "below two windows": ("x.npy", _array(_wave(999)), []),
-    "three axes": ("x.npy", _array(np.zeros((2_000, 2, 2))), []),
-    "which column": ("x.npy", _array(np.zeros((2_000, 2))), []),
-    "column number too large": ("x.npy", _array(np.zeros((2_000, 2))), ["--column", "2"]),
+    "too short": ("x.npy", _array(_wave(999)), []),
+    "three axes": ("x.npy", _array(np.zeros((4_000, 2, 2))), []),
+    "which column": ("x.npy", _array(np.zeros((4_000, 2))), []),
+    "column number too large": ("x.npy", _array(np.zeros((4_000, 2))), ["--column", "2"]),
     "column name": ("x.csv", lambda path: _table(path, a=_wave(), b=_wave()), ["--column", "volts"]),
     "time column": ("x.csv", lambda path: _table(path, a=_wave()), ["--time", "utc"]),
     "time of an array": ("x.npy", _array(_wave()), ["--time", "utc"]),
     "pickled objects": ("x.npy", _array(np.array([{}, None] * 1_000, object)), []),
-    "irregular times": ("x.csv", lambda path: _table(path, a=_wave(), t=np.arange(2_000) ** 1.1), ["--column", "a", "--time", "t"]),
-    "falling times": ("x.csv", lambda path: _table(path, a=_wave(), t=-np.arange(2_000)), ["--column", "a", "--time", "t"]),
+    "irregular times": ("x.csv", lambda path: _table(path, a=_wave(), t=np.arange(4_000) ** 1.1), ["--column", "a", "--time", "t"]),
+    "falling times": ("x.csv", lambda path: _table(path, a=_wave(), t=-np.arange(4_000)), ["--column", "a", "--time", "t"]),
     "a word among the times": (
         "x.csv",
-        lambda path: _table(path, a=_wave(), t=[*range(1_999), "soon"]),
+        lambda path: _table(path, a=_wave(), t=[*range(3_999), "soon"]),
         ["--column", "a", "--time", "t"],
     ),
 }
@@ -103,18 +103,19 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["--seed", "-1"], "--seed -1"),
+        (["--seed", "-1"], "-1"),
         (["--seed", str(2**32)], str(2**32)),  # the detectors and the classifier accept no larger seed
-        (["--spread", "-1"], "--spread -1"),
         (["--only", "fig99"], "fig99"),
         (["--only", "fig0"], "fig0"),
-        (["--only", ""], "fig01"),
+        (["--only", ""], "--only"),
         (["--column", "0"], "--telemetry"),
         (["--time", "t"], "--telemetry"),
         (["--seed", "abc"], "'abc'"),
         (["--budget", "tiny"], "'tiny'"),
         (["--seed"], "--seed"),
         (["--sed", "3"], "--sed 3"),
+        (["--set", "dropout"], "dropout"),
+        (["--set", "no_such=1"], "no_such"),
         (["--experiment", "robustness"], "--experiment"),
         (["--telemetry"], "--telemetry"),
     ],
@@ -164,8 +165,7 @@ def test_a_refusal_as_the_shell_sees_it(tmp_path, arguments):
 
 
 STRANGE = {
-    "two windows": _wave(1_000),
-    "a few samples more": _wave(1_100),
+    "barely long enough": _wave(800),
     "a ramp without noise": np.arange(3_000.0),
     "one step": (np.arange(3_000) > 1_500).astype(np.float64),
     "still in training": np.concatenate([np.ones(2_200), _wave(800)]),
@@ -174,13 +174,9 @@ STRANGE = {
 
 
 @pytest.mark.parametrize("case", STRANGE)
-def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, monkeypatch, case):
-    counts = {"telemetry__num_windows": 12, "enhancer__hidden_units": 4, "enhancer__epochs": 1, "noise__filters": 4}
-    counts |= {"adversarial__batch_size": 8, "adversarial__num_iterations": 2, "adversarial__record_every": 1}
-    make = settings.make_settings
-    monkeypatch.setattr(settings, "make_settings", lambda budget, seed: make("full", seed, **counts, detectors__num_speed_windows=8))
+def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, case):
     np.save(tmp_path / "channel.npy", STRANGE[case])
-    code, _, lines = told("--budget", "smoke", "--telemetry", tmp_path / "channel.npy")
+    code, _, lines = told("--budget", "smoke", *TINY_OPTIONS, "--telemetry", tmp_path / "channel.npy")
     if code == 0:
         assert not lines and (tmp_path / "out" / "results.json").is_file()
     else:

@@ -67,7 +67,8 @@ def test_an_unknown_study_is_refused(refused):
 def test_the_budget_comes_from_the_environment(tmp_path, monkeypatch, refused):
     monkeypatch.setenv("ENHSIM_TF_CACHE", str(tmp_path))
     monkeypatch.setenv(lesson.BUDGET, lesson.SMOKE)
-    assert lesson.open_experiment().settings.budget == lesson.SMOKE
+    pipeline, budget = lesson.open_pipeline()
+    assert (budget, pipeline.settings.epochs) == (lesson.SMOKE, 2)
     monkeypatch.setenv(lesson.BUDGET, "endless")
     with refused("endless", lesson.BUDGET):
-        lesson.open_experiment()
+        lesson.open_pipeline()

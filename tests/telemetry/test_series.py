@@ -12,7 +12,6 @@ from enhsim_tf.telemetry.windows import (
     evenly_spaced_starts,
     random_window_starts,
     scattered_starts,
-    split_by_time,
 )
 
 RAMP = np.arange(12.0)
@@ -238,29 +237,6 @@ def test_parts_keep_the_clock():
     assert part.values.tolist() == [32, 33, 34]
     assert part.time_s.tolist() == [23.0, 23.5, 24.0] == whole.time_s[32:35].tolist()
     assert (part.start, part.name, part.unit, len(part)) == ("2020-03-01", "n", "V", 3)
-
-
-@pytest.mark.parametrize("number", [1_003, 5_000, 9_999])
-@pytest.mark.parametrize("fractions", [(0.7, 0.3), (0.6, 0.2, 0.2), (0.5, 0.3, 0.1, 0.1)])
-def test_split_leaves_gaps_and_uses_nearly_all_samples(number, fractions):
-    gap = 100
-    whole = Telemetry(np.arange(number, dtype=np.float32), interval_s=2.0, offset_s=11.0)
-    parts = split_by_time(whole, fractions, gap)
-    for before, after in zip(parts[:-1], parts[1:], strict=True):
-        assert after.values[0] - before.values[-1] - 1 == gap  # values are sample numbers
-    for part, fraction in zip(parts, fractions, strict=True):
-        assert (part.time_s == 11 + 2 * part.values).all()
-        assert len(part) == pytest.approx(fraction * (number - gap * (len(fractions) - 1)), abs=1)
-    assert parts[0].values[0] == 0 and number - len(parts) <= parts[-1].values[-1] + 1 <= number
-
-
-def test_split_refusals(refused):
-    series = Telemetry(np.arange(100, dtype=np.float32))
-    for fractions in [(0.5, 0.4), (1.2, -0.2), (0.0, 1.0)]:
-        with refused(str(fractions)):
-            split_by_time(series, fractions, 10)
-    with refused("gaps of 100"):
-        split_by_time(series, (0.5, 0.5), 100)
 
 
 def test_random_starts_reach_every_window_and_no_more(refused):

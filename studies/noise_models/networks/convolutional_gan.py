@@ -16,9 +16,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from enhsim_tf.common.backend import keras, tf
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.keras_tools.backend import keras, tf
-from enhsim_tf.keras_tools.training import predict_windows, seeded_initialiser
+from enhsim_tf.common.training import predict_windows, seeded_initialiser
 
 layers, ops = keras.layers, keras.ops
 

@@ -19,9 +19,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import gammaln
 
+from enhsim_tf.common.backend import keras
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.keras_tools.backend import keras
-from enhsim_tf.keras_tools.training import seeded_initialiser
+from enhsim_tf.common.training import seeded_initialiser
 from enhsim_tf.noise.window_bootstrap import MatchedWindowBootstrap, WindowBootstrap
 from enhsim_tf.telemetry.quantisation import Levels
 

@@ -13,7 +13,13 @@ from studies.factorial.run import run
 from studies.factorial.summary import KEPT
 from studies.robustness.replicate import Replicate
 
-SMALL = {"telemetry__num_windows": 40, "second__num_windows": 90, "robustness__num_windows": 30, "adversarial__num_iterations": 0}
+SMALL = {
+    "paper__num_windows": 40,
+    "second__num_windows": 90,
+    "robustness__num_windows": 30,
+    "paper__iterations": 1,
+    "paper__record_every": 1,
+}
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +29,7 @@ def without_networks(tmp_path_factory):
 
 def test_whole_windows_of_the_residual_are_added_to_the_signal(without_networks):
     one, cell = without_networks, Cell("many", "residual", "ridge", "whole windows")
-    coarse = one.data.windows("train", 30, TRAINING)["coarse"]
+    coarse = one.example.windows("train", 30, TRAINING)["coarse"]
     noise = one.arm(cell, TRAINING) - one.enhancer("ridge", "many")(coarse)
     extracted = one.extracted(*cell.source)
     assert extracted.shape == (90, 500)
@@ -42,12 +48,12 @@ def test_the_residual_is_telemetry_minus_the_signal_and_keeps_its_scale(without_
 def test_few_and_many_windows_are_those_of_the_two_pipelines(without_networks):
     one = without_networks
     assert [len(one.training_starts(windows)) for windows in ("few", "many")] == [40, 90]
-    paper = one.data.windows("train", 40, "training windows")
+    paper = one.example.windows("train", 40, "training windows")
     assert np.array_equal(one.pairs(one.training_starts("few"))[1], paper["target"])
 
 
 def test_ridge_recovers_the_true_signal_from_the_coarse_one(without_networks):
-    windows = without_networks.data.windows("test", None)
+    windows = without_networks.example.windows("test", None)
     error = [np.std(without_networks.enhancer("ridge", level)(windows["coarse"]) - windows["truth"]) for level in ("few", "many")]
     assert error[1] < error[0] < np.std(windows["coarse"] - windows["truth"])
 
@@ -87,7 +93,7 @@ SAME = {
 
 @pytest.mark.usefixtures("narrow_networks")
 def test_cells_that_both_studies_have_are_the_same(tmp_path):
-    settings = make_settings("smoke", telemetry__noise="shot", **SMALL)
+    settings = make_settings("smoke", paper__hidden_units=64, **SMALL).of("shot", 0)
     replicate = Replicate(settings, Stages(tmp_path))
     one, arms = Pipelines(replicate), replicate.arms(TRAINING)
     for arm, cell in SAME.items():

@@ -58,7 +58,7 @@ def test_aligned_windows_have_the_mean_and_the_covariance_of_the_target():
 
 
 def test_the_gradient_of_the_domain_is_reversed():
-    from enhsim_tf.keras_tools.backend import tf
+    from enhsim_tf.common.backend import tf
     from studies.few_windows.domain_adversarial import reverse_gradient
 
     values = tf.constant([1.0, -2.0, 3.0])
@@ -88,7 +88,7 @@ def test_a_cell_has_all_training_data_and_is_read_from_the_cache(tmp_path):
     counts = {"num_real": (6,), "first_seed": 3, "num_windows": 30, "num_judged": 20, "num_anomalous": 6}
     changed = {f"few_windows__{name}": value for name, value in counts.items()}
     changed |= {"classifiers__num_real": (6,), "classifiers__num_steps": 3}
-    settings = make_settings("smoke", 3, telemetry__window=48, telemetry__noise="shot", **changed)
+    settings = make_settings("smoke", paper__window=48, **changed).of("shot", 3)
     first, again = (Cell(World(settings), 6).rows(Stages(tmp_path)) for _ in range(2))
     pd.testing.assert_frame_equal(first, again)
     simulated = [SIMULATOR + name for name in NOISE_MODELS]
@@ -99,7 +99,7 @@ def test_a_cell_has_all_training_data_and_is_read_from_the_cache(tmp_path):
 
 
 def test_the_record_ends_before_the_judged_windows():
-    world = World(make_settings("smoke", 3, few_windows__num_real=(5, 20), few_windows__num_judged=8))
+    world = World(make_settings("smoke", paper__seed=3, few_windows__num_real=(5, 20), few_windows__num_judged=8))
     few, many = world.record(5), world.record(20)
     np.testing.assert_array_equal(few.telemetry.values, many.telemetry.values[-5 * world.window :])
     assert few.telemetry.offset_s == 15 * world.window

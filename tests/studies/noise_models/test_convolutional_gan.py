@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from enhsim_tf.realism import measures
+from enhsim_tf.common import measures
 from studies.common.noise_processes import AutoregressiveNoise
 from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN, fit_convolutional_gan
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.realism.measures import autocorrelation
+from enhsim_tf.common.measures import autocorrelation
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
 WINDOW = 32

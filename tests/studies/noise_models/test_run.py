@@ -12,7 +12,7 @@ from studies.noise_models.summary import KEPT
 
 def test_every_model_is_tried_and_a_second_run_trains_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(cells, "DETECTORS", {name: DETECTORS[name] for name in ("limit check", "PCA residual")})
-    settings = make_settings("smoke", telemetry__window=64, robustness__num_windows=60)
+    settings = make_settings("smoke", paper__window=64, robustness__num_windows=60)
     out, told = tmp_path / "out", []
     out.mkdir()
     arguments = (settings, tmp_path / "cache", out, ["shot"], None, False)

@@ -40,6 +40,9 @@ class Windows:
         coarse = np.full((number, 10), float(len(self.purposes)))
         return {"coarse": coarse, "truth": coarse + 0.25, "target": coarse + 0.5}
 
+    def enhance(self, coarse):
+        return coarse + 1_000.0
+
     def draw(self, purpose):
         return np.random.default_rng(len(purpose))
 
@@ -47,7 +50,7 @@ class Windows:
 @pytest.fixture
 def replicate(tmp_path):
     made = Replicate(make_settings("smoke"), Stages(tmp_path))
-    made.experiment = type("Experiment", (), {"data": Windows(), "simulator": Pipeline(1_000.0)})()
+    made.example = Windows()
     made.__dict__["second"] = Pipeline(2_000.0)
     gans = {"enhanced": "GAN", "residual": "convolutional GAN"}
     made.__dict__["noises"] = {
@@ -71,7 +74,7 @@ def test_each_arm_is_the_clean_signal_of_its_pipeline_and_its_noise(replicate):
 
 def test_training_and_threshold_windows_are_drawn_separately(replicate):
     replicate.arms("arms, training"), replicate.arms("arms, threshold")
-    purposes = replicate.experiment.data.purposes
+    purposes = replicate.example.purposes
     assert len(set(purposes)) == len(purposes) == 4 and [part for part, _ in purposes] == ["train", "train", "train", "calibration"]
     for noises in replicate.noises.values():
         for noise in noises.values():

@@ -13,11 +13,13 @@ from studies.robustness.replicate import ARMS
 from studies.robustness.summary import KEPT
 
 SMALL = {
-    "telemetry__num_windows": 40,
+    "paper__num_windows": 40,
     "second__num_windows": 90,
     "robustness__num_windows": 120,
     "robustness__num_seeds": 1,
-    "adversarial__num_iterations": 1,
+    "paper__iterations": 1,
+    "paper__record_every": 1,
+    "paper__hidden_units": 64,
 }
 
 

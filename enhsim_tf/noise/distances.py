@@ -1,0 +1,229 @@
+"""Further distances between generated and real windows, with which `real_floor` judges noise (evaluates section 2.3 of the paper).
+
+Distances of spectra and correlations take the results of `window_spectra` or `lagged_products`, so that each window is transformed only
+once when the same windows are resampled many times.
+"""
+
+import functools
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.measures import lagged_products
+
+_TINY = 1e-30  # keeps logarithms and quotients of constant windows finite
+
+
+def lagged_square_products(windows: np.ndarray, max_lag: int) -> np.ndarray:
+    """`lagged_products` of the squared deviations from the mean, which show volatility clustering."""
+    return lagged_products((np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)) ** 2, max_lag)
+
+
+def autocorrelation_distance(generated_products: np.ndarray, real_products: np.ndarray) -> float:
+    """Largest absolute difference of two autocorrelations, which are computed from two sets of `lagged_products`."""
+    generated, real = (np.mean(products, axis=0) for products in (generated_products, real_products))
+    return float(np.max(np.abs(generated / (generated[0] + _TINY) - real / (real[0] + _TINY))))
+
+
+def log_scales(windows: np.ndarray) -> np.ndarray:
+    """Logarithm of each window's standard deviation, shape `(windows,)`."""
+    return np.log(np.std(windows, axis=1, dtype=np.float64) + _TINY)
+
+
+def log_scale_distance(generated_scales: np.ndarray, real_scales: np.ndarray) -> float:
+    """First Wasserstein distance between two sets of `log_scales`, which compares how the scale varies between windows."""
+    from scipy.stats import wasserstein_distance
+
+    return float(wasserstein_distance(generated_scales, real_scales))
+
+
+def excess_kurtosis(windows: np.ndarray) -> float:
+    """Excess kurtosis of the values: the standardised fourth moment minus 3, which is 0 for a Gaussian distribution."""
+    centred = np.asarray(windows, np.float64) - np.mean(windows, dtype=np.float64)
+    squares = centred**2
+    return float(np.mean(squares**2) / (np.mean(squares) ** 2 + _TINY) - 3)
+
+
+def kurtosis_difference(generated: np.ndarray, real: np.ndarray) -> float:
+    """Excess kurtosis of the generated values minus that of the real values. A positive difference means too heavy tails."""
+    return excess_kurtosis(generated) - excess_kurtosis(real)
+
+
+def tail_ratio(generated: np.ndarray, real: np.ndarray) -> float:
+    """Ratio of the 0.999 quantiles of the absolute values, generated to real. A ratio above 1 means too heavy tails."""
+    return float(np.quantile(np.abs(generated), 0.999) / (np.quantile(np.abs(real), 0.999) + _TINY))
+
+
+def power_spectrum(windows: np.ndarray) -> np.ndarray:
+    """Mean periodogram with a Hann taper, without the zero frequency, shape `(samples // 2,)`, in squared units for each bin."""
+    samples = windows.shape[1]
+    taper = np.hanning(samples + 2)[1:-1]
+    transformed = np.fft.rfft(np.asarray(windows, np.float64) * taper, axis=1)
+    return np.mean(np.abs(transformed[:, 1:]) ** 2, axis=0) / np.sum(taper**2)
+
+
+def window_spectra(windows: np.ndarray, time_half_bandwidth: float = 4, num_tapers: int = 7) -> np.ndarray:
+    """Multitaper power spectrum of each window (Thomson 1982), without the zero frequency and the Nyquist frequency.
+
+    Args:
+        windows: Windows of shape `(windows, samples)`.
+        time_half_bandwidth: Time half-bandwidth product: the number of samples times half the bandwidth in cycles per sample.
+        num_tapers: Number of Slepian tapers, over which the spectra are averaged.
+
+    Returns:
+        float64 array of shape `(windows, (samples - 1) // 2)`, in squared units for each bin. The expected spectrum of white
+        noise equals its variance in every bin.
+    """
+    values = np.asarray(windows, np.float64)
+    samples, power = values.shape[1], 0.0
+    for taper in _slepian_tapers(samples, time_half_bandwidth, num_tapers):
+        power = power + np.abs(np.fft.rfft(values * taper, axis=1)[:, 1 : (samples + 1) // 2]) ** 2
+    return power / num_tapers
+
+
+@functools.cache
+def _slepian_tapers(samples: int, time_half_bandwidth: float, num_tapers: int) -> np.ndarray:
+    from scipy.signal.windows import dpss
+
+    return dpss(samples, time_half_bandwidth, num_tapers)
+
+
+def geodesic_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
+    """Geodesic distance of two power spectra (Georgiou 2007), which compares their shapes independently of scale.
+
+    It is the standard deviation, over the bins, of the log ratio of the median `window_spectra`. Wunderlich and Sklar (2023)
+    evaluate generated noise with this distance.
+    """
+    return float(np.std(_log_ratio(generated_spectra, real_spectra)))
+
+
+def log_spectral_distance(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> float:
+    """Root mean square, over the bins, of the log ratio of the median `window_spectra`, which compares shape and scale."""
+    return float(np.sqrt(np.mean(_log_ratio(generated_spectra, real_spectra) ** 2)))
+
+
+def _log_ratio(generated_spectra: np.ndarray, real_spectra: np.ndarray) -> np.ndarray:
+    return np.log(np.median(generated_spectra, axis=0) + _TINY) - np.log(np.median(real_spectra, axis=0) + _TINY)
+
+
+def convolution_features(windows: np.ndarray, num_kernels: int = 16, seed: int = 0) -> np.ndarray:
+    """Features of each window by fixed random convolutions (ROCKET, Dempster et al. 2020), for a linear classifier.
+
+    The kernels have nine taps and all dilations that fit into a window. For each kernel, the features are the largest response
+    and the share of responses above a random threshold. Together with a linear classifier, this is a small convolutional
+    network that needs no training of its convolutions, and therefore no TensorFlow.
+
+    Args:
+        windows: Windows of shape `(windows, samples)`, standardised by the mean and the standard deviation of real windows.
+        num_kernels: Number of kernels for each of the dilations 1, 2, 4, ...
+        seed: Seed for the kernels and the thresholds.
+
+    Returns:
+        float32 array of shape `(windows, dilations * 2 * num_kernels)`.
+
+    Raises:
+        InputError: If the windows are shorter than a kernel.
+    """
+    rng, taps = np.random.default_rng(seed), 9
+    values = np.asarray(windows, np.float32)
+    if values.shape[1] < taps:
+        raise InputError(f"Expected windows of at least {taps} samples. Received: {values.shape[1]}.")
+    found = []
+    for dilation in 2 ** np.arange(int(np.log2((values.shape[1] - 1) / (taps - 1))) + 1):
+        kernels = rng.standard_normal((taps, num_kernels)).astype(np.float32)
+        kernels /= np.linalg.norm(kernels, axis=0)  # the responses to white noise of standard deviation 1 have standard deviation 1
+        thresholds = rng.standard_normal(num_kernels).astype(np.float32)
+        pooled = []
+        for begin in range(0, len(values), 64):  # 64 windows fit into the processor's cache
+            reach = np.lib.stride_tricks.sliding_window_view(values[begin : begin + 64], (taps - 1) * dilation + 1, axis=1)
+            response = np.ascontiguousarray(reach[:, :, ::dilation]) @ kernels
+            pooled.append(np.concatenate([response.max(axis=1), np.mean(response > thresholds, axis=1, dtype=np.float32)], axis=1))
+        found.append(np.concatenate(pooled))
+    return np.concatenate(found, axis=1)
+
+
+def density(generated_features: np.ndarray, real_features: np.ndarray, num_neighbours: int = 5) -> float:
+    """Mean number of real neighbourhoods that contain a generated window, divided by `num_neighbours` (Naeem et al. 2020).
+
+    The neighbourhood of a real window is the ball that extends to its `num_neighbours`-th nearest real window, in features
+    standardised by the real windows. The density of perfect noise is 1. Copies of a few typical windows have a density above 1.
+
+    Args:
+        generated_features: Features of generated windows, shape `(windows, features)`.
+        real_features: Features of real windows, shape `(windows, features)`.
+        num_neighbours: Rank of the neighbour that defines the radius of a neighbourhood.
+    """
+    return float(_inside(generated_features, real_features, num_neighbours).sum() / (num_neighbours * len(generated_features)))
+
+
+def coverage(generated_features: np.ndarray, real_features: np.ndarray, num_neighbours: int = 5) -> float:
+    """Share of real neighbourhoods (see `density`) that contain at least one generated window (Naeem et al. 2020).
+
+    The expected coverage of perfect noise, with equal numbers of windows, is `1 - 2 ** -num_neighbours`. A generator that
+    repeats itself has a lower coverage.
+
+    Args:
+        generated_features: Features of generated windows, shape `(windows, features)`.
+        real_features: Features of real windows, shape `(windows, features)`.
+        num_neighbours: Rank of the neighbour that defines the radius of a neighbourhood.
+    """
+    return float(_inside(generated_features, real_features, num_neighbours).any(axis=0).mean())
+
+
+def _inside(generated_features: np.ndarray, real_features: np.ndarray, num_neighbours: int) -> np.ndarray:
+    """Returns whether each generated window lies in each real neighbourhood, shape `(generated, real)`."""
+    from scipy.spatial.distance import cdist
+
+    if len(real_features) <= num_neighbours:
+        raise InputError(f"Expected more than {num_neighbours} real windows. Received: {len(real_features)}.")
+    generated, real = (_standardised(features, real_features) for features in (generated_features, real_features))
+    reach = np.partition(cdist(real, real, "sqeuclidean"), num_neighbours, axis=1)[:, num_neighbours]  # index 0 is the window itself
+    return cdist(generated, real, "sqeuclidean") <= reach
+
+
+def mmd_squared(generated_features: np.ndarray, real_features: np.ndarray) -> float:
+    """Unbiased estimate of the squared maximum mean discrepancy (MMD, Gretton et al. 2012).
+
+    The estimate has a mean of 0 for two samples of the same distribution, and can be negative. Features are standardised by
+    the real windows. The kernel is exp(-d^2 / (2 m^2)), where m is the median distance between real windows.
+    """
+    return float(_mmd(_kernel(generated_features, real_features), len(generated_features), np.arange(len(generated_features))[None])[0])
+
+
+def mmd_p_value(generated_features: np.ndarray, real_features: np.ndarray, num_permutations: int = 500, seed: int = 0) -> float:
+    """Permutation p-value of `mmd_squared`: the share of permutations of all windows whose MMD is at least as large.
+
+    Args:
+        generated_features: Features of generated windows, shape `(windows, features)`.
+        real_features: Features of real windows, shape `(windows, features)`.
+        num_permutations: Number of permutations.
+        seed: Seed for the permutations.
+    """
+    kernel, number, rng = _kernel(generated_features, real_features), len(generated_features), np.random.default_rng(seed)
+    chosen = rng.permuted(np.tile(np.arange(len(kernel)), (num_permutations, 1)), axis=1)[:, :number]
+    found = _mmd(kernel, number, np.concatenate([np.arange(number)[None], chosen]))
+    return float((1 + np.sum(found[1:] >= found[0] - 1e-12)) / (1 + num_permutations))
+
+
+def _kernel(generated_features: np.ndarray, real_features: np.ndarray) -> np.ndarray:
+    """Returns the kernel matrix of all windows, the generated windows first, with zeros on the diagonal."""
+    from scipy.spatial.distance import pdist, squareform
+
+    generated, real = (_standardised(features, real_features) for features in (generated_features, real_features))
+    bandwidth = max(np.median(pdist(real, "sqeuclidean")), 1e-12)
+    return squareform(np.exp(pdist(np.concatenate([generated, real]), "sqeuclidean") / (-2 * bandwidth)))
+
+
+def _mmd(kernel: np.ndarray, number: int, chosen: np.ndarray) -> np.ndarray:
+    """Returns the unbiased estimate for each row of `chosen`, which holds the indices of the windows treated as generated."""
+    is_generated = np.zeros((len(kernel), len(chosen)))
+    np.put_along_axis(is_generated, chosen.T, 1.0, axis=0)
+    to_generated, other = kernel @ is_generated, len(kernel) - number
+    both, cross = np.sum(is_generated * to_generated, axis=0), np.sum((1 - is_generated) * to_generated, axis=0)
+    rest = kernel.sum() - both - 2 * cross
+    return both / (number * (number - 1)) + rest / (other * (other - 1)) - 2 * cross / (number * other)
+
+
+def _standardised(features: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    spread = np.std(reference, axis=0)
+    return (features - np.mean(reference, axis=0)) / np.where(spread > 0, spread, 1)

@@ -1,0 +1,75 @@
+"""The paper's pipeline on its example with other kinds of noise, and its parts as the tool takes them."""
+
+import functools
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.stages import Stages
+from enhsim_tf.paper import settings as of_paper
+from enhsim_tf.paper import telemetry as of_example
+from enhsim_tf.paper.pipeline import VERSION, Pipeline
+from enhsim_tf.telemetry.series import Telemetry
+from studies.common.noise_gallery import GALLERY
+from studies.common.settings import Settings
+
+
+def draw_noise(kind: str, signal: np.ndarray, sd: float, rng: np.random.Generator) -> np.ndarray:
+    """Draws noise.
+
+    Args:
+        kind: Name of a process in `noise_gallery.GALLERY`.
+        signal: The signal without noise, shape `(samples,)`, on which one of the processes depends.
+        sd: Standard deviation of the noise.
+        rng: Random generator.
+
+    Returns:
+        float64 array of shape `(samples,)`.
+
+    Raises:
+        InputError: If there is no process of that name.
+    """
+    if kind not in GALLERY:
+        raise InputError(f"Expected noise of one of the kinds {', '.join(GALLERY)}. Received: {kind!r}.")
+    process = GALLERY[kind]
+    return sd / process.standard_deviation * process.draw(len(signal), rng, signal)
+
+
+def coarse_simulator(settings: of_paper.Settings) -> SquareWaveSimulator:
+    """The simulator of the example."""
+    waves = ((settings.orbit_period, settings.orbit_amplitude), (settings.rotation_period, settings.rotation_amplitude))
+    return SquareWaveSimulator([SquareWave(period, low=-size, high=size) for period, size in waves])
+
+
+class Example(Pipeline):
+    """The paper's pipeline on its example with one of several kinds of noise.
+
+    Args:
+        settings: All settings.
+        stages: Runs stages and caches their results.
+    """
+
+    def __init__(self, settings: Settings, stages: Stages):
+        super().__init__(settings.paper, stages)
+        self.noise, self.coarse = settings.noise, coarse_simulator(settings.paper)
+
+    @functools.cached_property
+    def telemetry(self) -> of_example.Telemetry:
+        """The telemetry."""
+        depends = self.settings.of("telemetry") | {"noise": self.noise}
+        folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
+        return of_example.ParquetStore(folder / "telemetry.parquet").read()
+
+    def _make_telemetry(self, folder: Path) -> None:
+        chosen = self.settings
+        clean = self.truth(chosen.interval * np.arange(chosen.num_samples))
+        noisy = clean + draw_noise(self.noise, clean, chosen.noise_sd, self.draw("telemetry"))
+        of_example.ParquetStore(folder / "telemetry.parquet").write(of_example.Telemetry(noisy.astype(np.float32), chosen.interval))
+
+    @functools.cached_property
+    def train(self) -> Telemetry:
+        """The training part, as the tool takes it."""
+        part = self.parts["train"]
+        return Telemetry(part.values, part.interval, name=part.name, offset_s=part.interval * part.first)

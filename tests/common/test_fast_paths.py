@@ -1,0 +1,242 @@
+import keras
+import numpy as np
+import pytest
+import tensorflow as tf
+
+from enhsim_tf.common import convolution_maximum as fast_path
+from enhsim_tf.common.convolution_maximum import convolution_maximum, num_layers_computed
+from enhsim_tf.common.fused_adam import fused_adam
+from enhsim_tf.common.training import fit_windows
+from enhsim_tf.enhancer.network import enhance
+from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.paper import noise as of_paper
+from tests.paper.conftest import tiny_settings
+
+WINDOW, FILTERS, WIDTH, STRIDE = 63, 14, 20, 4  # the last sample lies under no filter
+
+
+def arrays(num_rows, seed=0):
+    rng = np.random.default_rng(seed)
+    shapes = {"rows": (num_rows, WINDOW), "kernel": (WIDTH, FILTERS), "bias": (FILTERS,), "upstream": (num_rows, FILTERS)}
+    return {name: rng.normal(0, 0.3, shape).astype(np.float32) for name, shape in shapes.items()}
+
+
+def by_autodiff(rows, kernel, bias, kept=None, rate=0.0):
+    products = tf.nn.relu(tf.nn.conv1d(rows[:, :, None], kernel[:, None], STRIDE, "VALID") + bias)
+    if kept is not None:
+        products = tf.where(kept, products / (1 - rate), 0.0)
+    return tf.reduce_max(products, axis=1)
+
+
+def compare(given, fast, plain, tolerance=2e-6):
+    found = {}
+    for name, function in (("fast", fast), ("plain", plain)):
+
+        @tf.function
+        def run(rows, kernel, bias, upstream, function=function):
+            with tf.GradientTape() as tape:
+                tape.watch([rows, kernel, bias])
+                outputs = function(rows, kernel, bias)
+            return outputs, *tape.gradient(outputs, [rows, kernel, bias], upstream)
+
+        found[name] = [array.numpy() for array in run(*(tf.constant(given[key]) for key in ("rows", "kernel", "bias", "upstream")))]
+    for of_fast, of_plain in zip(found["fast"], found["plain"], strict=True):
+        np.testing.assert_allclose(of_fast, of_plain, rtol=0, atol=tolerance * max(1, np.abs(of_plain).max()))
+    return found["plain"]
+
+
+# 7 rows are less than a block, 10 one block, 23 two and a part of a third
+@pytest.mark.parametrize("num_rows", [7, 10, 23])
+def test_gradients_are_those_of_autodiff(num_rows):
+    compare(arrays(num_rows), lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
+
+
+def test_gradients_where_frames_tie():
+    given = arrays(12)
+    given["rows"] = np.tile(given["rows"][:, :STRIDE], (1, 16))[:, :WINDOW]  # period of one stride: every frame is the same
+    given["rows"][6:, -WIDTH:] *= 3  # in half of the rows the last frames differ
+    _, to_rows, _, _ = compare(given, lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
+    assert np.count_nonzero(to_rows[0]) == 60  # the gradient is shared by all frames, not given to the first
+
+
+def test_gradients_where_nothing_fires():
+    given = arrays(12)
+    given["rows"][3] = 0.0
+    given["bias"][:] = -0.01
+    given["bias"][5] = -100.0
+    outputs, to_rows, to_kernel, _ = compare(given, lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
+    assert not outputs[3].any() and not to_rows[3].any() and not to_kernel[:, 5].any() and to_kernel.any()
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.95])  # at 0.95 some filters lose every frame
+def test_gradients_with_dropped_products(rate):
+    given, seed = arrays(23), tf.constant([3, 4])
+    seeds = tf.unstack(tf.random.split(seed, 3))
+    shapes = [tf.TensorShape((number, 11, FILTERS)) for number in (10, 10, 3)]
+    kept = tf.concat([fast_path._kept(shape, rate, each) for shape, each in zip(shapes, seeds, strict=True)], axis=0)
+    if rate == 0.95:
+        assert not kept.numpy().any(axis=1).all()
+    compare(
+        given,
+        lambda *given: convolution_maximum(*given, STRIDE, rate, seed),
+        lambda *given: by_autodiff(*given, kept, rate),
+        tolerance=2e-6 / (1 - rate),
+    )
+
+
+def test_dropped_products_are_drawn_independently_at_the_rate():
+    kept = fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 2])).numpy()
+    error = np.sqrt(0.3 * 0.7 / len(kept))
+    assert abs(kept.mean() - 0.7) < 5 * error
+    for lag in (1, 2, 8):  # neighbours come out of one word
+        assert abs(np.mean(kept[lag:] & kept[:-lag]) - 0.49) < 5 * np.sqrt(0.49 * 0.51 / len(kept)) * 2
+    assert not np.array_equal(kept, fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 3])).numpy())
+
+
+def test_mean_under_dropout_is_that_of_the_keras_layers():
+    row = arrays(1)["rows"]
+    model = small_discriminator(dropout=0.3)
+    by_keras = keras.Sequential(model.layers[:3])
+    first, draws = model.layers[0], 4_000
+    many = tf.constant(np.repeat(row, draws, axis=0))
+    ours = convolution_maximum(many, tf.squeeze(tf.convert_to_tensor(first.kernel), 1), first.bias.value, STRIDE, 0.3, tf.constant([5, 6]))
+    theirs = by_keras(many[:, :, None], training=True).numpy()
+    error = np.sqrt((ours.numpy().var(0) + theirs.var(0)) / draws)
+    assert (np.abs(ours.numpy().mean(0) - theirs.mean(0)) <= 5 * error + 1e-6).all()
+    assert (ours.numpy().std(0) > 0).any()
+
+
+def small_discriminator(dropout=0.0):
+    return of_paper.build_discriminator(tiny_settings(window=WINDOW, filters=FILTERS, narrow_units=5, dropout=dropout))
+
+
+def test_training_with_dropout_draws_anew_in_each_step_and_repeats():
+    rows, trained = tf.constant(np.random.default_rng(0).normal(0, 0.1, (16, WINDOW)), tf.float32), []
+    for _ in range(2):
+        settings = tiny_settings(window=WINDOW, filters=FILTERS, narrow_units=5, dropout=0.3, rows=16, fast=True)
+        gan = of_paper.NoiseGAN(of_paper.build_generator(settings), of_paper.build_discriminator(settings), settings)
+        gan.compile()
+        assert isinstance(gan.discriminator.layers[0], fast_path.ConvolutionMaximum)
+        convolution, *_, narrow, _ = gan.discriminator.layers
+        drops = [layer.seed_generator.state for layer in (convolution.dropout, narrow)]
+        before = [each.numpy().copy() for each in drops]
+        gan.train_discriminator(rows[:, :, None], of_paper.labels(16, of_paper.REAL))
+        assert all((old != new.numpy()).any() for old, new in zip(before, drops, strict=True))
+        trained.append([weight.numpy() for weight in gan.discriminator_weights])
+    for one, other in zip(*trained, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    "layers",
+    [
+        [keras.layers.Conv1D(3, 20, 4, activation="tanh"), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 4, activation="relu", padding="same"), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 3, activation="relu"), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 4, activation="relu", use_bias=False), keras.layers.GlobalMaxPooling1D()],
+        [keras.layers.Conv1D(3, 20, 4, activation="relu"), keras.layers.GlobalAveragePooling1D()],
+        [keras.layers.Flatten(), keras.layers.Dense(3)],
+        [keras.layers.GlobalMaxPooling1D()],
+    ],
+)
+def test_other_layers_are_left_to_keras(layers):
+    model = keras.Sequential([keras.Input((WINDOW, 1)), *layers, keras.layers.Dense(1, activation="sigmoid")])
+    assert num_layers_computed(model.layers) == 0
+    assert num_layers_computed(small_discriminator().layers) == 2
+    assert num_layers_computed(small_discriminator(dropout=0.3).layers) == 3
+
+
+def enhancer_and_windows():
+    from enhsim_tf.enhancer.network import build_enhancer
+
+    windows = np.random.default_rng(0).normal(size=(80, 24)).astype(np.float32)
+    return build_enhancer(24, 40), windows[:, ::-1].copy(), windows
+
+
+def test_enhancer_trains_as_under_keras_adam():
+    ours, source, target = enhancer_and_windows()
+    history = fit_windows(ours, source, target, epochs=5, batch_size=20, seed=3, verbose=0)  # 20 steps
+    plain, _, _ = enhancer_and_windows()
+    plain.compile(keras.optimizers.Adam(0.001), loss="mean_squared_error")
+    rng = np.random.default_rng(3)
+    orders = [rng.permutation(80) for _ in range(5)]
+    expected = {"loss": [plain.fit(source[o], target[o], batch_size=20, verbose=0, shuffle=False).history["loss"][0] for o in orders]}
+    np.testing.assert_allclose(history["loss"], expected["loss"], rtol=2e-6)
+    for weight, of_plain in zip(ours.weights, plain.weights, strict=True):
+        np.testing.assert_allclose(weight.numpy(), of_plain.numpy(), atol=2e-6)
+
+
+def test_fused_adam_moves_the_weights_as_adam_does():
+    start, rng = np.linspace(-1, 1, 50).astype(np.float32), np.random.default_rng(1)
+    gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(np.float32)  # from far below epsilon upwards
+    moved = []
+    for optimizer in (fused_adam(0.01), keras.optimizers.Adam(0.01)):
+        weight = keras.Variable(start)
+        optimizer.build([weight])
+        for gradient in gradients:
+            optimizer.apply([tf.constant(gradient)], [weight])
+        moved.append(weight.numpy() - start)
+    np.testing.assert_allclose(moved[0], moved[1], rtol=1e-4, atol=2e-6)
+    assert np.abs(moved[0]).max() > 0.1
+
+
+def small_simulator():
+    from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+
+    enhancer, _, _ = enhancer_and_windows()
+    waves = SquareWaveSimulator([SquareWave(period_s=10.0, low=-0.5, high=0.5)])
+    return EnhancedSimulator(waves, enhancer, GaussianNoise(0.1, 24), offset=1.0, scale=2.0)
+
+
+@pytest.mark.parametrize("mode", [None, "friction", "dropout"])
+def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
+    from enhsim_tf.enhanced_simulator import simulator as enhanced_simulator
+
+    from enhsim_tf import Degraded
+
+    simulator, scenario = small_simulator(), mode and Degraded(mode)
+    whole = simulator.generate(23, scenario, seed=5)
+    monkeypatch.setattr(enhanced_simulator, "_CHUNK", 4)
+    np.testing.assert_allclose(simulator.generate(23, scenario, seed=5), whole, atol=1e-6)
+    coarse = simulator.generate_coarse(23, scenario, seed=5)
+    if mode is None:  # a degraded window is the degraded run only where the mode has changed it
+        noise = simulator.noise.generate(23, np.random.default_rng([5, 1]))
+        np.testing.assert_allclose(whole, simulator.enhance(coarse) + noise, atol=1e-6)
+    assert np.abs(whole - simulator.generate(23, scenario, seed=6)).max() > 0.01
+
+
+def test_windows_do_not_depend_on_the_batch_size():
+    simulator, coarse = small_simulator(), small_simulator().generate_coarse(23)
+    expected = simulator.enhancer.predict(coarse, verbose=0)
+    for batch_size in (1, 5, 23, 1_000):
+        np.testing.assert_allclose(enhance(simulator.enhancer, coarse, batch_size), expected, atol=1e-6)
+    assert enhance(simulator.enhancer, coarse[:0]).shape == (0, 24)
+
+
+def test_parquet_holds_the_generated_windows(tmp_path, monkeypatch):
+    import pandas as pd
+    import pyarrow.parquet as pq
+    from enhsim_tf.enhanced_simulator import simulator as enhanced_simulator
+
+    monkeypatch.setattr(enhanced_simulator, "_CHUNK", 10)
+    simulator, path = small_simulator(), tmp_path / "new" / "windows.parquet"
+    simulator.generate_to_parquet(path, 23, seed=5)
+    np.testing.assert_array_equal(np.stack(pd.read_parquet(path)["window"]), simulator.generate(23, seed=5))
+    about = pq.ParquetFile(path)
+    assert about.metadata.num_row_groups == 3 and about.metadata.row_group(0).column(0).compression == "ZSTD"
+    assert str(about.schema_arrow.field("window").type) == "fixed_size_list<element: float>[24]"
+    assert [file.name for file in path.parent.iterdir()] == ["windows.parquet"]
+
+
+def test_a_failed_generation_leaves_the_old_file(tmp_path):
+    from enhsim_tf.telemetry.parquet_store import write_windows
+
+    def broken():
+        yield np.zeros((2, 3), np.float32)
+        raise RuntimeError("stopped")
+
+    path = tmp_path / "windows.parquet"
+    path.write_bytes(b"old")
+    with pytest.raises(RuntimeError, match="stopped"):
+        write_windows(path, broken(), 3)
+    assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 1

@@ -1,0 +1,115 @@
+"""The page of a run: what is on it, its structure for screen readers, and that it loads and runs nothing, whatever names it shows."""
+
+import html.parser
+import itertools
+import re
+import struct
+
+import pytest
+
+from enhsim_tf.paper import report
+from enhsim_tf.paper.claims import CLAIMS, judge
+from enhsim_tf.paper.figures import FIGURES
+from enhsim_tf.paper.settings import Settings
+
+HOSTILE = "\"'><img src=x onerror=alert(1)><script>alert(2)</script></table>{{ 7 * 7 }}&lt;" + "T1_" * 80 + ".npy"
+LEFT_OPEN = ("meta", "img", "input", "wbr")
+
+
+def found_of(name="the paper's example", published=None, **changed):
+    """What a run found, with the first claim measured."""
+    limits = {limit.name for limit in CLAIMS[0].limits} | {limit.high for limit in CLAIMS[0].limits if isinstance(limit.high, str)}
+    records = [judge(claim, dict.fromkeys(limits, 0.0421) if claim is CLAIMS[0] else {}) for claim in CLAIMS]
+    about = {"budget": "full", "seconds": 41.2, "stages": {"enhancer": 30.0}, "from_cache": ["enhancer"], "command": f"run {name}"}
+    return report.results(records, "[¬Re]", Settings(), published, telemetry=name, **about | changed)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a stand-in for each figure, as PNG and SVG; of a PNG, only the size is read."""
+    folder = tmp_path_factory.mktemp("report")
+    for name in FIGURES:
+        (folder / f"{name}.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 1440, 700))
+        (folder / f"{name}.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+    return folder
+
+
+class Page(html.parser.HTMLParser):
+    """All tags with their attributes, and the words; refuses what is not closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.words = [], [], ""
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in LEFT_OPEN:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, text):
+        self.words += f" {text}"
+
+    def of(self, *tags):
+        return [attributes for tag, attributes in self.tags if tag in tags]
+
+
+def read(folder, found):
+    return Page(report.write_page(folder, found, Settings()).read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return read(folder, found_of())
+
+
+def test_every_figure_has_its_text_alternative(page):
+    assert [each["id"] for each in page.of("figure")] == list(FIGURES)
+    assert [each["alt"] for each in page.of("img")] == [about.alt for about in FIGURES.values()]
+
+
+def test_every_claim_has_its_sentence_and_what_decides(page):
+    words = " ".join(page.words.split())
+    assert all(claim.sentence in words for claim in CLAIMS) and "0.0421" in words
+
+
+def test_hostile_names_are_escaped(folder, page):
+    hostile = read(folder, found_of(HOSTILE))
+    assert [tag for tag, _ in hostile.tags] == [tag for tag, _ in read(folder, found_of("plain")).tags]
+    assert {name for _, attributes in hostile.tags for name in attributes} <= {name for _, attributes in page.tags for name in attributes}
+    assert HOSTILE in hostile.words
+
+
+def test_nothing_is_loaded_and_nothing_runs(page, folder):
+    assert not page.of("script", "link", "iframe", "object", "embed", "base")
+    for _, attributes in page.tags:
+        assert not [name for name in attributes if name.startswith("on") or name in ("srcset", "background", "poster")]
+        assert attributes.get("src", "data:").startswith("data:")
+    style = re.search(r"<style>(.*?)</style>", (folder / "report.html").read_text(encoding="utf-8"), re.S)[1]
+    assert not re.search(r"url\(|@import|https?:", style)
+    (policy,) = (each["content"] for each in page.of("meta") if "http-equiv" in each)
+    assert "default-src 'none'" in policy and "script-src" not in policy
+
+
+def test_headings_are_in_order_and_links_lead_to_places(page):
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch("h[1-4]", tag)]
+    assert levels[0] == 1 and levels.count(1) == 1
+    assert all(after - before <= 1 for before, after in itertools.pairwise(levels))
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    targets = [attributes["href"] for attributes in page.of("a")]
+    assert {target[1:] for target in targets if target.startswith("#")} <= set(ids)
+
+
+def test_a_missing_figure_leaves_the_old_page(tmp_path, folder):
+    (tmp_path / "report.html").write_text("old")
+    with pytest.raises(FileNotFoundError):
+        report.write_page(tmp_path, found_of(), Settings())
+    assert (tmp_path / "report.html").read_text() == "old" and len(list(tmp_path.iterdir())) == 1

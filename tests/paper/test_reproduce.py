@@ -1,0 +1,146 @@
+import json
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf import reproduce
+from enhsim_tf.paper import report
+from enhsim_tf.paper.claims import judge_all
+from enhsim_tf.paper.figures import FIGURES
+from enhsim_tf.paper.telemetry import ParquetStore
+from tests.paper.conftest import TINY_OPTIONS
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def ran(cache, pipeline, tmp_path_factory):
+    """The command at the tiny size, which finds the stages of the pipeline in the cache."""
+    judge_all(pipeline)
+    out = tmp_path_factory.mktemp("out")
+    code = reproduce.main(["--budget", "smoke", "--cache", str(cache), "--out", str(out), *TINY_OPTIONS])
+    return code, out, json.loads((out / "results.json").read_text())
+
+
+def test_every_figure_is_written_and_the_page_shows_it(ran):
+    code, out, _ = ran
+    assert code == 0
+    page = (out / "report.html").read_text()
+    for name in FIGURES:
+        assert (out / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
+        assert f'id="{name}"' in page and (out / f"{name}.svg").stat().st_size > 1_000
+    assert not re.search(r"<script|https?://(?!arxiv\.org)[^\"]*\"", re.sub(r'src="data:[^"]*"', "", page))
+
+
+def test_the_box_is_the_same_on_the_terminal_in_the_results_and_in_markdown(ran):
+    box = ran[2]["box"]
+    for table in (report.as_text(box), report.as_markdown(box)):
+        for row in box:
+            assert all(value in table for value in row.values())
+    assert [row["this run"] for row in box] == [claim["verdict"] for claim in ran[2]["claims"]]
+
+
+def test_what_the_box_shows_is_what_decides():
+    limits = [{"name": "x", "words": "x", "value": 0.25, "low": None, "high": 0.1, "decides": "basic", "holds": False}]
+    record = {"id": "C1", "short": "s", "verdict": "not reproduced", "deciding": limits[0]}
+    published = {"claims": {"C1": {"verdict": "undecided", "agreeing": 6, "of": 10}}}
+    assert report.box([record], published)[0] == {
+        "claim": "C1 s",
+        "published": "undecided, 6 of 10 runs",
+        "this run": "not reproduced",
+        "because": "x: 0.25, needed at most 0.1",
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "different", "code"), [([], ["C1: nrmse"], 1), ([], [], 0), ([], None, 0), (["--budget", "smoke"], ["C1: nrmse"], 0)]
+)
+def test_the_exit_code_says_whether_a_measurement_lies_outside_its_published_range(arguments, different, code, capsys):
+    assert reproduce.conclude(reproduce.parse(arguments), different) == code
+    assert ("C1: nrmse" in capsys.readouterr().out) == (code == 1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [(["--help"], 0), (["--seed", "-1"], 2), (["--only", "fig99"], 2), (["--cache", "README.md/below", "--out", "."], 2)],
+)
+def test_answers_that_need_no_network_import_none(arguments, code):
+    program = f"""
+import sys
+from enhsim_tf.reproduce import main
+try:
+    code = main({arguments!r})
+except SystemExit as left:
+    code = left.code
+print()
+print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.stdout.splitlines()[-1] == f"{code} []", done.stderr
+
+
+def test_control_characters_reach_neither_caption_nor_results():
+    line = reproduce.command_line(reproduce.parse(["--telemetry", "a\x1b[31m\u202e.csv", "--column", "b\nc"]))
+    assert line.isprintable() and "a?[31m?.csv" in line
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_table_with_times_keeps_them(tmp_path, kind):
+    times = np.datetime64("2021-03-04T05:06:07") + np.arange(4_000) * np.timedelta64(30, "s")
+    values = np.sin(np.arange(4_000) / 15) + 0.1 * np.random.default_rng(0).standard_normal(4_000)
+    table = pd.DataFrame({"utc": times, "volts": values, "amperes": 0.0})
+    table.to_csv(tmp_path / "x.csv", index=False) if kind == "csv" else table.to_parquet(tmp_path / "x.parquet")
+    arguments = ["--telemetry", tmp_path / f"x.{kind}", "--column", "volts", "--time", "utc", "--only", "fig14"]
+    assert reproduce.main([str(each) for each in [*arguments, "--out", tmp_path / "out", "--cache", tmp_path / "cache"]]) == 0
+    (folder,) = (tmp_path / "cache").iterdir()
+    kept = ParquetStore(folder / "telemetry.parquet").read()
+    assert (kept.start, kept.interval, len(kept.values)) == ("2021-03-04T05:06:07Z", 30, 4_000)
+    slope, offset = np.polyfit(values, kept.values, 1)  # the pipeline's unit is that of the square wave
+    np.testing.assert_allclose(kept.values, slope * values + offset, atol=1e-5)
+
+
+def test_killed_in_training_it_ends_with_the_same_numbers(ran, tmp_path):
+    out, cache = tmp_path / "out", tmp_path / "cache"
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", "--cache", cache, "--out", out, *TINY_OPTIONS]
+    for stage in ("enhancer", "noise GAN"):
+        process = subprocess.Popen([*map(str, command)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        for line in process.stdout:
+            if line.startswith(stage):
+                process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+        assert not list(cache.glob(f"{stage}-*")), "no part of the killed stage stands under its name"
+    assert not (out / "results.json").exists()
+    done = subprocess.run([*map(str, command)], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((out / "results.json").read_text())
+    assert found["from_cache"] == ["telemetry", "enhancer", "enhancement"]
+    claims, expected = ([claim for claim in each["claims"] if claim["id"] != "C2"] for each in (found, ran[2]))
+    assert claims == expected, "to the last digit, in another cache"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--set", "dropout"],
+        ["--set", "no_such=1"],
+        ["--only", "fig99"],
+        ["--seed", "-1"],
+        ["--column", "volts"],
+        ["--telemetry", "no_such.csv"],
+        ["--store", "postgres"],
+        ["--budget", "smoke", "--out", "figures"],
+        ["--budget", "huge"],
+    ],
+)
+def test_an_option_that_cannot_be_used_gives_one_line_and_code_2(arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert reproduce.main(arguments) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and re.match(r"error: Expected .*Received: ", lines[0])
+    assert not list(tmp_path.rglob("*.png"))
