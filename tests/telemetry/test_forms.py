@@ -65,6 +65,14 @@ READ = {
     "date and time of day": (table("date,clock,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), VALUES), START),
     "year and day of year": (table("Year,DOY,Hour,Min,v", stamps("%Y"), stamps("%j"), stamps("%H"), stamps("%M"), VALUES), START),
     "year, month and day": (table("YYYY,MM,DD,HH,mn,v", *(stamps(f"%{part}") for part in "YmdHM"), VALUES), START),
+    "a compact date and a time of day": (table("Date,Time,v", stamps("%Y%m%d"), stamps("%H:%M:%S"), VALUES), START),
+    "seconds of the day": (table("year,doy,sod,v", stamps("%Y"), stamps("%j"), SECONDS, VALUES), START),
+    "milliseconds in a third column": (
+        table("date,clock,ms,v", stamps("%Y-%m-%d"), stamps("%H:%M:%S"), [70] * N, VALUES),
+        START + pd.Timedelta("70ms"),
+    ),
+    "a unit below the name": (table("Time,v", 1000 * SECONDS, VALUES).replace("v\n", "v\n[ms],V\n", 1), ZERO),
+    "names in two lines": (table(",v", stamps("%Y-%m-%d %H:%M"), VALUES).replace(",v\n", ",v\ntime,V\n", 1), START),
     "seconds in brackets": (table("Time (s),v", SECONDS, VALUES), ZERO),
     "milliseconds in the name": (table("timestamp_ms,v", 1000 * SECONDS, VALUES), ZERO),
     "minutes elapsed": (table("elapsed [min],v", np.arange(N), VALUES), ZERO),
@@ -128,6 +136,27 @@ ASKED = {
         ["at line 2", "--time-format"],
         {"options": Cleaning(time_format="%H:%M:%S %d-%m-%Y")},
         60,
+    ),
+    "an unknown form of time": (table("when,v", stamps("%y-%jT%H:%M"), VALUES), ["'24-061T00:00'", "--time when"], {"time": "none"}, 1),
+    "a date and a time in numbers": (table("Date,Time,v", stamps("%Y%m%d"), stamps("%H%M%S"), VALUES), ["one column"], None, 0),
+    "a zone in letters": (table("time,v", stamps("%Y-%m-%d %H:%M CET"), VALUES), ["offset such as +01:00"], None, 0),
+    "two clocks": (
+        table("event_time,received_time,v", stamps("%Y-%m-%d %H:%M"), stamps("%Y-%m-%d %H:%M:01"), VALUES),
+        ["event_time, received_time"],
+        {"time": "event_time"},
+        60,
+    ),
+    "states that change often": (
+        table("time,mode,v", stamps("%Y-%m-%d %H:%M"), ["A", "B"] * (N // 2), VALUES),
+        ["--series-column mode", "--series-column none"],
+        {"options": Cleaning(series_column="none")},
+        60,
+    ),
+    "a point where there are commas": (
+        table("Zeit;U", stamps("%d.%m.%Y %H:%M"), ["1.234"] * N, separator=";"),
+        ["'1.234'", "--decimal"],
+        None,
+        0,
     ),
     "no names": (table("0.0,20.0", SECONDS[1:] + 0.5, VALUES[1:]), ["--no-header"], None, 0),
     "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), ["digits"], None, 0),
@@ -441,3 +470,13 @@ def test_whole_and_fractional_seconds_are_read_in_one_column(tmp_path):
     (tmp_path / "a.csv").write_text(table("time;v", times, VALUES, separator=";"))
     index = only(read_source(tmp_path / "a.csv")).index
     assert (index[0] - START.tz_localize(None), index[1] - index[0]) == (pd.Timedelta("250ms"), pd.Timedelta("59.75s"))
+
+
+def test_text_of_windows_is_read_with_its_signs(tmp_path):
+    (tmp_path / "a.csv").write_bytes(table("Zeit;Preis in €", stamps("%Y-%m-%d %H:%M"), VALUES, separator=";").encode("cp1252"))
+    assert list(read_source(tmp_path / "a.csv")) == ["Preis in €"]
+
+
+def test_a_year_and_a_month_are_the_first_day_of_the_month(tmp_path):
+    (tmp_path / "a.csv").write_text(table("year,month,v", 1990 + np.arange(N) // 12, 1 + np.arange(N) % 12, VALUES))
+    assert only(read_source(tmp_path / "a.csv")).index[-1] == pd.Timestamp("1994-12-01")

@@ -159,7 +159,7 @@ BAD = {
     "no columns named": ("a.csv", "a,b\n1,2\n", {"columns": []}, "columns=[]"),
     "a channel of a file": ("a.csv#a", "a,b\n1,2\n", {}, "a.csv#a"),
     "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
-    "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "none in a.parquet"),
+    "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "lists in 'window'"),
     "two levels of names": (
         "a.parquet",
         pd.DataFrame([[1.0, 2.0]], columns=pd.MultiIndex.from_tuples([("a", "x"), ("a", "y")])),

@@ -46,7 +46,7 @@ class Cleaning:
         min_part: Shortest part that is kept, in samples.
         label_column: Name, or names, of the columns of a table that label anomalous rows, or "none". None: detected.
         labelled: Treatment of rows that are labelled anomalous: "keep" them, or take their values as "missing".
-        series_column: Name, or names, of the columns whose values tell several series of one table apart. None: detected.
+        series_column: Name, or names, of the columns whose values tell several series of one table apart, or "none". None: detected.
         value_column: Name, or names, of the columns that hold the values of such series. None: all columns of numbers.
         no_header: Whether a text file has no line of column names. Its columns are then called "column 0", "column 1", ...
 

@@ -290,7 +290,10 @@ def _from_dates_as_text(
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
     bad = dates.isna().to_numpy() & ~missing
-    _refuse(cells, bad, what, places, drop, f"Give time_format (--time-format {'%d.%m.%Y %H:%M:%S'!r}) or name another time column")
+    then = "Give time_format (--time-format '%d.%m.%Y %H:%M:%S') or name another time column"
+    if bad.any() and re.search(r"\d ?(?:[A-Z]{3,5}|\[.*\])$", str(cells[bad].iloc[0])):
+        then = "Write the zone as an offset such as +01:00"
+    _refuse(cells, bad, what, places, drop, then)
     if leap.any():
         text = f"leap seconds, taken as the following second: {leap.sum():,}"
         findings.append(Finding("leap seconds", int(leap.sum()), text, tuple(places.of(row) for row in np.flatnonzero(leap)[:3])))

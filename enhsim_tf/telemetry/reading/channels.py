@@ -1,5 +1,6 @@
 """Reads the channels of a table, each with its times and with findings that say what was decided."""
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from enhsim_tf.telemetry.reading.table import Table
 _SAID = {
     "row numbers": "columns that number the rows, not taken as channels",
     "quality flags": "columns of quality flags, not taken as channels; name them with columns (--column) if they are telemetry",
-    "further clocks": "columns that show the time once more, not taken as channels",
+    "further clocks": "further columns of times, not taken as channels",
     "own columns": "columns that this tool wrote beside the values, not taken as channels",
     "columns left out": "columns without numbers",
 }
@@ -32,6 +33,11 @@ def read_table_channels(
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
     what = _name_of(source)
     table = _without_repeats(read_table(source, options), columns, time, options, what)
+    lists = next((name for name, cells in table.frame.items() if isinstance(next(iter(cells), None), list | np.ndarray)), None)
+    if lists is not None:
+        raise InputError(
+            f"Expected one value in each cell. Received: lists in {lists!r} of {what}, as in files of windows. Give a series (generate --continuous)."
+        )
     named = _wanted(table, columns)
     layout = lay_out(table, named, time, options, what)
     keys = [key for key in keys_of(table.frame, layout, options, what) if key not in (named or ())]
@@ -94,7 +100,7 @@ def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | No
             )
     if columns is None and repeated:
         raise InputError(f"Expected columns of different names. Received: {min(repeated)!r} more than once in {what}. Rename them.")
-    return Table(table.frame.loc[:, ~names.isin(repeated)], table.places, table.decimal, table.findings) if repeated else table
+    return dataclasses.replace(table, frame=table.frame.loc[:, ~names.isin(repeated)]) if repeated else table
 
 
 def _check_names(table: Table, columns: Sequence[str] | None, what: str, layout: Layout) -> None:

@@ -8,16 +8,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.dates import LOOK, date_forms
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import DURATION, Times, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, is_epoch, is_same_clock, may_be_clock, named_clock
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, named_clock
 from enhsim_tf.telemetry.reading.table import Table
 
 _LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
-_FLAGS = set("quality qc qa flag flags valid validity".split())
+_FLAGS = set("quality qc qa flag flags valid validity mask".split())
 _ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number".split())
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
@@ -86,12 +85,13 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
     gone = {name for names in left_out.values() for name in names}
     if time is None:
         candidates = {name: values for name, values in numbers.items() if name not in asked and name not in gone}
-        clock = find_clock(frame, {name: kind for name, kind in kinds.items() if name not in gone}, candidates, what, options.time_format)
+        clock = find_clock(frame, {name: kind for name, kind in kinds.items() if name not in gone}, candidates, what)
     else:
-        clock = Clock() if time == NO_TIME else named_clock(frame, time, what, options.time_format)
+        clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
+    clock = named_clock(clock, what, options.time_format, table.units)
     times = _times_of(clock, table, options, what)
     gone |= set(clock.columns)
-    clocks = _further_clocks(clock, times, numbers, what)
+    clocks = further_clocks(clock, times, numbers, kinds)
     further = [name for name in free if name not in gone and name in clocks]
     rest = [name for name in numbers if name not in gone and name not in further]
     counted = [name for name in rest if name in free and clock.columns and _counts(numbers[name])]
@@ -218,8 +218,7 @@ def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times
     if not clock.columns:
         return None
     what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-    form = options.time_format or clock.form
-    return parse_times(clock.cells, what, options.on_bad_times == "drop", form, options.timezone, table.places)
+    return parse_times(clock.cells, what, options.on_bad_times == "drop", clock.form, options.timezone, table.places)
 
 
 def _fits(cells: pd.Series, form: str) -> bool:
@@ -231,19 +230,6 @@ def _fits(cells: pd.Series, form: str) -> bool:
         return bool(pd.to_datetime(head.astype(str).str.strip(), format=form, errors="coerce", utc=True).notna().mean() > 0.5)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format, which the parser of times refuses
         return False
-
-
-def _further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], what: str) -> set[str]:
-    """Returns the columns of numbers that show the time once more, or show it although samples are counted."""
-    if times is None:
-        try:
-            found = find_clock(pd.DataFrame(numbers), dict.fromkeys(numbers, "numbers"), numbers, what)
-        except InputError:  # nothing is clearly a clock
-            return set()
-        return {*found.columns, *found.others}
-    own = np.where(times.stamps.isna(), np.nan, times.stamps.tz_localize(None).as_unit("ns").asi8.astype(np.float64))
-    may = {name: values for name, values in numbers.items() if name not in clock.columns and (may_be_clock(name) or is_epoch(values))}
-    return {*clock.others, *(name for name, values in may.items() if is_same_clock(own, values))}
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:

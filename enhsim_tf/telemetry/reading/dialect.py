@@ -27,6 +27,7 @@ class Dialect:
         names: Names of the columns; "" for a column without one.
         first_line: Line at which the data begin, counted from 0.
         skipped: Lines before the data that are neither names nor blank.
+        units: Cells of the line between the names and the data, where units stand, or none.
         head: Cells of the first rows of data.
     """
 
@@ -35,6 +36,7 @@ class Dialect:
     first_line: int
     skipped: int
     head: list[list[str]]
+    units: Sequence[str] = ()
 
 
 def decode(content: bytes) -> tuple[str, str, list[Finding]]:
@@ -66,8 +68,8 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
         except UnicodeDecodeError:
             if b"\x00" in whole:
                 raise ValueError("it is not text") from None
-            text, encoding = whole.decode("latin-1"), "latin-1"
-            findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Latin-1"))
+            text, encoding = whole.decode("cp1252", "replace"), "cp1252"
+            findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252"))
     if "\x00" in text:
         raise ValueError("it is not text")
     if "\r" in text and "\n" not in text:
@@ -157,7 +159,7 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
     block = begin
     while block > 0 and rows[block - 1] and len(rows[block - 1]) <= width and (share(rows[block - 1]) == 0 or len(rows) == 1):
         block -= 1
-    names, skipped = [""] * width, sum(bool(row) for row in rows[:begin])
+    names, units, skipped = [""] * width, [], sum(bool(row) for row in rows[:begin])
     if block < begin and not no_header:
         header = max(range(block, begin), key=lambda number: (len({cell for cell in rows[number] if cell}), -number))
         given = rows[header]
@@ -167,9 +169,13 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
         names, skipped = [*given, *[""] * short], skipped - 1
         if not any(names):
             return None
+        others = [rows[number] for number in range(block, begin) if number != header]
+        for place in [place for place, name in enumerate(names) if not name]:  # names in two lines, as under merged cells
+            names[place] = next((row[place] for row in others if place < len(row) and row[place]), "")
+        units = rows[header + 1] if header + 1 < begin else []
     elif block < begin and no_header:
         begin, skipped = block, sum(bool(row) for row in rows[:block])
-    return Dialect(mark, names, begin, skipped, [row for row in rows[begin:] if row])
+    return Dialect(mark, names, begin, skipped, [row for row in rows[begin:] if row], units)
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:

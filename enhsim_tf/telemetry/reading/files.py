@@ -1,5 +1,6 @@
 """Reads tables from files of every kind, from several files of one series, and from pandas objects."""
 
+import dataclasses
 import gzip
 import io
 import re
@@ -142,7 +143,7 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
     dialect = find_dialect(text, name, options.no_header, "\t")
     names = [f"column {number}" if cell == "" else cell for number, cell in enumerate(dialect.names)]
     frame = pd.DataFrame([row[:width] for row in rows[dialect.first_line :]], columns=names).infer_objects()
-    return Table(frame, Places([(0, dialect.first_line + 1, name)]), None, tuple(findings))
+    return Table(frame, Places([(0, dialect.first_line + 1, name)]), None, tuple(findings), dict(zip(names, dialect.units, strict=False)))
 
 
 def _with_plain_columns(table: Table, name: str) -> Table:
@@ -157,7 +158,7 @@ def _with_plain_columns(table: Table, name: str) -> Table:
             f"Expected a table of 1 to {MAX_COLUMNS:,} columns. Received: {len(frame.columns):,} in {name}. Give another table."
         )
     frame = frame.set_axis([str(column).strip() for column in frame.columns], axis=1)
-    return Table(frame, table.places, table.decimal, table.findings)
+    return dataclasses.replace(table, frame=frame)
 
 
 def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
@@ -181,4 +182,4 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
     frame = pd.concat([table.frame[names] for table in tables], ignore_index=True)
     findings = [Finding("files", len(paths), f"files read one after the other: {len(paths)}, {paths[0].name} to {paths[-1].name}")]
     findings += list({finding.text: finding for table in tables for finding in table.findings}.values())
-    return Table(frame, Places(places), next(iter(decimals - {None}), None), tuple(findings))
+    return Table(frame, Places(places), next(iter(decimals - {None}), None), tuple(findings), tables[0].units)

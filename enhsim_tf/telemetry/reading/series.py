@@ -9,6 +9,7 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.reading.columns import Layout
 
 _KEYS = set(
@@ -33,7 +34,7 @@ def keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) -
         InputError: If a column of numbers seems to tell series apart.
     """
     if options.series_column is not None:
-        return list(options.series_column)
+        return [] if options.series_column == (NO_TIME,) else list(options.series_column)
     own = [
         name
         for name in ("copy", "table")
@@ -45,7 +46,7 @@ def keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) -
     times = None if layout.times is None else layout.times.stamps.tz_localize(None).as_unit("ns").asi8
     chosen: list[str] = []
     for name in candidates:
-        if _is_key(frame, name, chosen, times):
+        if _is_key(frame, name, chosen, times, what if layout.channels else None):
             chosen.append(name)
     if not chosen and "_field" in frame and "_value" in layout.channels:
         return ["_field"]
@@ -54,8 +55,8 @@ def keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) -
     return chosen
 
 
-def _is_key(frame: pd.DataFrame, name: str, chosen: Sequence[str], times: np.ndarray | None) -> bool:
-    """Whether a column tells more series apart than the columns that were chosen before it."""
+def _is_key(frame: pd.DataFrame, name: str, chosen: Sequence[str], times: np.ndarray | None, what: str | None) -> bool:
+    """Whether a column tells more series apart than the columns that were chosen before it; `what` describes the source if it may ask."""
     before = _codes(frame, chosen)
     codes = _codes(frame, [*chosen, name])
     if codes.max() == before.max():
@@ -74,7 +75,13 @@ def _is_key(frame: pd.DataFrame, name: str, chosen: Sequence[str], times: np.nda
     back = (np.diff(times[known]) < 0) & changes
     number = codes.max() + 1
     stacked = number > 1 and back.sum() >= (number - 1) / 2 and changes.sum() < 2 * number and _overlap(times[known], codes[known])
-    return bool(changes.mean() > 0.5 and _overlap(times[known], codes[known])) or bool(stacked)
+    is_word = not frame[name].dropna().astype("str").str.match(r"\s*[+-]?\d").any()
+    if what is not None and is_word and not stacked and changes.mean() > 0.5 and _overlap(times[known], codes[known]):
+        raise InputError(
+            f"Expected one series, or to know what tells several apart. Received: words that change from row to row in {name!r} of {what}. Give "
+            f"series_column (--series-column {name}, or --series-column none if all rows are of one series)."
+        )
+    return bool(stacked)
 
 
 def _is_named(name: str) -> bool:
