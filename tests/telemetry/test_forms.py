@@ -480,3 +480,8 @@ def test_text_of_windows_is_read_with_its_signs(tmp_path):
 def test_a_year_and_a_month_are_the_first_day_of_the_month(tmp_path):
     (tmp_path / "a.csv").write_text(table("year,month,v", 1990 + np.arange(N) // 12, 1 + np.arange(N) % 12, VALUES))
     assert only(read_source(tmp_path / "a.csv")).index[-1] == pd.Timestamp("1994-12-01")
+
+
+def test_a_stray_carriage_return_changes_nothing(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"\r" + PLAIN.encode())
+    check(only(read_source(tmp_path / "a.csv")))

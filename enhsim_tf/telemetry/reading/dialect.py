@@ -131,7 +131,7 @@ def _split(lines: Sequence[str], mark: str) -> list[list[str]]:
     """Splits lines into cells; comments and blank lines have none."""
     rows = []
     for line in lines:
-        cells = next(csv.reader([line], delimiter=mark, skipinitialspace=mark != "\t"), []) if _is_content(line) else []
+        cells = next(csv.reader([line.replace("\r", " ")], delimiter=mark, skipinitialspace=mark != "\t"), []) if _is_content(line) else []
         rows.append([cell.strip() for cell in cells])
     return rows
 
