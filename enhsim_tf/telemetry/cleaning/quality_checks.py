@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from enhsim_tf.telemetry.cleaning.regular_grid import Part
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
-from enhsim_tf.telemetry.cleaning.resampling import Part
 
 _NUM_STRETCHES = 10  # consecutive stretches whose level and amplitude are compared
 _MAX_LEVELS = 4_096  # a channel with more distinct values does not count as quantised
