@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pandas.tseries.api import guess_datetime_format
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, fill_dates, parse_dates
 from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Places
 
@@ -26,6 +26,12 @@ _YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
 DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
 """Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
+_ISO = "ISO8601"
+LOOK = 200  # number of cells that are inspected to find a form
+_TIME = r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>\.\d+)?)?)(?P<half> ?[AaPp][Mm])?"
+_END = rf"(?:(?P<gap>[T:]|,? +){_TIME})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
+_DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
+_DAY_MONTH = re.compile(rf"(?P<first>\d\d?)(?P<mark>[./-])(?P<second>\d\d?)(?P=mark)\d{{4}}{_END}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,7 +137,7 @@ def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: 
             f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {what}, where both are at most 12 "
             f"throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
         )
-    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else ISO, zone, places)
+    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else _ISO, zone, places)
 
 
 def _to_text(cell: Any) -> str | None:
@@ -279,13 +285,13 @@ def _from_dates_as_text(
 ) -> Times:
     findings = []
     try:
-        dates, zoned = parse_dates(text, form)
+        dates, zoned = _parse_dates(text, form)
         leap = np.zeros(len(text), bool)
         left = (dates.isna() & text.notna()).to_numpy()
         leap[left] = text[left].astype(str).str.contains(r":\d\d:60").to_numpy()
         if leap.any():
-            earlier, zoned[leap] = parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
-            dates = fill_dates(dates, earlier + pd.Timedelta(seconds=1))
+            earlier, zoned[leap] = _parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
+            dates = _fill_dates(dates, earlier + pd.Timedelta(seconds=1))
             leap &= dates.notna().to_numpy()
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
@@ -313,15 +319,104 @@ def _from_dates_as_text(
             stamps = stamps.tz_localize("UTC").where(stated, inside)
         else:
             stamps = stamps.tz_localize("UTC")
-    name = "ISO 8601 dates" if form == ISO else f"dates of the form {form}"
+    name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
     return Times(stamps, bad | parsed.bad, name, words, False, tuple(findings))
+
+
+def date_forms(text: pd.Series) -> list[str]:
+    """Finds the forms in which a column of dates may be written.
+
+    Args:
+        text: Text without missing cells.
+
+    Returns:
+        Formats as for `datetime.strptime`, or `_ISO`. None of them: the text is no dates. Two: day and month cannot be told apart.
+    """
+    head = _plain(text.iloc[:LOOK])
+    if not len(head):
+        return []
+    if not head.str.fullmatch(r"\d{1,7}").all() and pd.to_datetime(head, format=_ISO, utc=True, errors="coerce").notna().mean() > 0.5:
+        return [_ISO]
+    for cell in head.iloc[:3]:  # the first cells may be damaged
+        if found := _DAY_OF_YEAR.fullmatch(cell):
+            return [f"%Y{found['mark']}%j{_end(found)}"] if found["mark"] or found["time"] else []
+        if found := _DAY_MONTH.fullmatch(cell):
+            return [f"{order.replace('-', found['mark'])}{_end(found)}" for order in _orders(text, found["mark"])]
+        if re.search(r"[A-Za-z]{3}", cell) and (form := guess_datetime_format(cell)) and "%Y" in form and "%d" in form:
+            return [form]
+        if found := re.fullmatch(rf"\d\d?/[A-Z][a-z]{{2}}/\d{{4}}{_END}", cell):  # of web servers
+            return [f"%d/%b/%Y{_end(found)}"]
+        if re.fullmatch(rf"\d{{4}}(?P<mark>[/.])\d\d?(?P=mark)\d\d?{_END}", cell) and (form := guess_datetime_format(cell)):
+            return [form]
+    return []
+
+
+def _orders(text: pd.Series, mark: str) -> list[str]:
+    """Returns the orders of day and month that all dates allow; with points, the day comes first."""
+    days = pd.Series(text.str[:12].unique(), dtype="str")  # far fewer than rows
+    parts = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}").dropna().astype(int)
+    largest = parts.max()
+    orders = [order for order, which in (("%d-%m-%Y", 1), ("%m-%d-%Y", 0)) if largest[which] <= 12]
+    return orders[:1] if mark == "." else orders
+
+
+def _end(found: re.Match) -> str:
+    """Returns the format of the time of day and the zone behind a date."""
+    if not found["time"]:
+        return ""
+    hours = "%I:%M" if found["half"] else "%H:%M"
+    time = hours + (":%S" if found["seconds"] else "") + (".%f" if found["fraction"] else "")
+    half = "" if not found["half"] else found["half"][:-2] + "%p"
+    return found["gap"] + time + half + ("" if not found["zone"] else found["zone"][: found["zone"].startswith(" ")] + "%z")
+
+
+def _plain(text: pd.Series) -> pd.Series:
+    """Rewrites what no parser takes: decimal commas in seconds, and UTC in words."""
+    return text.str.strip().str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True).str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
+
+
+def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
+    """Parses dates of one form."""
+    try:
+        dates = pd.to_datetime(text, format=form, errors="coerce")
+        zoned = np.full(len(dates), isinstance(dates.dtype, pd.DatetimeTZDtype))
+    except ValueError as error:
+        if "ixed" not in str(error):
+            raise
+        dates = pd.to_datetime(text, format=form, utc=True, errors="coerce")  # some state a zone, or another one than others
+        zoned = _has_zone(text, form)
+    if isinstance(dates.dtype, pd.DatetimeTZDtype):
+        dates = dates.dt.tz_convert("UTC").dt.tz_localize(None)
+    left = (dates.isna() & text.notna()).to_numpy()
+    if left.any():
+        rest = _plain(text[left].astype(str))
+        whole = form.replace(".%f", "")
+        for other in dict.fromkeys((form, whole, whole.replace("%S", "%S.%f"))):
+            found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
+            dates = _fill_dates(dates, found)
+        zoned[left] = _has_zone(rest, form)
+    return dates, zoned
+
+
+def _fill_dates(dates: pd.Series, found: pd.Series) -> pd.Series:
+    """Fills missing dates with others. Whole seconds and fractions have different units, of which the finer is taken."""
+    unit = np.promote_types(dates.dtype, found.dtype)
+    return dates.astype(unit).fillna(found.astype(unit))
+
+
+def _has_zone(text: pd.Series, form: str) -> np.ndarray:
+    """Says which cells state a zone: by an offset behind a time of day, or by the format."""
+    if form != _ISO:
+        return np.full(len(text), "%z" in form or "%Z" in form)
+    zone = r"[T ]\d\d(?::?\d\d(?::?\d\d(?:[.,]\d+)?)?)?\s?(?:Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)\s*$"
+    return text.str.contains(zone).fillna(False).to_numpy(bool)
 
 
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """Assigns a time zone to local times.
 
-    Of an hour that a clock repeats in autumn, the order of the rows or their neighbours show which is meant; where they do not, times
-    become NaT. So do local times that do not exist.
+    Of an hour that a clock repeats in autumn, the order of the rows shows which is meant; where it does not, times become NaT. So do
+    local times that do not exist.
 
     Args:
         stamps: Times without a zone.
@@ -335,49 +430,14 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """
     try:
         local = stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
-        if not (local.isna() & stamps.notna()).any():
-            return local
-        first, second = (stamps.tz_localize(zone, ambiguous=np.full(len(stamps), is_dst), nonexistent="NaT") for is_dst in (True, False))
     except (KeyError, ValueError, TypeError, OSError):
         raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
-    unclear = local.isna() & first.notna()
-    rows = np.flatnonzero(stamps.notna())
-    known = stamps[rows].as_unit("ns").asi8
-    if len(rows) > 1 and np.median(np.sign(np.diff(known))) < 0:
-        rows = rows[::-1]
-    if np.mean(np.diff(stamps[rows].as_unit("ns").asi8) >= 0) < 0.9:
-        return local  # out of order, so that neighbours show nothing
-    starts = np.flatnonzero(np.diff(unclear[rows].astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    utc = [each.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8 for each in (first, second)]
-    is_first, is_second = np.zeros(len(stamps), bool), np.zeros(len(stamps), bool)
-    for begin, end in starts.tolist():
-        split = _end_of_first_hour(rows, begin, end, utc)
-        if split is not None:
-            is_first[rows[begin:split]], is_second[rows[split:end]] = True, True
-    return local.where(~is_first, first).where(~is_second, second)
-
-
-def _end_of_first_hour(rows: np.ndarray, begin: int, end: int, utc: list[np.ndarray]) -> int | None:
-    """Returns where, among consecutive rows of an hour that occurs twice, its second occurrence begins; None if that is unclear.
-
-    Args:
-        rows: All rows with a time, in ascending order of time.
-        begin: First of the rows in question.
-        end: End of the rows in question (exclusive).
-        utc: Times of all rows in nanoseconds, if the first and if the second occurrence is meant.
-    """
-    steps = np.diff(utc[0][rows[begin:end]])
-    back = np.flatnonzero(steps < 0)
-    if len(back) == 1:
-        return begin + int(back[0]) + 1
-    if len(back):
-        return None
-    near = UNITS_NS["h"] / 2
-    if begin > 0 and 0 < utc[0][rows[begin]] - utc[0][rows[begin - 1]] < near:
-        return end
-    if end < len(rows) and 0 < utc[1][rows[end]] - utc[1][rows[end - 1]] < near:
-        return begin
-    return None
+    known = np.flatnonzero(stamps.notna())
+    order = -1 if len(known) > 1 and stamps[known[0]] > stamps[known[-1]] else 1
+    try:
+        return stamps[::order].tz_localize(zone, ambiguous="infer", nonexistent="NaT")[::order]
+    except ValueError:  # the order does not show it everywhere
+        return local
 
 
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:

@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.telemetry.cleaning.dates import LOOK, date_forms
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.cleaning.times import DURATION, Times, parse_times
+from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
 from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, named_clock
 from enhsim_tf.telemetry.reading.table import Table
 
