@@ -104,7 +104,7 @@ def _rows_with_times(
     """Parses the times of a raw series and returns the cleaning log, the rows that have a time, in chronological order, and the clock."""
     places = about.get("places", ROWS)
     what, drop = f"the times of {name}", options.on_bad_times == "drop"
-    parsed = parse_times(index, what, drop, options.time_format, options.timezone, places)
+    parsed = parse_times(index, what, drop, options.time_format, places)
     stamps, bad = parsed.stamps, parsed.bad
     known = about.get("clock") or {
         "column": "the index" if index.name is None else repr(str(index.name)),
@@ -118,7 +118,7 @@ def _rows_with_times(
         stamps = localize_times(stamps, options.timezone)
     changed = had_time & stamps.isna()
     times = stamps.as_unit("ns").asi8 if stamps.tz is None else stamps.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8
-    log = CleaningLog(times, [*map(finding_from_dict, about.get("findings", ())), *parsed.findings], places, known["counts"])
+    log = CleaningLog(times, map(finding_from_dict, about.get("findings", ())), places, known["counts"])
     kept = np.flatnonzero(stamps.notna())
     unreadable, missing = np.flatnonzero(bad), np.flatnonzero(~had_time & ~bad)
     log.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))

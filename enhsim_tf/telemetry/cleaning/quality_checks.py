@@ -7,6 +7,7 @@ import numpy as np
 
 from enhsim_tf.telemetry.cleaning.regular_grid import Part
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
+from enhsim_tf.telemetry.quantisation import Levels
 
 _NUM_STRETCHES = 10  # consecutive stretches whose level and amplitude are compared
 _MAX_LEVELS = 4_096  # a channel with more distinct values does not count as quantised
@@ -71,16 +72,10 @@ def _log_resolution(values: np.ndarray, log: CleaningLog) -> None:
 
 
 def _log_levels(values: np.ndarray, log: CleaningLog) -> None:
-    levels = np.unique(values)
-    if not 2 <= len(levels) <= min(_MAX_LEVELS, len(values) // 10):
-        return
-    steps = np.diff(levels)
-    step = float(steps.min())
-    multiples = (levels - levels[0]) / step
-    even = float(np.abs(multiples - np.round(multiples)).max()) < 0.05
-    how = f"in steps of {step:.4g}" if even else f"at least {step:.4g} apart"
-    text = f"quantised values, {{count}} levels {how}: noise smaller than a step cannot be learnt"
-    log.add("quantised", (), text, count=len(levels), details={"step": step, "is_even": even})
+    levels = Levels.find(values)
+    if levels is not None and levels.count <= _MAX_LEVELS:
+        text = f"quantised values, {{count}} levels in steps of {levels.step:.4g}: noise smaller than a step cannot be learnt"
+        log.add("quantised", (), text, count=levels.count, details={"step": levels.step})
 
 
 def _log_stuck(values: np.ndarray, numbers: np.ndarray, log: CleaningLog) -> None:

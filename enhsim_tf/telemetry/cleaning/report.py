@@ -13,9 +13,9 @@ import pandas as pd
 from enhsim_tf.common.errors import printable
 
 _ACTIONS = {
-    "accepted": "files, header lines, encoding, clock, time zone, further clocks, labels, quality flags, row numbers, own columns, series, "
+    "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
     "columns left out, commands, decimal comma, fill values, missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level",
-    "repaired": "leap seconds, descending, unsorted, other rates, jitter, gaps filled",
+    "repaired": "descending, unsorted, other rates, jitter, gaps filled",
     "left out": "padding, missing times, bad times, clock change, duplicate rows, same time, missing values, bad values, averaged, short parts",
 }
 KINDS = {kind: action for action, kinds in _ACTIONS.items() for kind in kinds.split(", ")}

@@ -15,7 +15,7 @@ from pandas.tseries.api import guess_datetime_format
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
-from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Places
+from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
 UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_NAMES = {"D": "days", "h": "hours", "min": "minutes", "s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
@@ -44,7 +44,6 @@ class Times:
         form: How the times are written, for the report.
         zone: The zone that the source states, for the report; empty if it states none.
         counts: Whether the times count from a zero of their own and are no dates.
-        findings: Findings for the cleaning log.
     """
 
     stamps: pd.DatetimeIndex
@@ -52,7 +51,6 @@ class Times:
     form: str = "dates"
     zone: str = ""
     counts: bool = False
-    findings: tuple[Finding, ...] = ()
 
 
 def check_time_format(form: str | None) -> None:
@@ -71,9 +69,7 @@ def check_time_format(form: str | None) -> None:
         )
 
 
-def parse_times(
-    times: Any, what: str, drop: bool = False, form: str | None = None, zone: str | None = None, places: Places = ROWS
-) -> Times:
+def parse_times(times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS) -> Times:
     """Parses a column of times.
 
     Args:
@@ -81,7 +77,6 @@ def parse_times(
         what: Description of the source, for messages.
         drop: If True, a time that cannot be parsed is marked and treated as missing. If False, it raises an `InputError`.
         form: A format of text as for `datetime.strptime`, or the unit or kind of numbers, see `Cleaning.time_format`. None: detected.
-        zone: Time zone of cells without one among others with one. None: UTC.
         places: Where the rows are in their file, for messages.
 
     Returns:
@@ -107,10 +102,10 @@ def parse_times(
         if not is_format:
             return _from_numbers(times, what, drop, form, places)
         times = times.astype("Int64").astype(str).where(times.notna()) if (times.dropna() % 1 == 0).all() else times.astype(str)
-    return _from_text(times, what, drop, form if is_format else None, None if is_format else form, zone, places)
+    return _from_text(times, what, drop, form if is_format else None, None if is_format else form, places)
 
 
-def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: str | None, zone: str | None, places: Places) -> Times:
+def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: str | None, places: Places) -> Times:
     missing = is_missing(cells)
     given = cells[~missing] if missing.any() else cells
     if cells.dtype == object:
@@ -137,7 +132,7 @@ def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: 
             f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {what}, where both are at most 12 "
             f"throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
         )
-    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else _ISO, zone, places)
+    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else _ISO, places)
 
 
 def _to_text(cell: Any) -> str | None:
@@ -280,19 +275,9 @@ def refuse_days(values: np.ndarray, what: str) -> None:
     )
 
 
-def _from_dates_as_text(
-    cells: pd.Series, text: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str, zone: str | None, places: Places
-) -> Times:
-    findings = []
+def _from_dates_as_text(cells: pd.Series, text: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str, places: Places) -> Times:
     try:
         dates, zoned = _parse_dates(text, form)
-        leap = np.zeros(len(text), bool)
-        left = (dates.isna() & text.notna()).to_numpy()
-        leap[left] = text[left].astype(str).str.contains(r":\d\d:60").to_numpy()
-        if leap.any():
-            earlier, zoned[leap] = _parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
-            dates = _fill_dates(dates, earlier + pd.Timedelta(seconds=1))
-            leap &= dates.notna().to_numpy()
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
         raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
     bad = dates.isna().to_numpy() & ~missing
@@ -300,27 +285,17 @@ def _from_dates_as_text(
     if bad.any() and re.search(r"\d ?(?:[A-Z]{3,5}|\[.*\])$", str(cells[bad].iloc[0])):
         then = "Write the zone as an offset such as +01:00"
     _refuse(cells, bad, what, places, drop, then)
-    if leap.any():
-        text = f"leap seconds, taken as the following second: {leap.sum():,}"
-        findings.append(Finding("leap seconds", int(leap.sum()), text, tuple(places.of(row) for row in np.flatnonzero(leap)[:3])))
     parsed = _from_dates(dates, what, drop, places)
     there = parsed.stamps.notna()
-    stated, stamps = zoned & there, parsed.stamps
-    words = ""
-    if stated.any():
-        words = "stated, converted to UTC"
-        local = there & ~zoned
-        if local.any():
-            taken = zone or "UTC"
-            findings.append(
-                Finding("time zone", int(local.sum()), f"times without a zone among others with one, taken as {taken}: {local.sum():,}")
-            )
-            inside = localize_times(stamps.where(local), taken).tz_convert("UTC")
-            stamps = stamps.tz_localize("UTC").where(stated, inside)
-        else:
-            stamps = stamps.tz_localize("UTC")
+    is_zoned, bare = bool(zoned[there].any()), np.flatnonzero(there & ~zoned)
+    if is_zoned and len(bare):
+        raise InputError(
+            f"Expected times of which all or none state a zone. Received: {format_cell(cells.iloc[bare[0]])} at {places.of(bare[0])} of {what}, without "
+            "one among others with one. Complete them."
+        )
     name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
-    return Times(stamps, bad | parsed.bad, name, words, False, tuple(findings))
+    stamps = parsed.stamps.tz_localize("UTC") if is_zoned else parsed.stamps
+    return Times(stamps, bad | parsed.bad, name, "stated, converted to UTC" if is_zoned else "")
 
 
 def date_forms(text: pd.Series) -> list[str]:

@@ -170,7 +170,7 @@ def _bad_times(layout: Layout, places: Places) -> list[Finding]:
     if layout.times is None:
         return []
     bad: Any = layout.times.bad
-    findings = list(layout.times.findings)
+    findings = []
     if bad.any():
         rows = tuple(places.of(row) for row in np.flatnonzero(bad)[:3])
         findings.append(Finding("bad times", int(bad.sum()), f"times that cannot be read, taken as missing: {int(bad.sum()):,}", rows))

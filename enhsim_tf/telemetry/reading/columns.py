@@ -217,7 +217,7 @@ def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times
     if not clock.columns:
         return None
     what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-    return parse_times(clock.cells, what, options.on_bad_times == "drop", clock.form, options.timezone, table.places)
+    return parse_times(clock.cells, what, options.on_bad_times == "drop", clock.form, table.places)
 
 
 def _fits(cells: pd.Series, form: str) -> bool:
