@@ -28,7 +28,6 @@ def lines(*columns, header="utc,volts", separator=","):
 ISO = TIMES.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
 COMMAS = [str(value).replace(".", ",") for value in VALUES]
 CSV = {
-    "plain": lines(ISO, VALUES),
     "semicolons": lines(ISO, VALUES, header="utc;volts", separator=";"),
     "semicolons and decimal commas": lines(ISO, COMMAS, header="utc;volts", separator=";"),
     "tabs": lines(ISO, VALUES, header="utc\tvolts", separator="\t"),
@@ -39,8 +38,6 @@ CSV = {
     "spaces in the header": lines(ISO, VALUES, header="utc, volts"),
     "lines of another system": lines(ISO, VALUES).replace("\n", "\r\n"),
     "no end of the last line": lines(ISO, VALUES).rstrip("\n"),
-    "epoch milliseconds": lines(TIMES.as_unit("ms").asi8, VALUES, header="time,volts"),
-    "row numbers without a name": lines(range(N), ISO, VALUES, header=",utc,volts"),
     "the time last": lines(VALUES, ISO, header="volts,when"),
     "words beside": lines(ISO, ["on"] * N, VALUES, header="utc,state,volts"),
 }
@@ -140,22 +137,14 @@ BAD = {
     "a name no file can have": ("x" * 300 + ".csv", None, {}, "does not exist"),
     "unknown kind": ("a.xlsx", "x", {}, "a.xlsx"),
     "empty": ("a.csv", "", {}, "empty"),
-    "blank": ("a.csv", "\n \n", {}, "empty"),
     "comments only": ("a.csv", "# a\n# b\n", {}, "a.csv"),
     "bytes": ("a.csv", bytes(range(256)) * 20, {}, "not text"),
     "no header": ("a.csv", "1,2\n3,4\n5,6\n", {}, "1, 2"),
-    "no header, decimal commas": ("a.csv", "1,5;2\n3,5;4\n", {}, "header"),
     "lines longer than the header": ("a.csv", "a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
-    "one longer line": ("a.csv", "a,b\n1,2\n1,2,3\n", {}, "a.csv"),
-    "one name for two columns": ("a.csv", "a,a\n1,2\n3,4\n", {}, "'a' more than once"),
     "one name for two columns, named": ("a.csv", "a,a,b\n1,2,3\n3,4,5\n", {"columns": ["a"]}, "'a' more than once"),
     "no such column": ("a.csv", "a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
-    "no such time": ("a.csv", "a,b\n1,2\n", {"time": "c"}, "'c'"),
     "two time columns": ("a.csv", "start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n", {}, "start, end"),
-    "words for times": ("a.csv", "time,v\nnoon,1\nnight,2\n", {}, "'noon' at line 2"),
-    "a time that is none": ("a.csv", "time,v\n2020-01-01,1\nsoon,2\n2020-01-03,3\n", {}, "'soon' at line 3"),
     "words only": ("a.csv", "a,b\nx,y\nz,w\n", {}, "none in a.csv"),
-    "columns twice": ("a.csv", "a,b\n1,2\n", {"columns": ["a", "a"]}, "['a', 'a']"),
     "no columns named": ("a.csv", "a,b\n1,2\n", {"columns": []}, "columns=[]"),
     "a channel of a file": ("a.csv#a", "a,b\n1,2\n", {}, "a.csv#a"),
     "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
@@ -167,10 +156,6 @@ BAD = {
         "2 levels",
     ),
     "no array": ("a.npy", b"not an array", {}, "a.npy"),
-    "an array of objects": ("a.npy", np.array([{}, None], object), {}, "a.npy"),
-    "three axes": ("a.npy", np.zeros((3, 4, 5)), {}, "(3, 4, 5)"),
-    "no axis": ("a.npy", np.array(3.0), {}, "()"),
-    "fields": ("a.npy", np.zeros(3, [("a", float)]), {}, "fields"),
     "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),
     "a time of an array": ("a.npy", np.zeros(3), {"time": "t"}, "'t'"),
 }
@@ -183,15 +168,6 @@ def test_bad_sources_are_refused(tmp_path, refused, case):
     path = save(tmp_path, name.split("#")[0], content).with_name(name)
     with refused(words):
         read_source(path, **arguments)
-
-
-@pytest.mark.parametrize("cell", ["1.5 V", "-", "1_0", "true"])
-def test_text_among_numbers_is_refused_with_its_place(tmp_path, refused, cell):
-    (tmp_path / "a.csv").write_text(lines(ISO, [*VALUES[:-1], cell]))
-    channel = read_source(tmp_path / "a.csv")["volts"]
-    with refused(f"{cell!r} at line 51"):
-        clean(channel)
-    assert clean(channel, Cleaning(on_bad_values="drop")).report.find("bad values").places == (f"line 51, {TIMES[49].isoformat()}",)
 
 
 def test_the_series_of_a_store(tmp_path, refused):
