@@ -88,123 +88,132 @@ def parse_times(times: Any, what: str, drop: bool = False, form: str | None = No
     check_time_format(form)
     if isinstance(times, pd.MultiIndex):
         raise InputError(f"Expected one time for a row. Received: an index of {times.nlevels} levels from {what}. Name one time column.")
-    times = column(times, what)
+    times, reader = column(times, what), _Reader(what, drop, places)
     if isinstance(times.dtype, pd.PeriodDtype):
         times = times.astype(str).where(times.notna()) if len(times) else times.astype(object)
     kind, is_format = times.dtype, form is not None and "%" in form
     if pd.api.types.is_datetime64_any_dtype(kind):
-        return _from_dates(times, what, drop, places)
+        return reader.of_dates(times)
     if pd.api.types.is_timedelta64_dtype(kind):
-        return _from_numbers(times.dt.total_seconds(), what, drop, "s", places)
+        return reader.of_numbers(times.dt.total_seconds(), "s")
     if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
         raise InputError(f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another time column.")
     if not is_text(times):
         if not is_format:
-            return _from_numbers(times, what, drop, form, places)
+            return reader.of_numbers(times, form)
         times = times.astype("Int64").astype(str).where(times.notna()) if (times.dropna() % 1 == 0).all() else times.astype(str)
-    return _from_text(times, what, drop, form if is_format else None, None if is_format else form, places)
+    return reader.of_text(times, form, is_format)
 
 
-def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: str | None, places: Places) -> Times:
-    missing = is_missing(cells)
-    given = cells[~missing] if missing.any() else cells
-    if cells.dtype == object:
-        of_text = given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
-        if len(given) and given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # datetime is a subclass of date
-            aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
-            return _from_dates(pd.Series(pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")), what, drop, places)
-    else:
-        of_text = np.ones(len(given), bool)
-    if form is None and len(given):
-        if (numbers := _as_numbers(cells, given, missing, what)) is not None:
-            values, bad = numbers
-            _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
-            return _mark(_from_numbers(values, what, drop, unit, places), bad)
-        if given.iloc[:20].astype(str).str.strip().str.fullmatch(DURATION).all():
-            spans = pd.to_timedelta(cells.where(~missing), errors="coerce")
-            bad = spans.isna().to_numpy() & ~missing
-            _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
-            return _mark(_from_numbers(spans.dt.total_seconds(), what, drop, "s", places), bad)
-    text = cells.where(~missing).map(_to_text).astype("str") if cells.dtype == object else cells.where(~missing) if missing.any() else cells
-    forms = [form] if form is not None else date_forms(given[of_text].astype("str"))
-    if len(forms) > 1:
+@dataclasses.dataclass(frozen=True)
+class _Reader:
+    """Reads times of one source; its arguments are those of `parse_times`."""
+
+    what: str
+    drop: bool
+    places: Places
+
+    def refuse(self, cells: pd.Series, bad: np.ndarray, then: str = "Correct them or name another time column") -> None:
+        """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
+        if self.drop or not bad.any():
+            return
+        row = int(np.argmax(bad))
+        try:
+            received = format_cell(cells.iloc[row])
+        except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
+            received = "a time out of range"
         raise InputError(
-            f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {what}, where both are at most 12 "
-            f"throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
+            f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what}, and "
+            f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
         )
-    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else _ISO, places)
 
+    def of_dates(self, times: pd.Series) -> Times:
+        stamps, zone = pd.DatetimeIndex(times), ""
+        if stamps.tz is not None:
+            zone = str(stamps.tz)
+            stamps = stamps.tz_convert("UTC")
+        coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
+        bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
+        self.refuse(times, bad, "Give times from 1678 to 2261")
+        return Times(stamps.where(~bad).as_unit("ns"), bad, "dates", zone)
 
-def _to_text(cell: Any) -> str | None:
-    return str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None
+    def of_numbers(self, times: pd.Series, unit: str | None) -> Times:
+        values, form = times.to_numpy(np.float64, na_value=np.nan), ""
+        finite = np.isfinite(values)
+        unit = unit or _infer_unit(values[finite], self.what)
+        if unit in DAYS:
+            values, form = np.round((values - DAYS[unit]) * 86_400, 3), _DAY_NAMES[unit]  # a spreadsheet's eight decimals are a millisecond
+            times, unit = pd.Series(values), "s"
+        factor = UNITS_NS[unit]
+        bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
+        self.refuse(times, bad)
+        usable = finite & ~bad
+        since = np.full(len(values), pd.NaT.value, np.int64)
+        if pd.api.types.is_integer_dtype(times.dtype):
+            since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # integers keep their precision
+        else:
+            whole = np.floor(values[usable])
+            since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
+        is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
+        if is_epoch:
+            _refuse_lost_digits(values[usable], self.what)
+        form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
+        stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
+        return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
 
+    def of_text(self, cells: pd.Series, form: str | None, is_format: bool) -> Times:
+        missing = is_missing(cells)
+        given, text = (cells[~missing], cells.where(~missing)) if missing.any() else (cells, cells)
+        if cells.dtype == object:
+            is_date = given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64))  # datetime is a subclass of date
+            if len(given) and is_date.all():
+                aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
+                return self.of_dates(pd.Series(pd.to_datetime(text, utc=bool(aware), errors="coerce")))
+            text = text.map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None).astype("str")
+        if len(given) and not is_format:
+            head, found, unit = given.iloc[:20], None, form
+            if parse_numbers(head, self.what, drop=True)[1].mean() <= 0.5:
+                values, bad, _ = parse_numbers(cells, self.what, drop=True)
+                exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
+                found = exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values)
+            elif head.astype(str).str.strip().str.fullmatch(DURATION).all():
+                spans = pd.to_timedelta(text, errors="coerce")
+                found, bad, unit = spans.dt.total_seconds(), spans.isna().to_numpy() & ~missing, "s"
+            if found is not None:
+                self.refuse(cells, bad)
+                times = self.of_numbers(found, unit)
+                return dataclasses.replace(times, bad=times.bad | bad)
+        forms = [form] if is_format else date_forms(text.dropna())
+        if len(forms) > 1:
+            raise InputError(
+                f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {self.what}, where both are at most "
+                f"12 throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
+            )
+        return self._of_dates_as_text(cells, text, missing, forms[0] if forms else _ISO)
 
-def _as_numbers(cells: pd.Series, given: pd.Series, missing: np.ndarray, what: str) -> tuple[pd.Series, np.ndarray] | None:
-    """Returns text as numbers and the mask of cells that are none, or None if most of the first cells are none."""
-    head = given.iloc[:20]
-    if parse_numbers(head, what, drop=True)[1].mean() > 0.5:
-        return None
-    values, bad, _ = parse_numbers(cells, what, drop=True)
-    exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
-    return exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values), bad
-
-
-def _mark(times: Times, bad: np.ndarray) -> Times:
-    return dataclasses.replace(times, bad=times.bad | bad)
-
-
-def _refuse(cells: pd.Series, bad: np.ndarray, what: str, places: Places, drop: bool, then: str) -> None:
-    """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
-    if drop or not bad.any():
-        return
-    row = int(np.argmax(bad))
-    try:
-        received = format_cell(cells.iloc[row])
-    except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
-        received = "a time out of range"
-    raise InputError(
-        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {places.of(row)} of {what}, and "
-        f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
-    )
-
-
-def _from_dates(times: pd.Series, what: str, drop: bool, places: Places) -> Times:
-    stamps, zone = pd.DatetimeIndex(times), ""
-    if stamps.tz is not None:
-        zone = str(stamps.tz)
-        stamps = stamps.tz_convert("UTC")
-    coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
-    bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
-    _refuse(times, bad, what, places, drop, "Give times from 1678 to 2261")
-    return Times(stamps.where(~bad).as_unit("ns"), bad, "dates", zone)
-
-
-def _from_numbers(times: pd.Series, what: str, drop: bool, unit: str | None, places: Places) -> Times:
-    values = times.to_numpy(np.float64, na_value=np.nan)
-    finite = np.isfinite(values)
-    unit = unit or _infer_unit(values[finite], what)
-    if unit in DAYS:
-        values, unit, form = (values - DAYS[unit]) * 86_400, "s", _DAY_NAMES[unit]
-        times = pd.Series(np.round(values, 3))  # a spreadsheet's eight decimals are a millisecond
-        values = times.to_numpy()
-    else:
-        form = ""
-    factor = UNITS_NS[unit]
-    bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
-    _refuse(times, bad, what, places, drop, "Correct them or name another time column")
-    usable = finite & ~bad
-    since = np.full(len(values), pd.NaT.value, np.int64)
-    if pd.api.types.is_integer_dtype(times.dtype):
-        since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # integers keep their precision
-    else:
-        whole = np.floor(values[usable])
-        since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
-    is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
-    if is_epoch:
-        _refuse_lost_digits(values[usable], what)
-    form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
-    stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
-    return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
+    def _of_dates_as_text(self, cells: pd.Series, text: pd.Series, missing: np.ndarray, form: str) -> Times:
+        try:
+            dates, zoned = _parse_dates(text, form)
+        except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
+            raise InputError(
+                f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}."
+            ) from None
+        bad = dates.isna().to_numpy() & ~missing
+        then = "Give time_format (--time-format '%d.%m.%Y %H:%M:%S') or name another time column"
+        if bad.any() and re.search(r"\d ?(?:[A-Z]{3,5}|\[.*\])$", str(cells[bad].iloc[0])):
+            then = "Write the zone as an offset such as +01:00"
+        self.refuse(cells, bad, then)
+        parsed = self.of_dates(dates)
+        there = parsed.stamps.notna()
+        is_zoned, bare = bool(zoned[there].any()), np.flatnonzero(there & ~zoned)
+        if is_zoned and len(bare):
+            raise InputError(
+                f"Expected times of which all or none state a zone. Received: {format_cell(cells.iloc[bare[0]])} at {self.places.of(bare[0])} of "
+                f"{self.what}, without one among others with one. Complete them."
+            )
+        name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
+        stamps = parsed.stamps.tz_localize("UTC") if is_zoned else parsed.stamps
+        return Times(stamps, bad | parsed.bad, name, "stated, converted to UTC" if is_zoned else "")
 
 
 def _refuse_lost_digits(values: np.ndarray, what: str) -> None:
@@ -273,29 +282,6 @@ def refuse_days(values: np.ndarray, what: str) -> None:
         f"Expected times whose unit is known. Received: {values[0]:.12g} to {values[-1]:.12g} in {what}, which may be days or seconds. "
         f"Give time_format {said or 'D'}, or s (--time-format)."
     )
-
-
-def _from_dates_as_text(cells: pd.Series, text: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str, places: Places) -> Times:
-    try:
-        dates, zoned = _parse_dates(text, form)
-    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
-        raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
-    bad = dates.isna().to_numpy() & ~missing
-    then = "Give time_format (--time-format '%d.%m.%Y %H:%M:%S') or name another time column"
-    if bad.any() and re.search(r"\d ?(?:[A-Z]{3,5}|\[.*\])$", str(cells[bad].iloc[0])):
-        then = "Write the zone as an offset such as +01:00"
-    _refuse(cells, bad, what, places, drop, then)
-    parsed = _from_dates(dates, what, drop, places)
-    there = parsed.stamps.notna()
-    is_zoned, bare = bool(zoned[there].any()), np.flatnonzero(there & ~zoned)
-    if is_zoned and len(bare):
-        raise InputError(
-            f"Expected times of which all or none state a zone. Received: {format_cell(cells.iloc[bare[0]])} at {places.of(bare[0])} of {what}, without "
-            "one among others with one. Complete them."
-        )
-    name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
-    stamps = parsed.stamps.tz_localize("UTC") if is_zoned else parsed.stamps
-    return Times(stamps, bad | parsed.bad, name, "stated, converted to UTC" if is_zoned else "")
 
 
 def date_forms(text: pd.Series) -> list[str]:
