@@ -106,7 +106,7 @@ def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[s
 
     Args:
         frame: The table.
-        kinds: Kind of each column, see `columns.kind_of`.
+        kinds: Kind of each column, such as "numbers", "dates", "words".
         numbers: Values of the columns of numbers that are not asked for as channels.
         what: Description of the source, for messages.
 

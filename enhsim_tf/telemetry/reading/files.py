@@ -53,18 +53,14 @@ def files_of(folder: Path) -> list[Path]:
         folder: The folder.
     """
     for endings in ((".csv",), (".parquet",), (".tsv", ".txt"), _EXCEL):
-        found = [path for path in folder.iterdir() if path.is_file() and suffix_of(path) in endings and not path.name.startswith(".")]
+        found = [path for path in folder.iterdir() if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")]
         if found:
             return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)])
     return []
 
 
-def suffix_of(path: Path) -> str:
-    """Returns the ending of a file's name in lower case, without that of a packed file: `.csv` for `day1.CSV.gz`.
-
-    Args:
-        path: The file.
-    """
+def _suffix_of(path: Path) -> str:
+    """Returns the ending of a file's name in lower case, without that of a packed file: `.csv` for `day1.CSV.gz`."""
     suffix = path.suffix.lower()
     return (Path(path.stem).suffix.lower() or ".csv") if suffix in PACKED else suffix
 
