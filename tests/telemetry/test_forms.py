@@ -73,6 +73,7 @@ READ = {
     ),
     "a unit below the name": (table("Time,v", 1000 * SECONDS, VALUES).replace("v\n", "v\n[ms],V\n", 1), ZERO),
     "names in two lines": (table(",v", stamps("%Y-%m-%d %H:%M"), VALUES).replace(",v\n", ",v\ntime,V\n", 1), START),
+    "the newest row first": (table("time,v", SECONDS[::-1], VALUES[::-1]), ZERO),
     "seconds in brackets": (table("Time (s),v", SECONDS, VALUES), ZERO),
     "milliseconds in the name": (table("timestamp_ms,v", 1000 * SECONDS, VALUES), ZERO),
     "minutes elapsed": (table("elapsed [min],v", np.arange(N), VALUES), ZERO),

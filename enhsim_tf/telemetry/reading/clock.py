@@ -15,7 +15,7 @@ from enhsim_tf.telemetry.cleaning.times import UNITS_NS, Times, are_days, refuse
 
 NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIMES = set(
-    "time times timestamp timestamps datetime date dates epoch elapsed simtime unix unixtime utc utcg ts clock mjd jd datenum uptime "
+    "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime utc utcg ts clock mjd jd datenum uptime "
     "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel zeitpunkt datum uhrzeit sekunden "
     "temps heure horodatage tiempo fecha hora tempo tijd".split()
 )
@@ -157,7 +157,7 @@ def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[s
 
 
 def _may_be_clock(tells: int, values: np.ndarray) -> bool:
-    return tells > 0 and (_is_increasing(values) or tells == 2 and _is_epoch(values))
+    return tells > 0 and (_is_increasing(values) or tells == 2 and (_is_epoch(values) or _is_regular(values[::-1])))
 
 
 def _one_of(names: list[str], frame: pd.DataFrame, what: str) -> Clock:
