@@ -3,10 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.pandas_series import from_series, to_series
 from enhsim_tf.telemetry.parquet_store import ParquetStore
@@ -222,45 +219,3 @@ def test_telemetry_to_pandas_and_back(refused):
             from_series(dirty)
     with refused("ndarray"):
         to_series(VALUES)
-
-
-CELLS = [
-    "",
-    "1",
-    "2.5",
-    "-3",
-    "1,5",
-    "nan",
-    "x",
-    '"',
-    "2020-01-01",
-    "2020-01-01T00:00:01Z",
-    "01/02/20",
-    "12:00",
-    "1e999",
-    "9" * 30,
-    "inf",
-    "-",
-]
-CELLS += ["#", "\x00", "°", "True", "1.5 V", "1583000000", "1583000001000", "20200101", " ", "\ufeff", "2020-01-01 00:00:00+02:00", "NaT"]
-
-
-@pytest.mark.filterwarnings("error")
-@settings(derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
-@given(
-    header=st.lists(st.sampled_from(["time", "a", "b", "", "t", "date", "1", "utc"]), max_size=4),
-    rows=st.lists(st.lists(st.sampled_from(CELLS), max_size=4), max_size=12),
-    form=st.tuples(st.sampled_from(",;\t"), st.sampled_from(["\n", "\r\n"]), st.sampled_from(["utf-8", "utf-16", "latin-1"])),
-    how=st.sampled_from(["refuse", "drop"]),
-)
-def test_any_table_gives_a_complete_report_or_one_error_line(tmp_path, header, rows, form, how):
-    separator, end, encoding = form
-    (tmp_path / "a.csv").write_bytes(end.join(separator.join(row) for row in [header, *rows]).encode(encoding, "replace"))
-    options = Cleaning(on_bad_times=how, on_bad_values=how, min_part=1)
-    try:
-        for channel in read_source(tmp_path / "a.csv", options=options).values():
-            report = clean(channel, options).report
-            assert report.rows_in == len(channel) == report.rows_used + report.rows_left_out
-            assert report.samples == report.rows_used + report.samples_filled
-    except InputError as error:
-        assert str(error).startswith("Expected ") and len(str(error).splitlines()) == 1

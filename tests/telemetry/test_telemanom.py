@@ -70,15 +70,11 @@ def test_other_shapes_of_the_layout(make):
 
 
 BAD_ROWS = {
-    "no sequences": ("A-1,SMAP,,[point],100", "line 3"),
     "a word for sequences": ("A-1,SMAP,often,[point],100", "'often' in line 3"),
     "code for sequences": ('A-1,SMAP,"__import__(1)",[point],100', "line 3"),
     "a sequence that ends before it begins": ('A-1,SMAP,"[[9, 3]]",[point],100', "[[9, 3]]"),
     "a sequence before the first sample": ('A-1,SMAP,"[[-3, 3]]",[point],100', "[[-3, 3]]"),
     "half a sample": ('A-1,SMAP,"[[1.5, 3]]",[point],100', "1.5"),
-    "three ends": ('A-1,SMAP,"[[1, 2, 3]]",[point],100', "line 3"),
-    "one number": ('A-1,SMAP,"[4]",[point],100', "line 3"),
-    "a bracket missing": ('A-1,SMAP,"[[1, 2]",[point],100', "line 3"),
     "a class missing": ('A-1,SMAP,"[[1, 2], [4, 5]]",[point],100', "Received: 1 in line 3"),
     "a column missing": ('A-1,SMAP,"[[1, 2]]",[point]', "Received: 4 in line 3"),
     "sequences without quotes": ("A-1,SMAP,[[1, 2]],[point],100", "Received: 6 in line 3"),
