@@ -484,3 +484,10 @@ def test_a_year_and_a_month_are_the_first_day_of_the_month(tmp_path):
 def test_a_stray_carriage_return_changes_nothing(tmp_path):
     (tmp_path / "a.csv").write_bytes(b"\r" + PLAIN.encode())
     check(only(read_source(tmp_path / "a.csv")))
+
+
+def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused):
+    (tmp_path / "volts.csv").write_text(PLAIN)
+    (tmp_path / "amps.csv").write_text("".join(PLAIN.splitlines(keepends=True)[:20]))
+    with refused("amps.csv and volts.csv over the same times"):
+        read_source(tmp_path)

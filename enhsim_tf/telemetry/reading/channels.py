@@ -52,6 +52,7 @@ def read_table_channels(
     _check_names(table, [] if keys else columns, what, layout)
     findings = [*table.findings, *_findings_of(layout, keys)]
     if not keys:
+        _refuse_parallel_files(table.places, layout, what)
         chosen = {name: (name, None) for name in layout.channels}
     else:
         values = options.value_column or [name for name in layout.channels if name not in keys]
@@ -77,6 +78,22 @@ def _name_of(source: Path | Sequence[Path] | pd.DataFrame | pd.Series) -> str:
     if isinstance(source, Path):
         return source.name
     return "the table" if isinstance(source, pd.DataFrame | pd.Series) else f"{source[0].name} ..."
+
+
+def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
+    """Refuses files over the same times, which are no parts of one series."""
+    if len({name for _, _, name in places}) < 2 or layout.times is None:
+        return
+    stamps = np.split(layout.times.stamps.tz_localize(None), [row for row, _, _ in places[1:]])
+    spans = sorted(
+        (part.min(), part.max(), place[2]) for part, place in zip(map(pd.DatetimeIndex, stamps), places, strict=True) if part.notna().any()
+    )
+    for (begin, end, first), (other, last, second) in zip(spans, spans[1:], strict=False):
+        shorter = min(end - begin, last - other)
+        if min(end, last) - other > shorter / 2:
+            raise InputError(
+                f"Expected files whose times follow each other. Received: {first} and {second} over the same times, in {what}. Give them one by one."
+            )
 
 
 def _with_cell(table: Table, name: str) -> str:
