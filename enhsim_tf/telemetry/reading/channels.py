@@ -4,7 +4,6 @@ import dataclasses
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -46,10 +45,9 @@ def read_table_channels(
         raise InputError(
             f"Expected one value in each cell. Received: lists in {lists!r} of {what}, as in files of windows. Give a series (generate --continuous)."
         )
-    named = _wanted(table, columns)
+    named = list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None  # others are names of series
     layout = lay_out(table, named, time, options, what)
     keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
-    _check_names(table, [] if keys else columns, what, layout)
     findings = [*table.findings, *_findings_of(layout, keys)]
     if not keys:
         _refuse_parallel_files(table.places, layout, what)
@@ -59,11 +57,12 @@ def read_table_channels(
         chosen = _name_series(table.frame, keys, list(values), what)
         said = ", ".join(list(chosen)[:6])
         findings.append(Finding("series", len(chosen), f"series told apart by {', '.join(keys)}: {len(chosen):,} ({said})"))
-        if columns is not None and named is None:
-            missing = next((name for name in columns if name not in chosen), None)
-            if missing is not None:
-                raise InputError(f"Expected series of {what}: {said}. Received: {missing!r}. Name one of these.")
-            chosen = {name: chosen[name] for name in columns}
+    if columns is not None and named is None:
+        unknown = next((name for name in columns if name not in chosen), None)
+        if unknown is not None:
+            known = ", ".join(list(chosen)[:8]) or ", ".join(table.frame.columns[:8])
+            raise InputError(f"Expected a channel of {what}: {known}. Received: {unknown!r}. Name one of these.")
+        chosen = {name: chosen[name] for name in columns}
     if not chosen:
         left = "; left out: " + ", ".join(_with_cell(table, name) for names in layout.left_out.values() for name in names)
         left = left if layout.left_out else ""
@@ -102,11 +101,6 @@ def _with_cell(table: Table, name: str) -> str:
     return f"{name} ({format_cell(cells.iloc[0])})" if len(cells) else name
 
 
-def _wanted(table: Table, columns: Sequence[str] | None) -> list[str] | None:
-    """Returns the columns of the table among those that were asked for, or None if these are names of series."""
-    return list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None
-
-
 def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Table:
     """Refuses names that occur twice, unless other columns were asked for, and names of options that do not occur."""
     names = table.frame.columns
@@ -126,13 +120,6 @@ def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | No
     if columns is None and repeated:
         raise InputError(f"Expected columns of different names. Received: {min(repeated)!r} more than once in {what}. Rename them.")
     return dataclasses.replace(table, frame=table.frame.loc[:, ~names.isin(repeated)]) if repeated else table
-
-
-def _check_names(table: Table, columns: Sequence[str] | None, what: str, layout: Layout) -> None:
-    for name in columns or ():
-        if name not in table.frame.columns:
-            known = ", ".join((layout.channels or tuple(table.frame.columns))[:8])
-            raise InputError(f"Expected a column of {what}: {known}. Received: {name!r}. Name one of these.")
 
 
 def _findings_of(layout: Layout, keys: Sequence[str]) -> list[Finding]:
@@ -156,10 +143,12 @@ def _channel(
     else:
         index = layout.times.stamps[take].rename(layout.clock.columns[0])
     series = pd.Series(cells.array, index=index, name=name, copy=False)
-    findings = [*findings, *_bad_times(layout, places)]
-    for label in layout.labels:
-        if not _concerns(label, column, layout):
-            continue
+    findings = list(findings)
+    bad = np.empty(0, np.int64) if layout.times is None else np.flatnonzero(layout.times.bad)
+    if len(bad):
+        where = tuple(places.of(row) for row in bad[:3])
+        findings.append(Finding("bad times", len(bad), f"times that cannot be read, taken as missing: {len(bad):,}", where))
+    for label in (label for label in layout.labels if _concerns(label, column, layout)):
         mask = anomalous(frame[label].iloc[take])
         if mask is None:
             said = ", ".join(map(str, frame[label].dropna().unique()[:4]))
@@ -180,18 +169,6 @@ def _channel(
         times, columns = layout.times, " and ".join(map(repr, layout.clock.columns))
         series.attrs["clock"] = {"column": columns, "form": times.form, "zone": times.zone, "counts": times.counts}
     return series
-
-
-def _bad_times(layout: Layout, places: Places) -> list[Finding]:
-    """Findings of the times, which concern every channel."""
-    if layout.times is None:
-        return []
-    bad: Any = layout.times.bad
-    findings = []
-    if bad.any():
-        rows = tuple(places.of(row) for row in np.flatnonzero(bad)[:3])
-        findings.append(Finding("bad times", int(bad.sum()), f"times that cannot be read, taken as missing: {int(bad.sum()):,}", rows))
-    return findings
 
 
 def _concerns(label: str, column: str, layout: Layout) -> bool:
