@@ -72,6 +72,9 @@ READ = {
         START + pd.Timedelta("70ms"),
     ),
     "a unit below the name": (table("Time,v", 1000 * SECONDS, VALUES).replace("v\n", "v\n[ms],V\n", 1), ZERO),
+    "a unit and a blank line below the name": (table("Time,v", SECONDS / 60, VALUES).replace("v\n", "v\n(min),V\n\n", 1), ZERO),
+    "a sign for the row number": (table("#,time,v", range(N), stamps("%Y-%m-%d %H:%M"), VALUES), START),
+    "MATLAB's comments": (table("% Time, v", SECONDS, VALUES, above="% Model: a\n"), ZERO),
     "names in two lines": (table(",v", stamps("%Y-%m-%d %H:%M"), VALUES).replace(",v\n", ",v\ntime,V\n", 1), START),
     "the newest row first": (table("time,v", SECONDS[::-1], VALUES[::-1]), ZERO),
     "seconds in brackets": (table("Time (s),v", SECONDS, VALUES), ZERO),
@@ -491,3 +494,8 @@ def test_files_over_the_same_times_are_no_parts_of_one_series(tmp_path, refused)
     (tmp_path / "amps.csv").write_text("".join(PLAIN.splitlines(keepends=True)[:20]))
     with refused("amps.csv and volts.csv over the same times"):
         read_source(tmp_path)
+
+
+def test_rows_without_the_word_of_others_are_a_series(tmp_path):
+    long(host=("a", "")).to_csv(tmp_path / "a.csv", index=False)
+    check(read_source(tmp_path / "a.csv")["a"])

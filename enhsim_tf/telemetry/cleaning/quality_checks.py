@@ -11,7 +11,7 @@ from enhsim_tf.telemetry.quantisation import Levels
 
 _NUM_STRETCHES = 10  # consecutive stretches whose level and amplitude are compared
 _MAX_LEVELS = 4_096  # a channel with more distinct values does not count as quantised
-_FEWEST_OTHERS = 10  # a channel with fewer other values has states, none of which is a fill value
+_FEWEST_OTHERS = 10  # a channel with fewer other values has states, none of which is a fill value unless it has usual digits
 _FAR = 3  # distance of a fill value that has no usual digits from all others, in their range
 _STUCK = 20  # a shorter run of one value, in samples, does not count as stuck
 
@@ -40,12 +40,13 @@ def _log_fill_values(read: np.ndarray, log: CleaningLog) -> None:
     """Reports a lowest or highest value that repeats exactly, far outside all others, as loggers write where they have no value."""
     distinct, counts = np.unique(read, return_counts=True)
     low, high, found = 0, len(distinct) - 1, []
-    while high - low >= _FEWEST_OTHERS:
+    while high - low >= 3:
         spread = distinct[high - 1] - distinct[low + 1]
         places = [
             place
             for place, distance in ((low, distinct[low + 1] - distinct[low]), (high, distinct[high] - distinct[high - 1]))
-            if counts[place] >= 2 and distance > (1 if _is_usual_fill(distinct[place]) else _FAR) * spread
+            if counts[place] >= 2
+            and (distance > spread if _is_usual_fill(distinct[place]) else high - low >= _FEWEST_OTHERS and distance > _FAR * spread)
         ]
         if not places:
             break

@@ -186,7 +186,7 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
         for name in ("copy", "table")
         if name in frame.columns and (name in layout.channels or name in layout.left_out.get("row numbers", ()))
     ]
-    candidates = [name for name in (*layout.words, *own) if 1 < frame[name].nunique() <= _MAX_SERIES]
+    candidates = [name for name in (*layout.words, *own) if 1 < frame[name].nunique(dropna=False) <= _MAX_SERIES]
     candidates.sort(key=lambda name: next((rank for rank, word in enumerate(_FIRST) if word == name.casefold()), len(_FIRST)))
     candidates.sort(key=lambda name: name in own)
     times = None if layout.times is None else layout.times.stamps.tz_localize(None).as_unit("ns").asi8
