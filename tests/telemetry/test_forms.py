@@ -435,6 +435,8 @@ def test_pandas_objects_are_sources():
     frame = pd.DataFrame({"time": TIMES, "v": VALUES})
     check(only(read_source(frame)))
     check(only(read_source(frame.set_index("time")["v"])))
+    parts = frame.assign(year=2024, month=3, day=1, second=SECONDS)[["year", "month", "day", "second", "v"]]
+    check(only(read_source(parts.iloc[5:])), VALUES[5:], TIMES[5])
 
 
 @pytest.mark.parametrize("form", ["labelled.csv", "labelled.parquet", "timeeval.csv"])

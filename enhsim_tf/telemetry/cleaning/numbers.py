@@ -114,7 +114,7 @@ def is_missing(cells: pd.Series) -> np.ndarray:
     of_text = ~missing
     if cells.dtype == object:
         of_text &= cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
-    text = cells[of_text]
+    text = cells if of_text.all() else cells[of_text]
     if pd.api.types.is_string_dtype(text.dtype) and text.dtype != object and (text.str.len() > len("-nan(snan)") + 2).all():
         return missing  # no such word is that long, as dates are
     text = text.str.strip().str.casefold()

@@ -145,8 +145,7 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
 def _with_plain_columns(table: Table, name: str) -> Table:
     """Turns an index that means something into a column, and names into text."""
     frame = table.frame
-    if not isinstance(frame.index, pd.RangeIndex):
-        frame = frame.reset_index()
+    frame = frame.reset_index(drop=isinstance(frame.index, pd.RangeIndex))  # the rows of a slice are counted from 0 as well
     if frame.columns.nlevels > 1:
         raise InputError(f"Expected one line of column names. Received: {frame.columns.nlevels} levels in {name}. Join them.")
     if not 0 < len(frame.columns) <= MAX_COLUMNS:
