@@ -263,7 +263,7 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
         "--label-column", action="append", metavar="NAME", help="column that labels anomalous rows, or 'none'; may be repeated"
     )
     table.add_argument(
-        "--series-column", action="append", metavar="NAME", help="column whose values tell several series apart; may be repeated"
+        "--series-column", action="append", metavar="NAME", help="column whose values tell several series apart, or 'none'; may be repeated"
     )
     table.add_argument(
         "--value-column", action="append", metavar="NAME", help="column that holds the values of such series; may be repeated"

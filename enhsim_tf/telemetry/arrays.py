@@ -1,6 +1,5 @@
 """Reads arrays as channels without times."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -14,19 +13,8 @@ from enhsim_tf.telemetry.commands import has_commands
 from enhsim_tf.telemetry.reading.clock import NO_TIME
 
 
-def load_array(path: str | os.PathLike) -> np.ndarray:
-    """Reads a `.npy` file of one or two dimensions, without pickle, so that its content cannot run code.
-
-    Args:
-        path: The file.
-
-    Returns:
-        The array.
-
-    Raises:
-        InputError: If the file cannot be read or is not such an array.
-    """
-    path = Path(path)
+def _load(path: Path) -> np.ndarray:
+    """Reads a `.npy` file of one or two dimensions, without pickle, so that its content cannot run code."""
     try:
         array = load_npy(path)
     except ValueError as error:
@@ -46,7 +34,7 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None,
     """
     if time not in (None, NO_TIME):
         raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
-    array = load_array(path)
+    array = _load(path)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")

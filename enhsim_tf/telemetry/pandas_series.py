@@ -8,7 +8,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 
-_NO_REPAIRS = Cleaning(max_fill=0, min_part=1, same_time="refuse", other_rates="leave out")
+_NO_REPAIRS = Cleaning(max_fill=0, min_part=1, same_time="refuse")
 _BREAKS = ("gaps", "clock steps")  # accepted by the cleaning, which splits the series there
 _MAX_ROUNDING = 0.05  # largest distance of a time from the regular grid, in intervals: rounded times, or a rounded interval
 

@@ -148,7 +148,7 @@ class ParquetStore:
     def names(self) -> list[str]:
         """The sorted names of the stored series."""
         folders = self.folder.glob("[!.]*") if self.folder.is_dir() else ()
-        return sorted(urllib.parse.unquote(folder.name) for folder in folders if folder.is_dir())
+        return sorted(urllib.parse.unquote(folder.name) for folder in folders if any(folder.glob("*.parquet")))
 
     def _channel(self, name: str) -> Path:
         return self.folder / encode_name(name)

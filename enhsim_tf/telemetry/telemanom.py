@@ -65,11 +65,6 @@ class LabelledChannel:
         return marks
 
 
-def is_labelled(folder: str | os.PathLike) -> bool:
-    """Whether a folder holds a label file of this layout."""
-    return (Path(folder) / LABELS).is_file()
-
-
 def read_labels(folder: str | os.PathLike, spacecraft: str | None = None) -> dict[str, Labels]:
     """Reads the label file. If a channel has several rows, their sequences are combined, and overlapping sequences are joined.
 

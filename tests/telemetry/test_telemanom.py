@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.telemanom import is_labelled, load_channel, load_labelled, read_labels
+from enhsim_tf.telemetry.telemanom import LABELS, load_channel, load_labelled, read_labels
 
 SMAP = Path(__file__).parents[2] / ".." / "shared" / "data" / "smap"
 HEADER = "chan_id,spacecraft,anomaly_sequences,class,num_values"
@@ -56,7 +56,6 @@ def test_channels_by_hand(make):
     assert [one.labels.channel for one in load_labelled(folder)] == ["A-1", "B-2", "C-3", "D-4"]
     assert [one.labels.channel for one in load_labelled(folder, spacecraft="SMAP")] == ["A-1", "B-2"]
     assert [one.labels.channel for one in load_labelled(folder, channels=["D-4", "A-1"])] == ["A-1", "D-4"]
-    assert is_labelled(folder) and not is_labelled(folder / "train")
 
 
 def test_other_shapes_of_the_layout(make):
@@ -71,15 +70,11 @@ def test_other_shapes_of_the_layout(make):
 
 
 BAD_ROWS = {
-    "no sequences": ("A-1,SMAP,,[point],100", "line 3"),
     "a word for sequences": ("A-1,SMAP,often,[point],100", "'often' in line 3"),
     "code for sequences": ('A-1,SMAP,"__import__(1)",[point],100', "line 3"),
     "a sequence that ends before it begins": ('A-1,SMAP,"[[9, 3]]",[point],100', "[[9, 3]]"),
     "a sequence before the first sample": ('A-1,SMAP,"[[-3, 3]]",[point],100', "[[-3, 3]]"),
     "half a sample": ('A-1,SMAP,"[[1.5, 3]]",[point],100', "1.5"),
-    "three ends": ('A-1,SMAP,"[[1, 2, 3]]",[point],100', "line 3"),
-    "one number": ('A-1,SMAP,"[4]",[point],100', "line 3"),
-    "a bracket missing": ('A-1,SMAP,"[[1, 2]",[point],100', "line 3"),
     "a class missing": ('A-1,SMAP,"[[1, 2], [4, 5]]",[point],100', "Received: 1 in line 3"),
     "a column missing": ('A-1,SMAP,"[[1, 2]]",[point]', "Received: 4 in line 3"),
     "sequences without quotes": ("A-1,SMAP,[[1, 2]],[point],100", "Received: 6 in line 3"),
@@ -144,7 +139,7 @@ def test_a_label_beyond_the_array_is_refused(make, refused):
         load_channel(make(num_test=60), "B-2")
 
 
-needs_smap = pytest.mark.skipif(not is_labelled(SMAP), reason="needs ../shared/data/smap beside the repository")
+needs_smap = pytest.mark.skipif(not (SMAP / LABELS).is_file(), reason="needs ../shared/data/smap beside the repository")
 
 
 @needs_smap

@@ -14,19 +14,10 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning as Cleaning
 from enhsim_tf.telemetry.cleaning.quality_checks import describe_values
-from enhsim_tf.telemetry.cleaning.regular_grid import find_binned_segments, find_interval, find_regular_segments, regular_step_fraction
+from enhsim_tf.telemetry.cleaning.regular_grid import Rows, regularise
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Report, finding_from_dict, iso_time
-from enhsim_tf.telemetry.cleaning.resampling import (
-    Rows,
-    build_parts,
-    drop_duplicate_timestamps,
-    drop_missing_values,
-    resample_to_common_interval,
-)
 from enhsim_tf.telemetry.cleaning.times import UNITS_NS, localize_times, parse_times, refuse_repeated_local_hour
 from enhsim_tf.telemetry.series import Telemetry
-
-_MIN_REGULAR_FRACTION = 0.4  # of the steps between rows; random times reach 0.25
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +54,6 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         InputError: If the input is not a series of numbers, or has no regularly sampled part.
     """
     options = options or Cleaning()
-    holds, max_fill = options.fill == "hold", options.longest_gap
     is_series = isinstance(series, pd.Series)
     name = "telemetry" if not is_series or series.name is None else str(series.name)
     about = series.attrs if is_series else {}
@@ -80,38 +70,13 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         log = CleaningLog(None, map(finding_from_dict, about.get("findings", ())), places)
         numbers = np.arange(len(values))
         begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
-        rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers, np.ones(len(values), np.int64))
+        rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers)
     log.findings[:0] = [_clock_finding(clock, rows.times) if has_time else _NO_CLOCK]
     log.findings += noted
 
-    rows = drop_duplicate_timestamps(rows, bad, log, name, options.same_time, options.interval_s is not None)
-    rows = drop_missing_values(rows, bad, log, name)
     base = int(rows.times[0])
     rows.times = rows.times - base
-    if not has_time:
-        interval = float(UNITS_NS["s"])
-    elif options.interval_s is not None:
-        interval = options.interval_s * 1e9
-    elif len(rows) > 1:
-        interval = find_interval(rows.times)
-        if regular_step_fraction(rows.times, interval) < _MIN_REGULAR_FRACTION:
-            raise InputError(
-                f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
-                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. "
-                "Give interval_s (--interval), and fill='hold' (--fill hold) for telemetry that is sent only when it changes."
-            )
-        if not holds:  # a long step of telemetry that is held is no slower rate
-            rows = resample_to_common_interval(rows, interval, log, options.other_rates == "resample", max_fill)
-    else:
-        raise InputError(
-            f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s (--interval)."
-        )
-    if options.interval_s is not None or holds:
-        segments = find_binned_segments(rows.times, interval, max_fill + 1)
-    else:
-        segments = find_regular_segments(rows.times, interval, options.max_jitter, max_fill + 1)
-    same_place = "last" if holds else "mean" if options.interval_s is not None else options.same_time or "mean"
-    parts, used = build_parts(rows, segments, interval, log, name, same_place, max_fill, options.min_part, holds)
+    parts, used, interval = regularise(rows, bad, log, name, options)
     describe_values(parts, values[np.isfinite(values)], log)
 
     first = parts[0].begin if has_time else -base
@@ -122,37 +87,24 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     return Cleaned(telemetry, report)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Clock:
-    """The clock of a channel, for its report: the column, how its times are written, their zone, and whether they count from zero."""
-
-    column: str
-    form: str
-    zone: str
-    counts: bool
-
-
 _NO_CLOCK = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
 
 
-def _clock_finding(clock: _Clock, times: np.ndarray) -> Finding:
-    """Describes the clock; `times` are those of all rows with a time, in ascending order."""
+def _clock_finding(clock: dict[str, Any], times: np.ndarray) -> Finding:
+    """Describes the clock: its column, form and zone, whether it counts from zero, and its first and last time in `times`."""
     first, last = int(times[0]), int(times[-1])
-    if clock.counts:
-        span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s"
-    else:
-        span = f"from {iso_time(first)} to {iso_time(last)}"
-    text = f"the clock is {clock.column}: {clock.form}, zone {clock.zone}, {span}"
-    return Finding("clock", 1, text, details=dataclasses.asdict(clock) | {"first_ns": first, "last_ns": last})
+    span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s" if clock["counts"] else f"from {iso_time(first)} to {iso_time(last)}"
+    text = f"the clock is {clock['column']}: {clock['form']}, zone {clock['zone']}, {span}"
+    return Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last})
 
 
 def _rows_with_times(
     index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]
-) -> tuple[CleaningLog, Rows, _Clock]:
+) -> tuple[CleaningLog, Rows, dict[str, Any]]:
     """Parses the times of a raw series and returns the cleaning log, the rows that have a time, in chronological order, and the clock."""
     places = about.get("places", ROWS)
     what, drop = f"the times of {name}", options.on_bad_times == "drop"
-    parsed = parse_times(index, what, drop, options.time_format, options.timezone, places)
+    parsed = parse_times(index, what, drop, options.time_format, places)
     stamps, bad = parsed.stamps, parsed.bad
     known = about.get("clock") or {
         "column": "the index" if index.name is None else repr(str(index.name)),
@@ -166,7 +118,7 @@ def _rows_with_times(
         stamps = localize_times(stamps, options.timezone)
     changed = had_time & stamps.isna()
     times = stamps.as_unit("ns").asi8 if stamps.tz is None else stamps.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8
-    log = CleaningLog(times, [*map(finding_from_dict, about.get("findings", ())), *parsed.findings], places, known["counts"])
+    log = CleaningLog(times, map(finding_from_dict, about.get("findings", ())), places, known["counts"])
     kept = np.flatnonzero(stamps.notna())
     unreadable, missing = np.flatnonzero(bad), np.flatnonzero(~had_time & ~bad)
     log.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))
@@ -188,4 +140,4 @@ def _rows_with_times(
         early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
         log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
-    return log, Rows(times[kept], values[kept], kept, np.ones(len(kept), np.int64)), _Clock(**known)
+    return log, Rows(times[kept], values[kept], kept), known

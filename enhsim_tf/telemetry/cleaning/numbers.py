@@ -114,7 +114,7 @@ def is_missing(cells: pd.Series) -> np.ndarray:
     of_text = ~missing
     if cells.dtype == object:
         of_text &= cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
-    text = cells[of_text]
+    text = cells if of_text.all() else cells[of_text]
     if pd.api.types.is_string_dtype(text.dtype) and text.dtype != object and (text.str.len() > len("-nan(snan)") + 2).all():
         return missing  # no such word is that long, as dates are
     text = text.str.strip().str.casefold()
@@ -173,39 +173,31 @@ def allows_point_thousands(text: pd.Series) -> bool:
 
 
 def _parse_text_numbers(cells: pd.Series, decimal: str | None) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
-    parsed, bad, findings = np.full(len(cells), np.nan), np.zeros(len(cells), bool), []
+    parsed, bad = np.full(len(cells), np.nan), np.zeros(len(cells), bool)
     left = ~is_missing(cells)
     of_text = cells.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
     for row in np.flatnonzero(left & ~of_text):
         parsed[row], bad[row] = _parse_object(cells.iloc[row])
     rows = np.flatnonzero(left & of_text)
     text = cells.iloc[rows].str.strip()
-    plain = text.str.fullmatch(f"{_NUMBER}|{_INFINITE}", case=False).to_numpy(bool)
-    commas = ~plain & text.str.fullmatch(_COMMA).to_numpy(bool)
-    thousands = ~plain & text.str.fullmatch(f"{_COMMA_THOUSANDS}|{_BOTH}").to_numpy(bool)
-    if decimal == "," and text.str.contains(",", regex=False).any() | text.str.fullmatch(_POINT_THOUSANDS).any():
-        with_points = text.str.fullmatch(_POINT_THOUSANDS).to_numpy(bool)
-        plain = plain & ~text.str.contains(".", regex=False).to_numpy(bool)
-        commas = commas | with_points
-        thousands = np.zeros_like(plain)
-    elif decimal == "." or text[thousands].str.fullmatch(_BOTH).any():
-        commas = np.zeros_like(plain)
-    elif commas.any():
-        has_points = text[plain].str.contains(".", regex=False).any()
-        maybe_thousands = text[commas].str.fullmatch(_COMMA_THOUSANDS).all()
-        thousands = np.zeros_like(plain)
-        if has_points or maybe_thousands:  # commas and points are mixed, or 1,500 could mean 1500 or 1.5
-            commas = np.zeros_like(plain)
-    if commas.any():
-        findings.append(Finding("decimal comma", int(commas.sum()), f"numbers written with a decimal comma: {commas.sum():,}"))
-    text = text.mask(thousands, text.str.replace(",", "", regex=False))
-    text = text.mask(commas, text.str.replace(".", "", regex=False).str.replace(",", ".", regex=False))
-    readable = plain | commas | thousands
-    parsed[rows[readable]] = text[readable].astype(np.float64)
-    written_finite = readable & ~text.str.contains("inf", case=False).to_numpy(bool)
-    bad[rows[~readable]] = True
-    bad[rows[written_finite]] |= ~np.isfinite(parsed[rows[written_finite]])  # 1e999 is a number but overflows float64
-    return parsed, bad, findings
+    sign = decimal or _sign_of(text)
+    forms = {",": f"{_COMMA}|{_POINT_THOUSANDS}|{_WHOLE}", ".": f"{_NUMBER}|{_COMMA_THOUSANDS}|{_BOTH}"}
+    readable = text.str.fullmatch(f"{forms.get(sign, _NUMBER)}|{_INFINITE}", case=False).to_numpy(bool)
+    text = text[readable]
+    count = int(text.str.contains(",", regex=False).sum()) if sign == "," else 0
+    text = text.str.replace("." if sign == "," else ",", "", regex=False).str.replace(",", ".", regex=False)
+    parsed[rows[readable]] = text.astype(np.float64)
+    overflows = np.isinf(parsed[rows[readable]]) & ~text.str.contains("inf", case=False).to_numpy(bool)  # 1e999
+    bad[rows[~readable]], bad[rows[readable][overflows]] = True, True
+    return parsed, bad, [Finding("decimal comma", count, f"numbers written with a decimal comma: {count:,}")] if count else []
+
+
+def _sign_of(text: pd.Series) -> str | None:
+    """Returns the decimal sign that a column of text shows. None: points, and no commas that separate thousands."""
+    if text.str.fullmatch(_BOTH).any():
+        return "."
+    has_points = text[text.str.fullmatch(_NUMBER).to_numpy(bool)].str.contains(".", regex=False).any()
+    return "," if shows_comma(text) and not has_points else None
 
 
 def _parse_object(cell: Any) -> tuple[float, bool]:

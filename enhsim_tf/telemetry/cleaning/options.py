@@ -10,7 +10,6 @@ _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
     "on_bad_values": ("refuse", "drop"),
     "same_time": (None, "mean", "first", "last", "refuse"),
-    "other_rates": ("resample", "leave out"),
     "fill": ("linear", "hold"),
     "labelled": ("keep", "missing"),
     "decimal": (None, ".", ","),
@@ -42,11 +41,10 @@ class Cleaning:
             `fill="hold"`.
         fill: How gaps are filled: "linear", by straight lines, or "hold", with the last value before the gap, for telemetry that is
             sent only when its value changes. With "hold", the last of several rows in an interval is used, not their mean.
-        other_rates: Treatment of stretches with another sampling rate: "resample" or "leave out".
         min_part: Shortest part that is kept, in samples.
         label_column: Name, or names, of the columns of a table that label anomalous rows, or "none". None: detected.
         labelled: Treatment of rows that are labelled anomalous: "keep" them, or take their values as "missing".
-        series_column: Name, or names, of the columns whose values tell several series of one table apart. None: detected.
+        series_column: Name, or names, of the columns whose values tell several series of one table apart, or "none". None: detected.
         value_column: Name, or names, of the columns that hold the values of such series. None: all columns of numbers.
         no_header: Whether a text file has no line of column names. Its columns are then called "column 0", "column 1", ...
 
@@ -65,7 +63,6 @@ class Cleaning:
     max_jitter: float = 0.25
     max_fill: int | None = None
     fill: str = "linear"
-    other_rates: str = "resample"
     min_part: int = 2
     label_column: str | Sequence[str] | None = None
     labelled: str = "keep"

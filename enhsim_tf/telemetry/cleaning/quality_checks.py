@@ -5,12 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from enhsim_tf.telemetry.cleaning.regular_grid import Part
 from enhsim_tf.telemetry.cleaning.report import CleaningLog
-from enhsim_tf.telemetry.cleaning.resampling import Part
+from enhsim_tf.telemetry.quantisation import Levels
 
 _NUM_STRETCHES = 10  # consecutive stretches whose level and amplitude are compared
 _MAX_LEVELS = 4_096  # a channel with more distinct values does not count as quantised
-_FEWEST_OTHERS = 10  # a channel with fewer other values has states, none of which is a fill value
+_FEWEST_OTHERS = 10  # a channel with fewer other values has states, none of which is a fill value unless it has usual digits
 _FAR = 3  # distance of a fill value that has no usual digits from all others, in their range
 _STUCK = 20  # a shorter run of one value, in samples, does not count as stuck
 
@@ -39,12 +40,13 @@ def _log_fill_values(read: np.ndarray, log: CleaningLog) -> None:
     """Reports a lowest or highest value that repeats exactly, far outside all others, as loggers write where they have no value."""
     distinct, counts = np.unique(read, return_counts=True)
     low, high, found = 0, len(distinct) - 1, []
-    while high - low >= _FEWEST_OTHERS:
+    while high - low >= 3:
         spread = distinct[high - 1] - distinct[low + 1]
         places = [
             place
             for place, distance in ((low, distinct[low + 1] - distinct[low]), (high, distinct[high] - distinct[high - 1]))
-            if counts[place] >= 2 and distance > (1 if _is_usual_fill(distinct[place]) else _FAR) * spread
+            if counts[place] >= 2
+            and (distance > spread if _is_usual_fill(distinct[place]) else high - low >= _FEWEST_OTHERS and distance > _FAR * spread)
         ]
         if not places:
             break
@@ -71,16 +73,10 @@ def _log_resolution(values: np.ndarray, log: CleaningLog) -> None:
 
 
 def _log_levels(values: np.ndarray, log: CleaningLog) -> None:
-    levels = np.unique(values)
-    if not 2 <= len(levels) <= min(_MAX_LEVELS, len(values) // 10):
-        return
-    steps = np.diff(levels)
-    step = float(steps.min())
-    multiples = (levels - levels[0]) / step
-    even = float(np.abs(multiples - np.round(multiples)).max()) < 0.05
-    how = f"in steps of {step:.4g}" if even else f"at least {step:.4g} apart"
-    text = f"quantised values, {{count}} levels {how}: noise smaller than a step cannot be learnt"
-    log.add("quantised", (), text, count=len(levels), details={"step": step, "is_even": even})
+    levels = Levels.find(values)
+    if levels is not None and levels.count <= _MAX_LEVELS:
+        text = f"quantised values, {{count}} levels in steps of {levels.step:.4g}: noise smaller than a step cannot be learnt"
+        log.add("quantised", (), text, count=levels.count, details={"step": levels.step})
 
 
 def _log_stuck(values: np.ndarray, numbers: np.ndarray, log: CleaningLog) -> None:

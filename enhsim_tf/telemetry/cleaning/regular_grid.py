@@ -1,14 +1,116 @@
-"""Infers the sampling of a series from its times: the interval, stretches with another rate, and the regular grid.
+"""Turns the rows of a raw channel into regular samples: unique times, one sampling interval, parts without long gaps.
 
-All functions are pure functions of arrays. Times are sorted int64 nanoseconds. `resampling` decides what happens to the rows.
+Times are int64 nanoseconds. Each step drops or merges rows, or fills samples, and records this in the `CleaningLog`.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.cleaning.options import Cleaning
+from enhsim_tf.telemetry.cleaning.report import CleaningLog
 
 _ALIKE = (0.8, 1.25)  # steps within these factors have the same rate; with jitter of a quarter, means of four steps stay inside
 _RUN = 4  # smallest number of consecutive steps that form a stretch with another rate
+_LEAST_REGULAR = 0.4  # share of the steps that are whole numbers of intervals; random times reach 0.25
+
+
+@dataclasses.dataclass
+class Rows:
+    """The rows that are still in use, in chronological order. All arrays have the shape `(rows,)`.
+
+    Args:
+        times: Times in nanoseconds, int64.
+        values: Values, float64; a missing value is NaN or infinite.
+        source_row: Number of the row in the source.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    source_row: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def take(self, which: np.ndarray | slice) -> "Rows":
+        """Selects rows by index, mask or slice."""
+        return Rows(self.times[which], self.values[which], self.source_row[which])
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """Regular samples without a gap.
+
+    Args:
+        begin: Time of the first sample in nanoseconds, a float because the grid need not lie on whole nanoseconds.
+        values: float64 array of shape `(samples,)`.
+        source_row: For each sample, its row in the source. A filled sample has the number of the last row before it.
+    """
+
+    begin: float
+    values: np.ndarray
+    source_row: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class _Segment:
+    """Rows that lie on one regular grid: their slice, the grid point of each in ascending order, the time of point 0, and their distances."""
+
+    rows: slice
+    places: np.ndarray
+    begin: float
+    off: np.ndarray
+
+
+def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> tuple[list[Part], int, float]:
+    """Turns rows into regular parts.
+
+    Args:
+        rows: The rows.
+        bad: Mask of the source rows whose value cannot be read.
+        log: The cleaning log, to which findings are added. If it has no times, samples are counted.
+        name: Channel name, for messages.
+        options: How problems are treated.
+
+    Returns:
+        `(parts, used, interval)`: the parts, the number of rows that their samples represent, and the interval in nanoseconds.
+
+    Raises:
+        InputError: If the rows have no common interval, or no part is long enough, or if times repeat that must not.
+    """
+    rows = _drop_missing_values(_drop_duplicate_times(rows, bad, log, name, options), bad, log, name)
+    holds, longest = options.fill == "hold", options.longest_gap + 1
+    by_interval = options.interval_s is not None or holds
+    if log.times is None:
+        interval = 1e9
+    elif options.interval_s is not None:
+        interval = options.interval_s * 1e9
+    elif len(rows) < 2:
+        raise InputError(
+            f"Expected at least 2 rows to infer the interval. Received: 1 usable row from {name}. Give interval_s (--interval)."
+        )
+    else:
+        interval = find_interval(rows.times)
+        if regular_step_fraction(rows.times, interval) < _LEAST_REGULAR:
+            raise InputError(
+                f"Expected roughly regular times. Received: steps from {np.diff(rows.times).min() / 1e9:g} s to "
+                f"{np.diff(rows.times).max() / 1e9:g} s without a common interval, in {name}. "
+                "Give interval_s (--interval), and fill='hold' (--fill hold) for telemetry that is sent only when it changes."
+            )
+        other = np.flatnonzero(_have_other_rate(rows.times, interval))
+        if len(other) and not holds:  # a long step of telemetry that is held is no slower rate
+            by_interval = True
+            text = (
+                f"rows in stretches of another rate than one every {interval / 1e9:.6g} s, to which they are averaged or filled: {{count}}"
+            )
+            log.add("other rates", rows.source_row[other], text)
+    segments = _binned(rows.times, interval, longest) if by_interval else _regular(rows.times, interval, options.max_jitter, longest)
+    same_place = "last" if holds else "mean" if by_interval else options.same_time or "mean"
+    parts, used = _build_parts(rows, segments, interval, log, name, same_place, options)
+    return parts, used, interval
 
 
 def find_interval(times: np.ndarray) -> float:
@@ -65,69 +167,69 @@ def regular_step_fraction(times: np.ndarray, interval: float) -> float:
     return float(np.mean((numbers >= 1) & (np.abs(ratios - numbers) <= 0.25)))
 
 
-@dataclasses.dataclass(frozen=True)
-class OtherRateSegment:
-    """A segment of rows whose sampling rate differs from the common one.
-
-    Args:
-        first: First row of the segment.
-        last: Last row of the segment (inclusive).
-        ratio: Median step of the segment, in common intervals.
-        longest: Longest step of the segment, in common intervals.
-    """
-
-    first: int
-    last: int
-    ratio: float
-    longest: float
-
-
-def find_other_rates(times: np.ndarray, interval: float) -> list[OtherRateSegment]:
-    """Finds segments whose steps are all shorter than the interval, or all longer and similar to each other."""
-    ratios = np.diff(times) / interval
+def _have_other_rate(times: np.ndarray, interval: float) -> np.ndarray:
+    """Marks rows in stretches whose steps are all shorter than the interval, or all longer and similar to each other."""
+    ratios, marks = np.diff(times) / interval, np.zeros(len(times), bool)
     if len(ratios) < _RUN:
-        return []
+        return marks
     windows = np.lib.stride_tricks.sliding_window_view(ratios, _RUN)
     lowest, highest = windows.min(axis=1), windows.max(axis=1)
-    segments = []
-    for is_other in (highest < _ALIKE[0], (lowest > _ALIKE[1]) & (highest < 1.3 * lowest)):
-        covered = np.convolve(is_other, np.ones(_RUN)) > 0.5
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], covered.view(np.int8), [0]])))
-        for first, last in edges.reshape(-1, 2).tolist():
-            inside = ratios[first:last]
-            segments.append(OtherRateSegment(first, last, float(np.median(inside)), float(inside.max())))
-    return sorted(segments, key=lambda segment: segment.first)
+    starts = np.flatnonzero((highest < _ALIKE[0]) | (lowest > _ALIKE[1]) & (highest < 1.3 * lowest))
+    marks[(starts[:, None] + np.arange(_RUN + 1)).ravel()] = True
+    return marks
 
 
-@dataclasses.dataclass(frozen=True)
-class Segment:
-    """A segment of rows that lie on one regular grid.
+def _drop_duplicate_times(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options: Cleaning) -> Rows:
+    """Keeps one row for each time. A mean that would merge most rows must be asked for."""
+    same_time = options.same_time
+    values = np.where(bad[rows.source_row], np.inf, rows.values)  # an unreadable value is not a duplicate of a missing one
+    is_copy = pd.DataFrame({"time": rows.times, "value": values}).duplicated().to_numpy()
+    copies = rows.source_row[is_copy]
+    log.add("duplicate rows", copies, "rows that repeat the time and value of another: {count}", rows_left_out=len(copies))
+    rows = rows.take(~is_copy)
+    kept, left = _merge_groups(rows, rows.times, same_time or "mean")
+    if same_time is None and options.interval_s is None and 2 * len(left) >= len(rows) > 2:
+        raise InputError(
+            f"Expected a time for each row. Received: {len(rows):,} rows of {name} with {len(kept):,} different times. If they belong to several "
+            "series, give series_column (--series-column); if the clock lost digits, give interval_s (--interval) or same_time='mean'."
+        )
+    if same_time == "refuse" and len(left):
+        raise InputError(
+            f"Expected one value for each time. Received: {len(left):,} more in {name}, the first at {log.place(left[0])}. Give same_time='mean'."
+        )
+    text = f"rows with another value at the same time, of which the {same_time or 'mean'} was taken: {{count}}"
+    log.add("same time", left, text, rows_left_out=len(left))
+    return kept
 
-    Args:
-        rows: Slice of the rows.
-        places: Index of the grid point of each row, from 0, in ascending order. Rows may share a grid point.
-        begin: Time of grid point 0 in nanoseconds, a float because the grid need not lie on whole nanoseconds.
-        off: Distance of each row from its grid point in nanoseconds.
-    """
 
-    rows: slice
-    places: np.ndarray
-    begin: float
-    off: np.ndarray
+def _merge_groups(rows: Rows, groups: np.ndarray, how: str) -> tuple[Rows, np.ndarray]:
+    """Merges each group of neighbouring rows into one row; also returns the source rows that were merged into others."""
+    if not np.any(groups[1:] == groups[:-1]):
+        return rows, rows.source_row[:0]
+    has_value = np.isfinite(rows.values)
+    order = np.arange(len(rows)) * (-1 if how == "last" else 1)
+    ranked = np.lexsort((order, ~has_value, groups))  # within each group, rows with a value come first
+    chosen = ranked[np.flatnonzero(np.diff(groups[ranked], prepend=groups[ranked[0]] - 1))]
+    kept = rows.take(chosen)
+    if how not in ("first", "last"):
+        means = pd.Series(np.where(has_value, rows.values, np.nan)).groupby(groups).mean().to_numpy()
+        kept.values = np.where(np.isfinite(means), means, kept.values)
+    return kept, np.delete(rows.source_row, chosen)
 
 
-def find_regular_segments(times: np.ndarray, interval: float, max_jitter: float, max_step: int) -> list[Segment]:
-    """Splits a series into segments whose rows lie on regular grids with the same interval and individual start times.
+def _drop_missing_values(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str) -> Rows:
+    """Drops rows without a finite value."""
+    has_value = np.isfinite(rows.values)
+    unread, missing = rows.source_row[~has_value & bad[rows.source_row]], rows.source_row[~has_value & ~bad[rows.source_row]]
+    log.add("bad values", unread, "values that cannot be read, taken as missing: {count}", rows_left_out=len(unread))
+    log.add("missing values", missing, "rows without a value (NaN, infinite or empty), taken as gaps: {count}", rows_left_out=len(missing))
+    if not has_value.any():
+        raise InputError(f"Expected values. Received: only missing ones in {name}. Choose another channel.")
+    return rows.take(has_value)
 
-    Args:
-        times: Times of the rows.
-        interval: The interval in nanoseconds.
-        max_jitter: Largest distance of a row from its grid point, in intervals, at most 0.5.
-        max_step: Longest step inside a segment, in intervals.
 
-    Returns:
-        The segments in chronological order.
-    """
+def _regular(times: np.ndarray, interval: float, max_jitter: float, max_step: int) -> list[_Segment]:
+    """Splits a series, also at jumps of the clock, into segments on regular grids with the same interval and individual start times."""
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
     whole = (numbers <= max_step) & (np.abs(ratios - numbers) <= 2 * max_jitter + 1e-9)
@@ -143,7 +245,7 @@ def find_regular_segments(times: np.ndarray, interval: float, max_jitter: float,
             middle = float(np.median(off))
             if np.abs(off - middle).max() > max_jitter * interval:
                 middle = float(off.max() + off.min()) / 2
-            segments.append(Segment(slice(start + first, start + end), places, float(times[start + first]) + middle, off - middle))
+            segments.append(_Segment(slice(start + first, start + end), places, float(times[start + first]) + middle, off - middle))
             first = end
     return segments
 
@@ -163,22 +265,79 @@ def _end_of_spread(values: np.ndarray, spread: float) -> int:
     return len(values)
 
 
-def find_binned_segments(times: np.ndarray, interval: float, max_step: int) -> list[Segment]:
-    """Splits a series at its long gaps and assigns every row to the nearest point of one grid that starts at the first row.
-
-    Args:
-        times: Times of the rows.
-        interval: The interval in nanoseconds.
-        max_step: Longest step inside a segment, in intervals.
-
-    Returns:
-        The segments in chronological order.
-    """
+def _binned(times: np.ndarray, interval: float, max_step: int) -> list[_Segment]:
+    """Splits a series at its long gaps and assigns every row to the nearest point of one grid that starts at the first row."""
     places = np.round((times - times[0]) / interval).astype(np.int64)
     breaks = [0, *(np.flatnonzero(np.diff(places) > max_step) + 1).tolist(), len(times)]
     segments = []
     for start, stop in zip(breaks[:-1], breaks[1:], strict=True):
         begin = float(times[0]) + places[start] * interval
         inside = places[start:stop] - places[start]
-        segments.append(Segment(slice(start, stop), inside, begin, times[start:stop] - begin - inside * interval))
+        segments.append(_Segment(slice(start, stop), inside, begin, times[start:stop] - begin - inside * interval))
     return segments
+
+
+def _build_parts(
+    rows: Rows, segments: Sequence[_Segment], interval: float, log: CleaningLog, name: str, same_place: str, options: Cleaning
+) -> tuple[list[Part], int]:
+    """Builds regular parts, fills their short gaps, and counts the rows that they use. Of several rows at one grid point, one is kept."""
+    parts, used, merged, short, gaps, num_filled = [], 0, [], [], [], 0
+    off, holds = np.zeros(len(rows)), options.fill == "hold"
+    for segment in segments:
+        inside, length = rows.take(segment.rows), int(segment.places[-1]) + 1
+        if length < options.min_part:
+            short.append(inside.source_row)
+            continue
+        off[segment.rows] = segment.off
+        inside, left = _merge_groups(inside, segment.places, same_place)
+        if same_place == "refuse" and len(left):
+            raise InputError(
+                f"Expected one row for each interval of {interval / 1e9:.6g} s. Received: another at {log.place(left[0])} of {name}. "
+                "Give same_time='mean'."
+            )
+        merged.append(left)
+        places, samples = np.unique(segment.places), np.arange(length)
+        previous = np.searchsorted(places, samples, "right") - 1
+        values = inside.values[previous] if holds else np.interp(samples, places, inside.values)
+        parts.append(Part(segment.begin, values, inside.source_row[previous]))
+        used += len(inside)
+        gaps.append(inside.source_row[:-1][np.diff(places) > 1])
+        num_filled += length - len(places)
+    if not parts:
+        longest = max(int(segment.places[-1]) + 1 for segment in segments)
+        raise InputError(
+            f"Expected regular samples, at least {options.min_part} in a row. Received: {longest} at most, every {interval / 1e9:.6g} s, in {name}. "
+            "Give interval_s (--interval), a longer max_fill (--max-fill) or a shorter min_part."
+        )
+    _log_breaks(rows, segments, interval, log, options.longest_gap)
+    _log_jitter(rows, off, interval, log)
+    for kind, found, text in (
+        ("averaged", merged, f"rows that share an interval with another row, of which the {same_place} was taken: {{count}}"),
+        ("short parts", short, f"rows in parts of fewer than {options.min_part:,} samples ({len(short):,} such parts): {{count}}"),
+    ):
+        numbers = np.concatenate([*found, rows.source_row[:0]])
+        log.add(kind, numbers, text, rows_left_out=len(numbers))
+    how = "filled with the value before them," if holds else "filled by straight lines with"
+    text = f"gaps of up to {options.longest_gap} samples, {how} {num_filled:,} samples in total: {{count}}"
+    log.add("gaps filled", np.concatenate(gaps), text, samples_filled=num_filled)
+    return parts, used
+
+
+def _log_breaks(rows: Rows, segments: Sequence[_Segment], interval: float, log: CleaningLog, max_fill: int) -> None:
+    before = np.array([segment.rows.stop - 1 for segment in segments[:-1]], np.int64)
+    steps = (rows.times[before + 1] - rows.times[before]) / interval
+    is_gap = np.round(steps) > max_fill + 1
+    unit = 1.0 if log.times is None else interval / 1e9
+    longest, what = steps.max(initial=0) * unit, "samples" if log.times is None else "s"
+    text = f"gaps of more than {max_fill} samples, the longest {longest:.6g} {what}, at which the series is split: {{count}}"
+    log.add("gaps", rows.source_row[before[is_gap]], text, details={"longest": float(longest)})
+    log.add("clock steps", rows.source_row[before[~is_gap]], "jumps of the clock, at which the series is split: {count}")
+
+
+def _log_jitter(rows: Rows, off: np.ndarray, interval: float, log: CleaningLog) -> None:
+    share = np.abs(off) / interval
+    snapped = np.flatnonzero(share > 1e-3)  # smaller deviations come from rounded times
+    largest = float(share.max()) * interval / 1e9
+    worst = rows.source_row[snapped[np.argsort(-share[snapped], kind="stable")]]
+    text = f"times off the regular grid, by up to {largest:.4g} s ({share.max():.0%} of an interval), snapped to it: {{count}}"
+    log.add("jitter", worst, text, details={"largest_s": largest})

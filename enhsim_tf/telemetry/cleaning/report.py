@@ -12,49 +12,13 @@ import pandas as pd
 
 from enhsim_tf.common.errors import printable
 
-KINDS = {
-    "files": "accepted",
-    "header lines": "accepted",
-    "encoding": "accepted",
-    "padding": "left out",
-    "clock": "accepted",
-    "time zone": "accepted",
-    "further clocks": "accepted",
-    "labels": "accepted",
-    "quality flags": "accepted",
-    "row numbers": "accepted",
-    "own columns": "accepted",
-    "series": "accepted",
-    "columns left out": "accepted",
-    "commands": "accepted",
-    "leap seconds": "repaired",
-    "decimal comma": "accepted",
-    "fill values": "accepted",
-    "missing words": "accepted",
-    "missing times": "left out",
-    "bad times": "left out",
-    "clock change": "left out",
-    "descending": "repaired",
-    "unsorted": "repaired",
-    "duplicate rows": "left out",
-    "same time": "left out",
-    "missing values": "left out",
-    "bad values": "left out",
-    "finer stretches": "repaired",
-    "coarser stretches": "repaired",
-    "other rates": "left out",
-    "averaged": "left out",
-    "jitter": "repaired",
-    "gaps filled": "repaired",
-    "gaps": "accepted",
-    "clock steps": "accepted",
-    "short parts": "left out",
-    "constant": "accepted",
-    "stuck": "accepted",
-    "quantised": "accepted",
-    "resolution": "accepted",
-    "changing level": "accepted",
+_ACTIONS = {
+    "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
+    "columns left out, commands, decimal comma, fill values, missing words, gaps, clock steps, constant, stuck, quantised, resolution, changing level",
+    "repaired": "descending, unsorted, other rates, jitter, gaps filled",
+    "left out": "padding, missing times, bad times, clock change, duplicate rows, same time, missing values, bad values, averaged, short parts",
 }
+KINDS = {kind: action for action, kinds in _ACTIONS.items() for kind in kinds.split(", ")}
 """What was done about each kind of finding."""
 _NUM_PLACES = 3  # places named in each finding
 
@@ -225,10 +189,6 @@ class CleaningLog:
         if count:
             places = tuple(self.place(row) for row in rows[:_NUM_PLACES])
             self.findings.append(Finding(kind, int(count), text.replace("{count}", f"{count:,}"), places, **numbers))
-
-    def set_samples_filled(self, kind: str, samples: int) -> None:
-        """Sets `samples_filled` of a finding that was added before this number was known."""
-        self.findings = [dataclasses.replace(one, samples_filled=samples) if one.kind == kind else one for one in self.findings]
 
 
 def iso_time(nanoseconds: int) -> str:

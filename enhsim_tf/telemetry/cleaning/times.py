@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pandas.tseries.api import guess_datetime_format
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.dates import ISO, date_forms, fill_dates, parse_dates
 from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
-from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Finding, Places
+from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
 UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_NAMES = {"D": "days", "h": "hours", "min": "minutes", "s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
@@ -26,6 +26,12 @@ _YEARS_S = (3.1e8, 4.2e9)  # seconds since 1970 in the years 1979 to 2103
 _LARGEST_NS = 9.2e18  # limit of int64 nanoseconds since 1970: years 1678 to 2262
 DURATION = r"[+-]?\d+(?:\.\d+)? ?(?:ns|us|ms|s|secs?|seconds?|min|minutes?|h|hrs?|hours?|d|days?(?: [\d:.+-]+)?)"
 """Pattern of a time span as text, such as `0.5 sec` and `1 days 00:00:01`."""
+_ISO = "ISO8601"
+LOOK = 200  # number of cells that are inspected to find a form
+_TIME = r"(?P<time>\d\d?:\d\d(?P<seconds>:\d\d(?P<fraction>\.\d+)?)?)(?P<half> ?[AaPp][Mm])?"
+_END = rf"(?:(?P<gap>[T:]|,? +){_TIME})?(?P<zone> ?(?:Z|[+-]\d\d(?::?\d\d)?))?"
+_DAY_OF_YEAR = re.compile(rf"\d{{4}}(?P<mark>[-/:. ]?)\d{{3}}{_END}")
+_DAY_MONTH = re.compile(rf"(?P<first>\d\d?)(?P<mark>[./-])(?P<second>\d\d?)(?P=mark)\d{{4}}{_END}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +44,6 @@ class Times:
         form: How the times are written, for the report.
         zone: The zone that the source states, for the report; empty if it states none.
         counts: Whether the times count from a zero of their own and are no dates.
-        findings: Findings for the cleaning log.
     """
 
     stamps: pd.DatetimeIndex
@@ -46,7 +51,6 @@ class Times:
     form: str = "dates"
     zone: str = ""
     counts: bool = False
-    findings: tuple[Finding, ...] = ()
 
 
 def check_time_format(form: str | None) -> None:
@@ -65,9 +69,7 @@ def check_time_format(form: str | None) -> None:
         )
 
 
-def parse_times(
-    times: Any, what: str, drop: bool = False, form: str | None = None, zone: str | None = None, places: Places = ROWS
-) -> Times:
+def parse_times(times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS) -> Times:
     """Parses a column of times.
 
     Args:
@@ -75,7 +77,6 @@ def parse_times(
         what: Description of the source, for messages.
         drop: If True, a time that cannot be parsed is marked and treated as missing. If False, it raises an `InputError`.
         form: A format of text as for `datetime.strptime`, or the unit or kind of numbers, see `Cleaning.time_format`. None: detected.
-        zone: Time zone of cells without one among others with one. None: UTC.
         places: Where the rows are in their file, for messages.
 
     Returns:
@@ -87,123 +88,132 @@ def parse_times(
     check_time_format(form)
     if isinstance(times, pd.MultiIndex):
         raise InputError(f"Expected one time for a row. Received: an index of {times.nlevels} levels from {what}. Name one time column.")
-    times = column(times, what)
+    times, reader = column(times, what), _Reader(what, drop, places)
     if isinstance(times.dtype, pd.PeriodDtype):
         times = times.astype(str).where(times.notna()) if len(times) else times.astype(object)
     kind, is_format = times.dtype, form is not None and "%" in form
     if pd.api.types.is_datetime64_any_dtype(kind):
-        return _from_dates(times, what, drop, places)
+        return reader.of_dates(times)
     if pd.api.types.is_timedelta64_dtype(kind):
-        return _from_numbers(times.dt.total_seconds(), what, drop, "s", places)
+        return reader.of_numbers(times.dt.total_seconds(), "s")
     if pd.api.types.is_bool_dtype(kind) or not (pd.api.types.is_numeric_dtype(kind) or is_text(times)) or kind.kind == "c":
         raise InputError(f"Expected times as dates or numbers. Received: dtype {kind} from {what}. Name another time column.")
     if not is_text(times):
         if not is_format:
-            return _from_numbers(times, what, drop, form, places)
+            return reader.of_numbers(times, form)
         times = times.astype("Int64").astype(str).where(times.notna()) if (times.dropna() % 1 == 0).all() else times.astype(str)
-    return _from_text(times, what, drop, form if is_format else None, None if is_format else form, zone, places)
+    return reader.of_text(times, form, is_format)
 
 
-def _from_text(cells: pd.Series, what: str, drop: bool, form: str | None, unit: str | None, zone: str | None, places: Places) -> Times:
-    missing = is_missing(cells)
-    given = cells[~missing] if missing.any() else cells
-    if cells.dtype == object:
-        of_text = given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)
-        if len(given) and given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64)).all():  # datetime is a subclass of date
-            aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
-            return _from_dates(pd.Series(pd.to_datetime(cells.where(~missing), utc=bool(aware), errors="coerce")), what, drop, places)
-    else:
-        of_text = np.ones(len(given), bool)
-    if form is None and len(given):
-        if (numbers := _as_numbers(cells, given, missing, what)) is not None:
-            values, bad = numbers
-            _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
-            return _mark(_from_numbers(values, what, drop, unit, places), bad)
-        if given.iloc[:20].astype(str).str.strip().str.fullmatch(DURATION).all():
-            spans = pd.to_timedelta(cells.where(~missing), errors="coerce")
-            bad = spans.isna().to_numpy() & ~missing
-            _refuse(cells, bad, what, places, drop, "Correct them or name another time column")
-            return _mark(_from_numbers(spans.dt.total_seconds(), what, drop, "s", places), bad)
-    text = cells.where(~missing).map(_to_text).astype("str") if cells.dtype == object else cells.where(~missing) if missing.any() else cells
-    forms = [form] if form is not None else date_forms(given[of_text].astype("str"))
-    if len(forms) > 1:
+@dataclasses.dataclass(frozen=True)
+class _Reader:
+    """Reads times of one source; its arguments are those of `parse_times`."""
+
+    what: str
+    drop: bool
+    places: Places
+
+    def refuse(self, cells: pd.Series, bad: np.ndarray, then: str = "Correct them or name another time column") -> None:
+        """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
+        if self.drop or not bad.any():
+            return
+        row = int(np.argmax(bad))
+        try:
+            received = format_cell(cells.iloc[row])
+        except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
+            received = "a time out of range"
         raise InputError(
-            f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {what}, where both are at most 12 "
-            f"throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
+            f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {self.places.of(row)} of {self.what}, and "
+            f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
         )
-    return _from_dates_as_text(cells, text, missing, what, drop, forms[0] if forms else ISO, zone, places)
 
+    def of_dates(self, times: pd.Series) -> Times:
+        stamps, zone = pd.DatetimeIndex(times), ""
+        if stamps.tz is not None:
+            zone = str(stamps.tz)
+            stamps = stamps.tz_convert("UTC")
+        coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
+        bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
+        self.refuse(times, bad, "Give times from 1678 to 2261")
+        return Times(stamps.where(~bad).as_unit("ns"), bad, "dates", zone)
 
-def _to_text(cell: Any) -> str | None:
-    return str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None
+    def of_numbers(self, times: pd.Series, unit: str | None) -> Times:
+        values, form = times.to_numpy(np.float64, na_value=np.nan), ""
+        finite = np.isfinite(values)
+        unit = unit or _infer_unit(values[finite], self.what)
+        if unit in DAYS:
+            values, form = np.round((values - DAYS[unit]) * 86_400, 3), _DAY_NAMES[unit]  # a spreadsheet's eight decimals are a millisecond
+            times, unit = pd.Series(values), "s"
+        factor = UNITS_NS[unit]
+        bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
+        self.refuse(times, bad)
+        usable = finite & ~bad
+        since = np.full(len(values), pd.NaT.value, np.int64)
+        if pd.api.types.is_integer_dtype(times.dtype):
+            since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # integers keep their precision
+        else:
+            whole = np.floor(values[usable])
+            since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
+        is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
+        if is_epoch:
+            _refuse_lost_digits(values[usable], self.what)
+        form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
+        stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
+        return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
 
+    def of_text(self, cells: pd.Series, form: str | None, is_format: bool) -> Times:
+        missing = is_missing(cells)
+        given, text = (cells[~missing], cells.where(~missing)) if missing.any() else (cells, cells)
+        if cells.dtype == object:
+            is_date = given.map(lambda cell: isinstance(cell, datetime.date | np.datetime64))  # datetime is a subclass of date
+            if len(given) and is_date.all():
+                aware = given.map(lambda cell: getattr(cell, "tzinfo", None) is not None).any()
+                return self.of_dates(pd.Series(pd.to_datetime(text, utc=bool(aware), errors="coerce")))
+            text = text.map(lambda cell: str(cell) if isinstance(cell, str | datetime.date | np.datetime64) else None).astype("str")
+        if len(given) and not is_format:
+            head, found, unit = given.iloc[:20], None, form
+            if parse_numbers(head, self.what, drop=True)[1].mean() <= 0.5:
+                values, bad, _ = parse_numbers(cells, self.what, drop=True)
+                exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
+                found = exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values)
+            elif head.astype(str).str.strip().str.fullmatch(DURATION).all():
+                spans = pd.to_timedelta(text, errors="coerce")
+                found, bad, unit = spans.dt.total_seconds(), spans.isna().to_numpy() & ~missing, "s"
+            if found is not None:
+                self.refuse(cells, bad)
+                times = self.of_numbers(found, unit)
+                return dataclasses.replace(times, bad=times.bad | bad)
+        forms = [form] if is_format else date_forms(text.dropna())
+        if len(forms) > 1:
+            raise InputError(
+                f"Expected dates whose day and month can be told apart. Received: {format_cell(given.iloc[0])} in {self.what}, where both are at most "
+                f"12 throughout. Give time_format {forms[0]!r} or {forms[1]!r} (--time-format)."
+            )
+        return self._of_dates_as_text(cells, text, missing, forms[0] if forms else _ISO)
 
-def _as_numbers(cells: pd.Series, given: pd.Series, missing: np.ndarray, what: str) -> tuple[pd.Series, np.ndarray] | None:
-    """Returns text as numbers and the mask of cells that are none, or None if most of the first cells are none."""
-    head = given.iloc[:20]
-    if parse_numbers(head, what, drop=True)[1].mean() > 0.5:
-        return None
-    values, bad, _ = parse_numbers(cells, what, drop=True)
-    exact = pd.to_numeric(cells.where(~missing), errors="coerce")  # integer nanoseconds keep their precision
-    return exact if pd.api.types.is_integer_dtype(exact.dtype) else pd.Series(values), bad
-
-
-def _mark(times: Times, bad: np.ndarray) -> Times:
-    return dataclasses.replace(times, bad=times.bad | bad)
-
-
-def _refuse(cells: pd.Series, bad: np.ndarray, what: str, places: Places, drop: bool, then: str) -> None:
-    """Raises an `InputError` that names the first bad cell, unless there is none or they are dropped."""
-    if drop or not bad.any():
-        return
-    row = int(np.argmax(bad))
-    try:
-        received = format_cell(cells.iloc[row])
-    except (NotImplementedError, OverflowError, ValueError):  # the time is too far in the future or past to be converted to its zone
-        received = "a time out of range"
-    raise InputError(
-        f"Expected times as ISO 8601 date-times or seconds. Received: {received} at {places.of(row)} of {what}, and "
-        f"{int(bad.sum()) - 1:,} more. {then}, or leave them out with on_bad_times='drop' (--drop-bad)."
-    )
-
-
-def _from_dates(times: pd.Series, what: str, drop: bool, places: Places) -> Times:
-    stamps, zone = pd.DatetimeIndex(times), ""
-    if stamps.tz is not None:
-        zone = str(stamps.tz)
-        stamps = stamps.tz_convert("UTC")
-    coarse = stamps.tz_localize(None).to_numpy().astype("datetime64[s]").astype(np.int64)
-    bad = stamps.notna() & (np.abs(coarse.astype(np.float64)) > _LARGEST_NS / 1e9)
-    _refuse(times, bad, what, places, drop, "Give times from 1678 to 2261")
-    return Times(stamps.where(~bad).as_unit("ns"), bad, "dates", zone)
-
-
-def _from_numbers(times: pd.Series, what: str, drop: bool, unit: str | None, places: Places) -> Times:
-    values = times.to_numpy(np.float64, na_value=np.nan)
-    finite = np.isfinite(values)
-    unit = unit or _infer_unit(values[finite], what)
-    if unit in DAYS:
-        values, unit, form = (values - DAYS[unit]) * 86_400, "s", _DAY_NAMES[unit]
-        times = pd.Series(np.round(values, 3))  # a spreadsheet's eight decimals are a millisecond
-        values = times.to_numpy()
-    else:
-        form = ""
-    factor = UNITS_NS[unit]
-    bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST_NS / factor)
-    _refuse(times, bad, what, places, drop, "Correct them or name another time column")
-    usable = finite & ~bad
-    since = np.full(len(values), pd.NaT.value, np.int64)
-    if pd.api.types.is_integer_dtype(times.dtype):
-        since[usable] = times[usable].to_numpy().astype(np.int64) * factor  # integers keep their precision
-    else:
-        whole = np.floor(values[usable])
-        since[usable] = whole.astype(np.int64) * factor + np.round((values[usable] - whole) * factor).astype(np.int64)
-    is_epoch = bool(usable.any()) and bool(form or np.median(np.abs(values[usable])) * factor >= _YEARS_S[0] * 1e9)
-    if is_epoch:
-        _refuse_lost_digits(values[usable], what)
-    form = form or f"{UNIT_NAMES[unit]} since {'1970' if is_epoch else 'zero'}"
-    stamps = pd.DatetimeIndex(since.view("datetime64[ns]")).tz_localize("UTC")
-    return Times(stamps, bad, form, "UTC" if is_epoch else "none", not is_epoch)
+    def _of_dates_as_text(self, cells: pd.Series, text: pd.Series, missing: np.ndarray, form: str) -> Times:
+        try:
+            dates, zoned = _parse_dates(text, form)
+        except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
+            raise InputError(
+                f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}."
+            ) from None
+        bad = dates.isna().to_numpy() & ~missing
+        then = "Give time_format (--time-format '%d.%m.%Y %H:%M:%S') or name another time column"
+        if bad.any() and re.search(r"\d ?(?:[A-Z]{3,5}|\[.*\])$", str(cells[bad].iloc[0])):
+            then = "Write the zone as an offset such as +01:00"
+        self.refuse(cells, bad, then)
+        parsed = self.of_dates(dates)
+        there = parsed.stamps.notna()
+        is_zoned, bare = bool(zoned[there].any()), np.flatnonzero(there & ~zoned)
+        if is_zoned and len(bare):
+            raise InputError(
+                f"Expected times of which all or none state a zone. Received: {format_cell(cells.iloc[bare[0]])} at {self.places.of(bare[0])} of "
+                f"{self.what}, without one among others with one. Complete them."
+            )
+        name = "ISO 8601 dates" if form == _ISO else f"dates of the form {form}"
+        stamps = parsed.stamps.tz_localize("UTC") if is_zoned else parsed.stamps
+        return Times(stamps, bad | parsed.bad, name, "stated, converted to UTC" if is_zoned else "")
 
 
 def _refuse_lost_digits(values: np.ndarray, what: str) -> None:
@@ -274,51 +284,100 @@ def refuse_days(values: np.ndarray, what: str) -> None:
     )
 
 
-def _from_dates_as_text(
-    cells: pd.Series, text: pd.Series, missing: np.ndarray, what: str, drop: bool, form: str, zone: str | None, places: Places
-) -> Times:
-    findings = []
+def date_forms(text: pd.Series) -> list[str]:
+    """Finds the forms in which a column of dates may be written.
+
+    Args:
+        text: Text without missing cells.
+
+    Returns:
+        Formats as for `datetime.strptime`, or `_ISO`. None of them: the text is no dates. Two: day and month cannot be told apart.
+    """
+    head = _plain(text.iloc[:LOOK])
+    if not len(head):
+        return []
+    if not head.str.fullmatch(r"\d{1,7}").all() and pd.to_datetime(head, format=_ISO, utc=True, errors="coerce").notna().mean() > 0.5:
+        return [_ISO]
+    for cell in head.iloc[:3]:  # the first cells may be damaged
+        if found := _DAY_OF_YEAR.fullmatch(cell):
+            return [f"%Y{found['mark']}%j{_end(found)}"] if found["mark"] or found["time"] else []
+        if found := _DAY_MONTH.fullmatch(cell):
+            return [f"{order.replace('-', found['mark'])}{_end(found)}" for order in _orders(text, found["mark"])]
+        if re.search(r"[A-Za-z]{3}", cell) and (form := guess_datetime_format(cell)) and "%Y" in form and "%d" in form:
+            return [form]
+        if found := re.fullmatch(rf"\d\d?/[A-Z][a-z]{{2}}/\d{{4}}{_END}", cell):  # of web servers
+            return [f"%d/%b/%Y{_end(found)}"]
+        if re.fullmatch(rf"\d{{4}}(?P<mark>[/.])\d\d?(?P=mark)\d\d?{_END}", cell) and (form := guess_datetime_format(cell)):
+            return [form]
+    return []
+
+
+def _orders(text: pd.Series, mark: str) -> list[str]:
+    """Returns the orders of day and month that all dates allow; with points, the day comes first."""
+    days = pd.Series(text.str[:12].unique(), dtype="str")  # far fewer than rows
+    parts = days.str.extract(rf"^\s*(\d\d?)\{mark}(\d\d?)\{mark}").dropna().astype(int)
+    largest = parts.max()
+    orders = [order for order, which in (("%d-%m-%Y", 1), ("%m-%d-%Y", 0)) if largest[which] <= 12]
+    return orders[:1] if mark == "." else orders
+
+
+def _end(found: re.Match) -> str:
+    """Returns the format of the time of day and the zone behind a date."""
+    if not found["time"]:
+        return ""
+    hours = "%I:%M" if found["half"] else "%H:%M"
+    time = hours + (":%S" if found["seconds"] else "") + (".%f" if found["fraction"] else "")
+    half = "" if not found["half"] else found["half"][:-2] + "%p"
+    return found["gap"] + time + half + ("" if not found["zone"] else found["zone"][: found["zone"].startswith(" ")] + "%z")
+
+
+def _plain(text: pd.Series) -> pd.Series:
+    """Rewrites what no parser takes: decimal commas in seconds, and UTC in words."""
+    return text.str.strip().str.replace(r"(:\d\d),(\d)", r"\1.\2", regex=True).str.replace(r" ?(?:UTC|GMT)$", "+00:00", regex=True)
+
+
+def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
+    """Parses dates of one form."""
     try:
-        dates, zoned = parse_dates(text, form)
-        leap = np.zeros(len(text), bool)
-        left = (dates.isna() & text.notna()).to_numpy()
-        leap[left] = text[left].astype(str).str.contains(r":\d\d:60").to_numpy()
-        if leap.any():
-            earlier, zoned[leap] = parse_dates(text[leap].str.replace(r"(:\d\d):60", r"\1:59", regex=True), form)
-            dates = fill_dates(dates, earlier + pd.Timedelta(seconds=1))
-            leap &= dates.notna().to_numpy()
-    except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format
-        raise InputError(f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%y %H:%M:%S'. Received: {form!r}.") from None
-    bad = dates.isna().to_numpy() & ~missing
-    _refuse(cells, bad, what, places, drop, f"Give time_format (--time-format {'%d.%m.%Y %H:%M:%S'!r}) or name another time column")
-    if leap.any():
-        text = f"leap seconds, taken as the following second: {leap.sum():,}"
-        findings.append(Finding("leap seconds", int(leap.sum()), text, tuple(places.of(row) for row in np.flatnonzero(leap)[:3])))
-    parsed = _from_dates(dates, what, drop, places)
-    there = parsed.stamps.notna()
-    stated, stamps = zoned & there, parsed.stamps
-    words = ""
-    if stated.any():
-        words = "stated, converted to UTC"
-        local = there & ~zoned
-        if local.any():
-            taken = zone or "UTC"
-            findings.append(
-                Finding("time zone", int(local.sum()), f"times without a zone among others with one, taken as {taken}: {local.sum():,}")
-            )
-            inside = localize_times(stamps.where(local), taken).tz_convert("UTC")
-            stamps = stamps.tz_localize("UTC").where(stated, inside)
-        else:
-            stamps = stamps.tz_localize("UTC")
-    name = "ISO 8601 dates" if form == ISO else f"dates of the form {form}"
-    return Times(stamps, bad | parsed.bad, name, words, False, tuple(findings))
+        dates = pd.to_datetime(text, format=form, errors="coerce")
+        zoned = np.full(len(dates), isinstance(dates.dtype, pd.DatetimeTZDtype))
+    except ValueError as error:
+        if "ixed" not in str(error):
+            raise
+        dates = pd.to_datetime(text, format=form, utc=True, errors="coerce")  # some state a zone, or another one than others
+        zoned = _has_zone(text, form)
+    if isinstance(dates.dtype, pd.DatetimeTZDtype):
+        dates = dates.dt.tz_convert("UTC").dt.tz_localize(None)
+    left = (dates.isna() & text.notna()).to_numpy()
+    if left.any():
+        rest = _plain(text[left].astype(str))
+        whole = form.replace(".%f", "")
+        for other in dict.fromkeys((form, whole, whole.replace("%S", "%S.%f"))):
+            found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
+            dates = _fill_dates(dates, found)
+        zoned[left] = _has_zone(rest, form)
+    return dates, zoned
+
+
+def _fill_dates(dates: pd.Series, found: pd.Series) -> pd.Series:
+    """Fills missing dates with others. Whole seconds and fractions have different units, of which the finer is taken."""
+    unit = np.promote_types(dates.dtype, found.dtype)
+    return dates.astype(unit).fillna(found.astype(unit))
+
+
+def _has_zone(text: pd.Series, form: str) -> np.ndarray:
+    """Says which cells state a zone: by an offset behind a time of day, or by the format."""
+    if form != _ISO:
+        return np.full(len(text), "%z" in form or "%Z" in form)
+    zone = r"[T ]\d\d(?::?\d\d(?::?\d\d(?:[.,]\d+)?)?)?\s?(?:Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)\s*$"
+    return text.str.contains(zone).fillna(False).to_numpy(bool)
 
 
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """Assigns a time zone to local times.
 
-    Of an hour that a clock repeats in autumn, the order of the rows or their neighbours show which is meant; where they do not, times
-    become NaT. So do local times that do not exist.
+    Of an hour that a clock repeats in autumn, the order of the rows shows which is meant; where it does not, times become NaT. So do
+    local times that do not exist.
 
     Args:
         stamps: Times without a zone.
@@ -332,49 +391,14 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
     """
     try:
         local = stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
-        if not (local.isna() & stamps.notna()).any():
-            return local
-        first, second = (stamps.tz_localize(zone, ambiguous=np.full(len(stamps), is_dst), nonexistent="NaT") for is_dst in (True, False))
     except (KeyError, ValueError, TypeError, OSError):
         raise InputError(f"Expected a time zone such as Europe/Berlin. Received: timezone={zone!r}. Name another.") from None
-    unclear = local.isna() & first.notna()
-    rows = np.flatnonzero(stamps.notna())
-    known = stamps[rows].as_unit("ns").asi8
-    if len(rows) > 1 and np.median(np.sign(np.diff(known))) < 0:
-        rows = rows[::-1]
-    if np.mean(np.diff(stamps[rows].as_unit("ns").asi8) >= 0) < 0.9:
-        return local  # out of order, so that neighbours show nothing
-    starts = np.flatnonzero(np.diff(unclear[rows].astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    utc = [each.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8 for each in (first, second)]
-    is_first, is_second = np.zeros(len(stamps), bool), np.zeros(len(stamps), bool)
-    for begin, end in starts.tolist():
-        split = _end_of_first_hour(rows, begin, end, utc)
-        if split is not None:
-            is_first[rows[begin:split]], is_second[rows[split:end]] = True, True
-    return local.where(~is_first, first).where(~is_second, second)
-
-
-def _end_of_first_hour(rows: np.ndarray, begin: int, end: int, utc: list[np.ndarray]) -> int | None:
-    """Returns where, among consecutive rows of an hour that occurs twice, its second occurrence begins; None if that is unclear.
-
-    Args:
-        rows: All rows with a time, in ascending order of time.
-        begin: First of the rows in question.
-        end: End of the rows in question (exclusive).
-        utc: Times of all rows in nanoseconds, if the first and if the second occurrence is meant.
-    """
-    steps = np.diff(utc[0][rows[begin:end]])
-    back = np.flatnonzero(steps < 0)
-    if len(back) == 1:
-        return begin + int(back[0]) + 1
-    if len(back):
-        return None
-    near = UNITS_NS["h"] / 2
-    if begin > 0 and 0 < utc[0][rows[begin]] - utc[0][rows[begin - 1]] < near:
-        return end
-    if end < len(rows) and 0 < utc[1][rows[end]] - utc[1][rows[end - 1]] < near:
-        return begin
-    return None
+    known = np.flatnonzero(stamps.notna())
+    order = -1 if len(known) > 1 and stamps[known[0]] > stamps[known[-1]] else 1
+    try:
+        return stamps[::order].tz_localize(zone, ambiguous="infer", nonexistent="NaT")[::order]
+    except ValueError:  # the order does not show it everywhere
+        return local
 
 
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:

@@ -1,29 +1,37 @@
 """Reads the channels of a table, each with its times and with findings that say what was decided."""
 
+import dataclasses
+import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.size_limits import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.reading.clock import NO_TIME
 from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
 from enhsim_tf.telemetry.reading.files import read_table
-from enhsim_tf.telemetry.reading.series import keys_of, name_series
 from enhsim_tf.telemetry.reading.table import Table
 
 _SAID = {
     "row numbers": "columns that number the rows, not taken as channels",
     "quality flags": "columns of quality flags, not taken as channels; name them with columns (--column) if they are telemetry",
-    "further clocks": "columns that show the time once more, not taken as channels",
+    "further clocks": "further columns of times, not taken as channels",
     "own columns": "columns that this tool wrote beside the values, not taken as channels",
     "columns left out": "columns without numbers",
 }
+_KEYS = set(
+    "host hostname sensor sensorid device deviceid node tag tagname channel channelname parameter param signal variable metric field series "
+    "measurement point pointname station machine asset entity source location site name id copy table result item object".split()
+)
+_FIRST = ("_field", "field", "series", "metric", "parameter", "signal", "variable", "sensor", "channel", "tag")
+_MAX_SERIES = 500  # values of a column that tells series apart unasked
+_OFTEN = 0.3  # share of the rows whose time repeats, above which a table may hold several series
 
 
 def read_table_channels(
@@ -32,23 +40,29 @@ def read_table_channels(
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
     what = _name_of(source)
     table = _without_repeats(read_table(source, options), columns, time, options, what)
-    named = _wanted(table, columns)
+    lists = next((name for name, cells in table.frame.items() if isinstance(next(iter(cells), None), list | np.ndarray)), None)
+    if lists is not None:
+        raise InputError(
+            f"Expected one value in each cell. Received: lists in {lists!r} of {what}, as in files of windows. Give a series (generate --continuous)."
+        )
+    named = list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None  # others are names of series
     layout = lay_out(table, named, time, options, what)
-    keys = [key for key in keys_of(table.frame, layout, options, what) if key not in (named or ())]
-    _check_names(table, [] if keys else columns, what, layout)
+    keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
     findings = [*table.findings, *_findings_of(layout, keys)]
     if not keys:
+        _refuse_parallel_files(table.places, layout, what)
         chosen = {name: (name, None) for name in layout.channels}
     else:
         values = options.value_column or [name for name in layout.channels if name not in keys]
-        chosen = name_series(table.frame, keys, list(values), what)
+        chosen = _name_series(table.frame, keys, list(values), what)
         said = ", ".join(list(chosen)[:6])
         findings.append(Finding("series", len(chosen), f"series told apart by {', '.join(keys)}: {len(chosen):,} ({said})"))
-        if columns is not None and named is None:
-            missing = next((name for name in columns if name not in chosen), None)
-            if missing is not None:
-                raise InputError(f"Expected series of {what}: {said}. Received: {missing!r}. Name one of these.")
-            chosen = {name: chosen[name] for name in columns}
+    if columns is not None and named is None:
+        unknown = next((name for name in columns if name not in chosen), None)
+        if unknown is not None:
+            known = ", ".join(list(chosen)[:8]) or ", ".join(table.frame.columns[:8])
+            raise InputError(f"Expected a channel of {what}: {known}. Received: {unknown!r}. Name one of these.")
+        chosen = {name: chosen[name] for name in columns}
     if not chosen:
         left = "; left out: " + ", ".join(_with_cell(table, name) for names in layout.left_out.values() for name in names)
         left = left if layout.left_out else ""
@@ -65,15 +79,26 @@ def _name_of(source: Path | Sequence[Path] | pd.DataFrame | pd.Series) -> str:
     return "the table" if isinstance(source, pd.DataFrame | pd.Series) else f"{source[0].name} ..."
 
 
+def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
+    """Refuses files over the same times, which are no parts of one series."""
+    if len({name for _, _, name in places}) < 2 or layout.times is None:
+        return
+    stamps = np.split(layout.times.stamps.tz_localize(None), [row for row, _, _ in places[1:]])
+    spans = sorted(
+        (part.min(), part.max(), place[2]) for part, place in zip(map(pd.DatetimeIndex, stamps), places, strict=True) if part.notna().any()
+    )
+    for (begin, end, first), (other, last, second) in zip(spans, spans[1:], strict=False):
+        shorter = min(end - begin, last - other)
+        if min(end, last) - other > shorter / 2:
+            raise InputError(
+                f"Expected files whose times follow each other. Received: {first} and {second} over the same times, in {what}. Give them one by one."
+            )
+
+
 def _with_cell(table: Table, name: str) -> str:
     """Returns the name of a column with its first cell."""
     cells = table.frame[name].dropna()
     return f"{name} ({format_cell(cells.iloc[0])})" if len(cells) else name
-
-
-def _wanted(table: Table, columns: Sequence[str] | None) -> list[str] | None:
-    """Returns the columns of the table among those that were asked for, or None if these are names of series."""
-    return list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None
 
 
 def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Table:
@@ -94,14 +119,7 @@ def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | No
             )
     if columns is None and repeated:
         raise InputError(f"Expected columns of different names. Received: {min(repeated)!r} more than once in {what}. Rename them.")
-    return Table(table.frame.loc[:, ~names.isin(repeated)], table.places, table.decimal, table.findings) if repeated else table
-
-
-def _check_names(table: Table, columns: Sequence[str] | None, what: str, layout: Layout) -> None:
-    for name in columns or ():
-        if name not in table.frame.columns:
-            known = ", ".join((layout.channels or tuple(table.frame.columns))[:8])
-            raise InputError(f"Expected a column of {what}: {known}. Received: {name!r}. Name one of these.")
+    return dataclasses.replace(table, frame=table.frame.loc[:, ~names.isin(repeated)]) if repeated else table
 
 
 def _findings_of(layout: Layout, keys: Sequence[str]) -> list[Finding]:
@@ -125,10 +143,12 @@ def _channel(
     else:
         index = layout.times.stamps[take].rename(layout.clock.columns[0])
     series = pd.Series(cells.array, index=index, name=name, copy=False)
-    findings = [*findings, *_bad_times(layout, places)]
-    for label in layout.labels:
-        if not _concerns(label, column, layout):
-            continue
+    findings = list(findings)
+    bad = np.empty(0, np.int64) if layout.times is None else np.flatnonzero(layout.times.bad)
+    if len(bad):
+        where = tuple(places.of(row) for row in bad[:3])
+        findings.append(Finding("bad times", len(bad), f"times that cannot be read, taken as missing: {len(bad):,}", where))
+    for label in (label for label in layout.labels if _concerns(label, column, layout)):
         mask = anomalous(frame[label].iloc[take])
         if mask is None:
             said = ", ".join(map(str, frame[label].dropna().unique()[:4]))
@@ -151,19 +171,124 @@ def _channel(
     return series
 
 
-def _bad_times(layout: Layout, places: Places) -> list[Finding]:
-    """Findings of the times, which concern every channel."""
-    if layout.times is None:
-        return []
-    bad: Any = layout.times.bad
-    findings = list(layout.times.findings)
-    if bad.any():
-        rows = tuple(places.of(row) for row in np.flatnonzero(bad)[:3])
-        findings.append(Finding("bad times", int(bad.sum()), f"times that cannot be read, taken as missing: {int(bad.sum()):,}", rows))
-    return findings
-
-
 def _concerns(label: str, column: str, layout: Layout) -> bool:
     """Whether a label concerns a channel: one that ends with the name of a channel concerns that channel alone."""
     owner = [name for name in layout.channels if label != name and label.endswith(name) and len(name) > 1]
     return not owner or max(owner, key=len) == column
+
+
+def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) -> list[str]:
+    """Returns the columns whose values tell several series apart; none if the table holds one."""
+    if options.series_column is not None:
+        return [] if options.series_column == (NO_TIME,) else list(options.series_column)
+    own = [
+        name
+        for name in ("copy", "table")
+        if name in frame.columns and (name in layout.channels or name in layout.left_out.get("row numbers", ()))
+    ]
+    candidates = [name for name in (*layout.words, *own) if 1 < frame[name].nunique(dropna=False) <= _MAX_SERIES]
+    candidates.sort(key=lambda name: next((rank for rank, word in enumerate(_FIRST) if word == name.casefold()), len(_FIRST)))
+    candidates.sort(key=lambda name: name in own)
+    times = None if layout.times is None else layout.times.stamps.tz_localize(None).as_unit("ns").asi8
+    chosen: list[str] = []
+    for name in candidates:
+        if _is_key(frame, name, chosen, times, what if layout.channels else None):
+            chosen.append(name)
+    if not chosen and "_field" in frame and "_value" in layout.channels:
+        return ["_field"]
+    if not chosen and times is not None:
+        _refuse_numbered(frame, layout, times, what)
+    return chosen
+
+
+def _is_key(frame: pd.DataFrame, name: str, chosen: Sequence[str], times: np.ndarray | None, what: str | None) -> bool:
+    """Whether a column tells more series apart than the columns that were chosen before it; `what` describes the source if it may ask."""
+    before = _codes(frame, chosen)
+    codes = _codes(frame, [*chosen, name])
+    if codes.max() == before.max():
+        return False
+    if times is None:
+        return _is_named(name) and np.bincount(codes).min() > 1
+    repeats = [_repeating(times, each) for each in (before, codes)]
+    if repeats[0] > _OFTEN and repeats[1] < repeats[0] / 2:
+        return True
+    if chosen:
+        return False
+    if _is_named(name) and name != "result" and np.bincount(codes).min() > 2:
+        return True
+    known = times != pd.NaT.value
+    changes = np.diff(codes[known]) != 0
+    back = (np.diff(times[known]) < 0) & changes
+    number = codes.max() + 1
+    stacked = number > 1 and back.sum() >= (number - 1) / 2 and changes.sum() < 2 * number and _overlap(times[known], codes[known])
+    is_word = not frame[name].dropna().astype("str").str.match(r"\s*[+-]?\d").any()
+    if what is not None and is_word and not stacked and changes.mean() > 0.5 and _overlap(times[known], codes[known]):
+        raise InputError(
+            f"Expected one series, or to know what tells several apart. Received: words that change from row to row in {name!r} of {what}. Give "
+            f"series_column (--series-column {name}, or --series-column none if all rows are of one series)."
+        )
+    return bool(stacked)
+
+
+def _is_named(name: str) -> bool:
+    words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    return bool(words) and (words[-1] in _KEYS or "".join(words) in _KEYS) and words[0] in _KEYS
+
+
+def _codes(frame: pd.DataFrame, columns: Sequence[str]) -> np.ndarray:
+    """Numbers the combinations of values of columns."""
+    if not columns:
+        return np.zeros(len(frame), np.int64)
+    return frame.groupby(list(columns), sort=False, dropna=False).ngroup().to_numpy()
+
+
+def _repeating(times: np.ndarray, codes: np.ndarray) -> float:
+    """Share of the rows whose time occurred before in the same series."""
+    known = times != pd.NaT.value
+    if not codes.any() and (np.diff(times[known]) > 0).all():
+        return 0.0
+    return float(pd.DataFrame({"time": times[known], "code": codes[known]}).duplicated().mean()) if known.any() else 0.0
+
+
+def _overlap(times: np.ndarray, codes: np.ndarray) -> bool:
+    """Whether every series covers at least half of the whole time."""
+    spans = pd.Series(times).groupby(codes).agg(["min", "max"])
+    return bool(((spans["max"] - spans["min"]) >= 0.5 * np.ptp(times)).all())
+
+
+def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, what: str) -> None:
+    """Refuses a table in which numbers, such as those of sensors, tell series apart, because a channel may look alike."""
+    if _repeating(times, _codes(frame, [])) <= _OFTEN:
+        return
+    for name, cells in frame.items():
+        is_number = pd.api.types.is_integer_dtype(cells.dtype) and name not in layout.clock.columns and layout.channels != (name,)
+        if is_number and 1 < cells.nunique() <= _MAX_SERIES:
+            if _repeating(times, _codes(frame, [name])) < 0.02:
+                raise InputError(
+                    f"Expected one row for each time. Received: times that repeat, with different values of {name!r}, in {what}. Give "
+                    f"series_column (--series-column {name}) if it tells several series apart."
+                )
+
+
+def _name_series(frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[str], what: str) -> dict[str, tuple[str, np.ndarray]]:
+    """Returns the column and the rows of each series by its name: the values of the keys, and the column if there are several."""
+    codes = _codes(frame, keys)
+    if (codes.max(initial=-1) + 1) * len(channels) > MAX_COLUMNS:
+        raise InputError(
+            f"Expected at most {MAX_COLUMNS:,} series. Received: {codes.max() + 1:,} values of {', '.join(keys)} in {what}. Give another series_column."
+        )
+    order = np.argsort(codes, kind="stable")
+    rows = np.split(order, np.flatnonzero(np.diff(codes[order])) + 1)
+    found = {}
+    for inside in rows:
+        words = [
+            f"{key} {frame[key].iloc[inside[0]]}" if key in ("copy", "table") else str(frame[key].iloc[inside[0]]).strip() for key in keys
+        ]
+        for channel in channels:
+            name = ".".join([*words, channel] if len(channels) > 1 else words)
+            if name in found:
+                raise InputError(
+                    f"Expected series of different names. Received: {name!r} twice in {what}. Rename one of {', '.join(keys)}."
+                )
+            found[name] = (channel, inside)
+    return found

@@ -11,23 +11,23 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import UNITS_NS, are_days, refuse_days
+from enhsim_tf.telemetry.cleaning.times import UNITS_NS, Times, are_days, refuse_days
 
 NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIMES = set(
-    "time times timestamp timestamps datetime date dates epoch elapsed simtime unix unixtime utc utcg ts clock mjd jd datenum uptime "
+    "time times timestamp timestamps datetime date dates epoch elapsed simtime tout unix unixtime utc utcg ts clock mjd jd datenum uptime "
     "seconds secs millis milliseconds microseconds nanoseconds minutes hours days zeit zeitstempel zeitpunkt datum uhrzeit sekunden "
-    "temps heure horodatage secondes tiempo fecha hora segundos tempo tijd tijdstip".split()
+    "temps heure horodatage tiempo fecha hora tempo tijd".split()
 )
 _BESIDE = set(
     "since start of run the from local gmt cet sim simulation simulated mission rel relative abs absolute system sample sampling event log logger "
-    "record recorded created at in begin experiment test server gps day julian modified excel serial number _".split()
+    "record recorded received created at in begin experiment test server gps day julian modified excel serial number".split()
 )
 _UNITS = {
-    "D": "d day days tage jours dias",
-    "h": "h hr hrs hour hours stunden heures horas",
+    "D": "d day days tage",
+    "h": "h hr hrs hour hours stunden",
     "min": "min mins minute minutes minuten",
-    "s": "s sec secs second seconds sekunden secondes segundos",
+    "s": "s sec secs second seconds sekunden",
     "ms": "ms msec millis millisecond milliseconds",
     "us": "us \u00b5s \u03bcs usec micros microsecond microseconds",
     "ns": "ns nsec nanos nanosecond nanoseconds",
@@ -41,8 +41,8 @@ _PARTS = {
     "day": "day dy dom dd tag",
     "doy": "doy dayofyear jday ddd",
     "hour": "hour hr hh stunde",
-    "minute": "minute min mn minuten",
-    "second": "second sec ss sekunde",
+    "minute": "minute min mn",
+    "second": "second sec ss sekunde sod secondofday",
 }
 _PART_OF = {word: part for part, words in _PARTS.items() for word in words.split()}
 
@@ -55,21 +55,15 @@ class Clock:
         columns: Columns that make it up; none if samples are counted.
         cells: Their content, one cell per row, to be parsed as times.
         form: The unit or kind that the name tells, as for `Cleaning.time_format`, or None.
-        others: Further columns of numbers that are named like clocks.
     """
 
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
     form: str | None = None
-    others: tuple[str, ...] = ()
 
 
-def name_tells(name: str) -> tuple[int, str | None]:
-    """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit or kind of days that it states.
-
-    Args:
-        name: Name of a column.
-    """
+def _name_tells(name: str) -> tuple[int, str | None]:
+    """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit or kind of days that it states."""
     if name.casefold().strip() == "x_value":  # of LabVIEW
         return 2, None
     words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name))
@@ -85,22 +79,14 @@ def name_tells(name: str) -> tuple[int, str | None]:
     return (2, unit) if is_known and any(word in _TIMES for word in lower) else (0, None)
 
 
-def is_increasing(values: np.ndarray) -> bool:
-    """Whether numbers increase nearly throughout; some may repeat, and a few may come late.
-
-    Args:
-        values: Numbers, NaN where missing.
-    """
+def _is_increasing(values: np.ndarray) -> bool:
+    """Whether numbers increase nearly throughout; some may repeat, and a few may come late."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps)) and bool(np.mean(steps >= 0) >= 0.9 and np.mean(steps > 0) >= 0.3)
 
 
-def is_regular(values: np.ndarray) -> bool:
-    """Whether numbers increase nearly throughout, nearly always by one step or a multiple of it.
-
-    Args:
-        values: Numbers, NaN where missing.
-    """
+def _is_regular(values: np.ndarray) -> bool:
+    """Whether numbers increase nearly throughout, nearly always by one step or a multiple of it."""
     steps = np.diff(values[np.isfinite(values)])
     if len(steps) < _FEWEST or np.mean(steps > 0) < 0.95:
         return False
@@ -108,38 +94,21 @@ def is_regular(values: np.ndarray) -> bool:
     return bool(np.mean((np.abs(ratios - np.round(ratios)) <= 0.1) & (ratios > 0.5)) >= 0.9)
 
 
-def may_be_clock(name: str) -> bool:
-    """Whether a name may be that of a clock beside another: it speaks of time, or is a unit of time alone.
-
-    Args:
-        name: Name of a column.
-    """
-    words = re.findall(r"[^\W\d_]+", name.casefold())
-    return name_tells(name)[0] > 0 or bool(words) and all(word in _UNIT_OF or word in _BESIDE for word in words)
-
-
-def is_epoch(values: np.ndarray) -> bool:
-    """Whether numbers are times since 1970 in s, ms, us or ns, from the years 1979 to 2103.
-
-    Args:
-        values: Numbers, NaN where missing.
-    """
+def _is_epoch(values: np.ndarray) -> bool:
+    """Whether numbers are times since 1970 in s, ms, us or ns, from the years 1979 to 2103."""
     some = values[:: max(1, len(values) // 1_000)]
     size = float(np.median(np.abs(some[np.isfinite(some)]))) if np.isfinite(some).any() else 0.0
     return any(3.1e8 * 1e9 <= size * factor <= 4.2e9 * 1e9 for factor in (10**9, 10**6, 10**3, 1)) and size > 3e8
 
 
-def find_clock(
-    frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str, stated: str | None = None
-) -> Clock:
+def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str) -> Clock:
     """Finds the clock of a table.
 
     Args:
         frame: The table.
-        kinds: Kind of each column, see `columns.kind_of`.
+        kinds: Kind of each column, such as "numbers", "dates", "words".
         numbers: Values of the columns of numbers that are not asked for as channels.
         what: Description of the source, for messages.
-        stated: `Cleaning.time_format`.
 
     Returns:
         The clock.
@@ -147,88 +116,132 @@ def find_clock(
     Raises:
         InputError: If several columns may be the clock, or one of which only the values speak for it.
     """
-    tells = {name: name_tells(name) for name in kinds}
-    clocks = [
-        name for name in numbers if tells[name][0] and (is_increasing(numbers[name]) or tells[name][0] == 2 and is_epoch(numbers[name]))
-    ]
-    parts = _date_parts(frame, numbers)
+    tells = {name: _name_tells(name)[0] for name in kinds}
     dates = _varying([name for name, kind in kinds.items() if kind == "dates"], frame)
-    joined = _joined(frame, kinds, dates)
-    named = [name for name in numbers if tells[name][0] == 2]
-    if joined is not None:
-        return dataclasses.replace(joined, others=tuple(named))
-    if dates:
-        named_dates = [name for name in dates if tells[name][0]] or dates
-        if len(named_dates) > 1:
-            raise InputError(
-                f"Expected one time column. Received: {', '.join(named_dates[:4])} in {what}. Name it (--time NAME), or {NO_TIME!r} to count samples."
-            )
-        return Clock((named_dates[0],), frame[named_dates[0]], None, tuple(named))
+    hours = [name for name, kind in kinds.items() if kind == "times of day"]
     spans = [name for name, kind in kinds.items() if kind == "spans"]
+    named = [name for name in numbers if tells[name] == 2]
+    compact = [name for name in named if _are_compact_dates(numbers[name])]
+    if (joined := _joined(frame, hours, dates or compact, numbers)) is not None:
+        return joined
+    if dates:
+        return _one_of([name for name in dates if tells[name]] or dates, frame, what)
     if spans:
-        return Clock((spans[0],), frame[spans[0]], None, tuple(named))
-    if parts is not None:
-        return dataclasses.replace(parts, others=tuple(name for name in named if name not in parts.columns))
-    if clocks:
-        best = max(tells[name][0] for name in clocks)
-        clocks = [name for name in clocks if tells[name][0] == best]
-        other = next((name for name in clocks[1:] if not is_same_clock(numbers[clocks[0]], numbers[name])), None)
-        if other is not None:
-            raise InputError(
-                f"Expected one time column. Received: {clocks[0]}, {other} in {what}. Name it (--time NAME), or {NO_TIME!r} to count samples."
-            )
-        return named_clock(frame, clocks[0], what, stated, tuple(name for name in named if name != clocks[0]))
-    unread = next((name for name, kind in kinds.items() if tells[name][0] == 2 and kind in ("words", "times of day")), None)
-    if unread is not None and kinds[unread] == "times of day":
+        return Clock((spans[0],), frame[spans[0]])
+    if (parts := _date_parts(frame, numbers)) is not None:
+        return parts
+    best = max((tells[name] for name in numbers if _may_be_clock(tells[name], numbers[name])), default=0)
+    clocks = [name for name in numbers if best and tells[name] == best and _may_be_clock(best, numbers[name])]
+    clocks = [name for name in clocks if name == clocks[0] or not _is_same_clock(numbers[clocks[0]], numbers[name])]
+    if clocks and compact and clocks != compact[:1]:
         raise InputError(
-            f"Expected times with a date. Received: {str(frame[unread].dropna().iloc[0])!r} in {unread!r} of {what}. Add a column of dates, or give "
-            "time 'none' (--time none) to count the samples."
+            f"Expected a date and its time of day in one column. Received: {compact[0]!r} ({numbers[compact[0]][0]:.0f}) and {clocks[0]!r} in {what}. "
+            "Write both in one column, such as 2024-03-01T12:00:00."
         )
-    if unread is not None:
-        return Clock((unread,), frame[unread])  # to be refused with its first cell
+    if clocks:
+        return _one_of(clocks, frame, what)
+    for name in (name for name, kind in kinds.items() if tells[name] == 2 and kind in ("words", "times of day")):
+        if name in hours:
+            raise InputError(
+                f"Expected times with a date. Received: {str(frame[name].dropna().iloc[0])!r} in {name!r} of {what}. Add a column of dates, or give "
+                "time 'none' (--time none) to count the samples."
+            )
+        return Clock((name,), frame[name])  # to be refused with its first cell
     if named:
         raise InputError(
             f"Expected a clock that increases. Received: {named[0]!r} of {what}, which is named like one and goes back. Give time (--time "
             f"{_quoted(named[0])}) to sort by it, or --time none to count the samples."
         )
-    ramps = [name for name, values in numbers.items() if is_regular(values)]
-    if ramps and sum(kind == "numbers" for kind in kinds.values()) > 1:
-        raise InputError(
-            f"Expected to know the clock. Received: {ramps[0]!r} of {what}, which increases in equal steps of {_step(numbers[ramps[0]]):g}, as a clock "
-            f"or a counter does. Give --time {_quoted(ramps[0])} (with --time-format ms or another unit if it does not count seconds), or --time none."
-        )
+    _refuse_unknown(frame, kinds, numbers, what)
     return Clock()
 
 
-def named_clock(frame: pd.DataFrame, name: str, what: str, stated: str | None, others: tuple[str, ...] = ()) -> Clock:
-    """Returns the clock of a given column, with the unit that its name tells.
+def _may_be_clock(tells: int, values: np.ndarray) -> bool:
+    return tells > 0 and (_is_increasing(values) or tells == 2 and (_is_epoch(values) or _is_regular(values[::-1])))
+
+
+def _one_of(names: list[str], frame: pd.DataFrame, what: str) -> Clock:
+    if len(names) > 1:
+        raise InputError(
+            f"Expected one time column. Received: {', '.join(names[:4])} in {what}. Name it (--time NAME), or {NO_TIME!r} to count samples."
+        )
+    return Clock((names[0],), frame[names[0]])
+
+
+def _refuse_unknown(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str) -> None:
+    """Refuses a column that may be a clock of which neither name nor form is known."""
+    ramp = next((name for name, values in numbers.items() if _is_regular(values)), None)
+    if ramp is not None and sum(kind == "numbers" for kind in kinds.values()) > 1:
+        step = float(np.median(np.diff(numbers[ramp][np.isfinite(numbers[ramp])])))
+        raise InputError(
+            f"Expected to know the clock. Received: {ramp!r} of {what}, which increases in equal steps of {step:g}, as a clock "
+            f"or a counter does. Give --time {_quoted(ramp)} (with --time-format ms or another unit if it does not count seconds), or --time none."
+        )
+    for name in (name for name, kind in kinds.items() if kind == "words"):
+        cells = frame[name].dropna().astype("str")
+        if (
+            len(cells) >= _FEWEST
+            and cells.iloc[:1_000].nunique() == len(cells.iloc[:1_000])
+            and cells.iloc[:_FEWEST].str.contains(r"\d").all()
+        ):
+            raise InputError(
+                f"Expected to know the clock. Received: {cells.iloc[0][:40]!r} in {name!r} of {what}, which may be a time of an unknown form. Give "
+                f"--time {_quoted(name)} with --time-format, or --time none."
+            )
+
+
+def named_clock(clock: Clock, what: str, stated: str | None, units: Mapping[str, str]) -> Clock:
+    """Returns a clock of one column of numbers with its unit: the stated one, that of its name, or that of a line of units.
 
     Args:
-        frame: The table.
-        name: Name of the column.
+        clock: The clock.
         what: Description of the source, for messages.
-        stated: `Cleaning.time_format`, which goes before the name.
-        others: Further columns that are named like clocks.
+        stated: `Cleaning.time_format`.
+        units: Units of the columns.
 
     Raises:
         InputError: If the column holds days whose kind is not known.
     """
-    cells, form = frame[name], stated or (name_tells(name)[1] if name_tells(name)[0] else None)
-    if form is None and pd.api.types.is_numeric_dtype(cells.dtype) and re.search(r"dat(?:e|um)", name.casefold()):
-        values = cells.to_numpy(np.float64, na_value=np.nan)
+    if len(clock.columns) != 1 or stated is not None:
+        return dataclasses.replace(clock, form=stated)
+    name = clock.columns[0]
+    form = _name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
+    if form is None and pd.api.types.is_numeric_dtype(clock.cells.dtype) and re.search(r"dat(?:e|um)", name.casefold()):
+        values = clock.cells.to_numpy(np.float64, na_value=np.nan)
         values = values[np.isfinite(values)]
         if are_days(values, even_whole=True):
             refuse_days(values, f"{name!r} of {what}")
-    return Clock((name,), cells, form, others)
+    return dataclasses.replace(clock, form=form)
 
 
-def is_same_clock(first: np.ndarray, second: np.ndarray) -> bool:
-    """Whether two columns show the same time, perhaps from another zero and in another unit.
+def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]) -> set[str]:
+    """Returns the columns that show the time once more, or show it although samples are counted.
 
     Args:
-        first: Numbers, NaN where missing.
-        second: The same.
+        clock: The clock.
+        times: Its times.
+        numbers: Values of the columns of numbers.
+        kinds: Kind of each column.
     """
+    found = {name for name in numbers if _name_tells(name)[0] == 2} | {name for name, kind in kinds.items() if kind == "dates"}
+    if times is None:
+        parts = _date_parts(pd.DataFrame(numbers), numbers)
+        return (
+            found
+            | {name for name, values in numbers.items() if _may_be_clock(_name_tells(name)[0], values)}
+            | {*(parts.columns if parts else ())}
+        )
+    own = np.where(times.stamps.isna(), np.nan, times.stamps.tz_localize(None).as_unit("ns").asi8.astype(np.float64))
+    for name, values in numbers.items():
+        words = re.findall(r"[^\W\d_]+", name.casefold())
+        is_named = _name_tells(name)[0] > 0 or bool(words) and all(word in _UNIT_OF or word in _BESIDE for word in words)
+        if name not in clock.columns and (is_named or _is_epoch(values)) and _is_same_clock(own, values):
+            found.add(name)
+    return found
+
+
+def _is_same_clock(first: np.ndarray, second: np.ndarray) -> bool:
+    """Whether two columns show the same time, perhaps from another zero and in another unit."""
     both = np.isfinite(first) & np.isfinite(second)
     first, second = first[both], second[both]
     if len(first) < 3 or np.ptp(first) == 0 or np.ptp(second) == 0:
@@ -248,15 +261,24 @@ def _varying(names: list[str], frame: pd.DataFrame) -> list[str]:
     return varying or names[:1]
 
 
-def _joined(frame: pd.DataFrame, kinds: Mapping[str, str], dates: list[str]) -> Clock | None:
-    """Returns the clock that a column of dates and one of times of day make together, or None."""
-    days = [name for name, kind in kinds.items() if kind == "dates" and _has_no_time(frame[name])]
-    hours = [name for name, kind in kinds.items() if kind == "times of day"]
-    if len(days) != 1 or len(hours) != 1 or any(name not in days for name in dates):
+def _are_compact_dates(values: np.ndarray) -> bool:
+    """Whether numbers are dates such as 20240301."""
+    if not len(values) or not ((values > 1.9e7) & (values < 2.2e7) & (values % 1 == 0)).all():
+        return False
+    return bool(pd.to_datetime(pd.Series(np.unique(values)).astype(np.int64).astype(str), format="%Y%m%d", errors="coerce").notna().all())
+
+
+def _joined(frame: pd.DataFrame, hours: list[str], dates: list[str], numbers: Mapping[str, np.ndarray]) -> Clock | None:
+    """Returns the clock that a column of dates, one of times of day, and perhaps one of milliseconds make together, or None."""
+    if len(dates) != 1 or len(hours) != 1 or not _has_no_time(frame[dates[0]]):
         return None
-    cells = frame[days[0]]
+    cells = frame[dates[0]]
     day = cells.dt.strftime("%Y-%m-%d") if pd.api.types.is_datetime64_any_dtype(cells.dtype) else cells.astype("str").str.strip()
-    return Clock((days[0], hours[0]), day + " " + frame[hours[0]].astype("str").str.strip())
+    joined, columns = day + " " + frame[hours[0]].astype("str").str.strip(), (dates[0], hours[0])
+    for name, values in numbers.items():
+        if _UNIT_OF.get(name.casefold()) == "ms" and ((values >= 0) & (values < 1_000) & (values % 1 == 0)).all():
+            return Clock((*columns, name), joined + "." + pd.Series(values).map("{:03.0f}".format))
+    return Clock(columns, joined)
 
 
 def _has_no_time(cells: pd.Series) -> bool:
@@ -273,30 +295,20 @@ def _date_parts(frame: pd.DataFrame, numbers: Mapping[str, np.ndarray]) -> Clock
     found = {}
     for name in numbers:
         part = _PART_OF.get(re.sub(r"[^a-z]", "", name.casefold()))
-        if part is not None and part not in found:
-            found[part] = name
-    has_day = "doy" in found or {"month", "day"} <= set(found)
-    if "year" not in found or not has_day:
+        if part is not None:
+            found.setdefault(part, name)
+    if "year" not in found or not {"doy", "month"} & set(found):
         return None
     values = {part: pd.Series(numbers[name]) for part, name in found.items()}
-    years = values["year"].dropna()
+    years, first = values["year"].dropna(), pd.Series(1.0, index=frame.index)
     if not len(years) or (years % 1 != 0).any() or not years.between(1900, 2200).all():
         return None
-    unknown = pd.Series(1.0, index=frame.index)
-    days = {"month": unknown, "day": unknown} if "doy" in found else {part: values[part] for part in ("month", "day")}
+    days = {part: first if "doy" in found else values.get(part, first) for part in ("month", "day")}
     stamps = pd.to_datetime({"year": values["year"]} | days, errors="coerce").astype("datetime64[ns]")
-    if "doy" in found:
-        stamps += pd.to_timedelta(values["doy"] - 1, unit="D")
-    for part, unit in (("hour", "h"), ("minute", "min"), ("second", "s")):
+    for part, unit in (("doy", "D"), ("hour", "h"), ("minute", "min"), ("second", "s")):
         if part in found:
-            stamps += pd.to_timedelta(values[part], unit=unit)
-    used = [found[part] for part in _PARTS if part in found and not ("doy" in found and part in ("month", "day"))]
-    others = tuple(found[part] for part in ("month", "day") if "doy" in found and part in found)
-    return Clock(tuple(used), stamps.dt.round("ms"), None, others)
-
-
-def _step(values: np.ndarray) -> float:
-    return float(np.median(np.diff(values[np.isfinite(values)])))
+            stamps += pd.to_timedelta(values[part] - (part == "doy"), unit=unit)
+    return Clock(tuple(found[part] for part in _PARTS if part in found), stamps.dt.round("ms"))
 
 
 def _quoted(name: str) -> str:

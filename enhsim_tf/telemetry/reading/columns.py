@@ -3,21 +3,19 @@
 import dataclasses
 import datetime
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.dates import LOOK, date_forms
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.cleaning.times import DURATION, Times, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, is_epoch, is_same_clock, may_be_clock, named_clock
+from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, named_clock
 from enhsim_tf.telemetry.reading.table import Table
 
 _LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
-_FLAGS = set("quality qc qa flag flags valid validity".split())
+_FLAGS = set("quality qc qa flag flags valid validity mask".split())
 _ROWS = set("index idx row rows rownumber record recordnumber id no nr sample samples number".split())
 _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inlier".split())
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
@@ -68,68 +66,58 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
         InputError: If the clock cannot be told.
     """
     frame, asked = table.frame, {*(columns or ()), *(options.value_column or ())}
-    kinds = {name: kind_of(frame[name]) for name in frame.columns}
+    kinds = {name: _kind_of(frame[name]) for name in frame.columns}
     if "%" in (options.time_format or ""):
         kinds |= {name: "dates" for name in frame.columns if name not in asked and _fits(frame[name], str(options.time_format))}
     numbers = {name: _values(frame[name], table.decimal) for name, kind in kinds.items() if kind == "numbers"}
-    labels = _labels_of(frame, kinds, numbers, asked, options)
-    left_out: dict[str, list[str]] = {"labels": list(labels)}
-    free = [name for name in frame.columns if name not in asked and name not in labels and name not in (options.series_column or ())]
-    own = _own_columns(frame)
-    left_out["own columns"] = [name for name in free if name in own]
-    left_out["quality flags"] = [
-        name for name in free if _words_of(name) & _FLAGS and name not in own and _has_states(frame[name], kinds[name])
-    ]
-    left_out["row numbers"] = [name for name in free if name in numbers and _numbers_rows(name, numbers[name])]
-    if {"result", "table", "_time"} <= set(frame.columns):  # of InfluxDB
-        left_out["row numbers"] += [name for name in ("table",) if name in free and name in numbers]
-    gone = {name for names in left_out.values() for name in names}
+    roles = dict.fromkeys(asked, "")  # of each column; that of a channel is ""
+
+    def take(role: str, names: Iterable[str]) -> None:
+        roles.update({name: role for name in names if name not in roles})
+
+    take("labels", _labels_of(frame, kinds, asked, options))
+    take("series", options.series_column or ())
+    take("own columns", _own_columns(frame))
+    take("quality flags", [name for name, kind in kinds.items() if _words_of(name) & _FLAGS and _has_states(frame[name], kind)])
+    is_influx = {"result", "table", "_time"} <= set(kinds)
+    take("row numbers", [name for name in numbers if _numbers_rows(name, numbers[name]) or is_influx and name == "table"])
     if time is None:
-        candidates = {name: values for name, values in numbers.items() if name not in asked and name not in gone}
-        clock = find_clock(frame, {name: kind for name, kind in kinds.items() if name not in gone}, candidates, what, options.time_format)
+        free = {name: kind for name, kind in kinds.items() if not roles.get(name)}
+        clock = find_clock(frame, free, {name: values for name, values in numbers.items() if name not in roles}, what)
     else:
-        clock = Clock() if time == NO_TIME else named_clock(frame, time, what, options.time_format)
+        clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
+    clock = named_clock(clock, what, options.time_format, table.units)
     times = _times_of(clock, table, options, what)
-    gone |= set(clock.columns)
-    clocks = _further_clocks(clock, times, numbers, what)
-    further = [name for name in free if name not in gone and name in clocks]
-    rest = [name for name in numbers if name not in gone and name not in further]
-    counted = [name for name in rest if name in free and clock.columns and _counts(numbers[name])]
-    counted = counted if len(counted) < len(rest) else []  # the only column counts: it is the channel
-    left_out["further clocks"], left_out["row numbers"] = further, left_out["row numbers"] + counted
-    gone |= {*further, *counted}
-    channels = tuple(name for name in numbers if name not in gone) if columns is None else tuple(columns)
-    words = tuple(name for name, kind in kinds.items() if kind == "words" and name not in gone)
+    take("clock", clock.columns)
+    take("further clocks", further_clocks(clock, times, numbers, kinds))
+    counted = [name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])]
+    if len(counted) < sum(not roles.get(name) for name in numbers):  # if the only column counts, it is the channel
+        take("row numbers", counted)
+    channels = [name for name in numbers if not roles.get(name)] if columns is None else columns
+    words = tuple(name for name, kind in kinds.items() if kind == "words" and not roles.get(name))
     if columns is None:
-        left_out["columns left out"] = [name for name in frame.columns if name not in gone and name not in channels]
-    return Layout(clock, times, channels, tuple(labels), words, {kind: names for kind, names in left_out.items() if names})
+        take("columns left out", [name for name in kinds if name not in channels])
+    left_out = {role: [name for name in kinds if roles.get(name) == role] for role in set(roles.values()) - {"", "clock", "series"}}
+    return Layout(clock, times, tuple(channels), tuple(left_out.get("labels", ())), words, left_out)
 
 
-def kind_of(cells: pd.Series) -> str:
+def _kind_of(cells: pd.Series) -> str:
     """Says what a column holds: "numbers", "dates", "spans" of time, "times of day", "words", other "objects", or nothing ("empty").
 
     Text that holds at least some numbers is numbers.
-
-    Args:
-        cells: The column.
     """
-    if pd.api.types.is_datetime64_any_dtype(cells.dtype) or isinstance(cells.dtype, pd.PeriodDtype):
+    kind = cells.dtype
+    if isinstance(kind, pd.CategoricalDtype):
+        return _kind_of(cells.iloc[:LOOK].astype(object))
+    if pd.api.types.is_datetime64_any_dtype(kind) or isinstance(kind, pd.PeriodDtype):
         return "dates"
-    if pd.api.types.is_timedelta64_dtype(cells.dtype):
+    if pd.api.types.is_timedelta64_dtype(kind):
         return "spans"
+    if pd.api.types.is_bool_dtype(kind):
+        return "words"
     if not is_text(cells):
-        if isinstance(cells.dtype, pd.CategoricalDtype):
-            return kind_of(cells.iloc[:LOOK].astype(object))
-        is_number = pd.api.types.is_numeric_dtype(cells.dtype) and not pd.api.types.is_bool_dtype(cells.dtype) and cells.dtype.kind != "c"
-        return (
-            "words"
-            if pd.api.types.is_bool_dtype(cells.dtype)
-            else "objects"
-            if not is_number
-            else "numbers"
-            if cells.notna().any()
-            else "empty"
-        )
+        is_number = pd.api.types.is_numeric_dtype(kind) and kind.kind != "c"
+        return "objects" if not is_number else "numbers" if cells.notna().any() else "empty"
     given = cells.iloc[: 10 * LOOK]
     given = given[~is_missing(given)].iloc[:LOOK]
     if not len(given):
@@ -175,9 +163,7 @@ def _has_states(cells: pd.Series, kind: str) -> bool:
     return kind == "words" or not any(isinstance(state, float) and state % 1 for state in states)
 
 
-def _labels_of(
-    frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], asked: set[str], options: Cleaning
-) -> list[str]:
+def _labels_of(frame: pd.DataFrame, kinds: Mapping[str, str], asked: set[str], options: Cleaning) -> list[str]:
     """Returns the columns that label anomalous rows: those that the options name, or those whose name and values show it."""
     if options.label_column is not None:
         return [] if options.label_column == (NO_TIME,) else list(options.label_column)
@@ -218,8 +204,7 @@ def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times
     if not clock.columns:
         return None
     what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-    form = options.time_format or clock.form
-    return parse_times(clock.cells, what, options.on_bad_times == "drop", form, options.timezone, table.places)
+    return parse_times(clock.cells, what, options.on_bad_times == "drop", clock.form, table.places)
 
 
 def _fits(cells: pd.Series, form: str) -> bool:
@@ -231,19 +216,6 @@ def _fits(cells: pd.Series, form: str) -> bool:
         return bool(pd.to_datetime(head.astype(str).str.strip(), format=form, errors="coerce", utc=True).notna().mean() > 0.5)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, re.error):  # an invalid format, which the parser of times refuses
         return False
-
-
-def _further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], what: str) -> set[str]:
-    """Returns the columns of numbers that show the time once more, or show it although samples are counted."""
-    if times is None:
-        try:
-            found = find_clock(pd.DataFrame(numbers), dict.fromkeys(numbers, "numbers"), numbers, what)
-        except InputError:  # nothing is clearly a clock
-            return set()
-        return {*found.columns, *found.others}
-    own = np.where(times.stamps.isna(), np.nan, times.stamps.tz_localize(None).as_unit("ns").asi8.astype(np.float64))
-    may = {name: values for name, values in numbers.items() if name not in clock.columns and (may_be_clock(name) or is_epoch(values))}
-    return {*clock.others, *(name for name, values in may.items() if is_same_clock(own, values))}
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:

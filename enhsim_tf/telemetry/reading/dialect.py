@@ -27,6 +27,7 @@ class Dialect:
         names: Names of the columns; "" for a column without one.
         first_line: Line at which the data begin, counted from 0.
         skipped: Lines before the data that are neither names nor blank.
+        units: Cells of the line between the names and the data, where units stand, or none.
         head: Cells of the first rows of data.
     """
 
@@ -35,6 +36,7 @@ class Dialect:
     first_line: int
     skipped: int
     head: list[list[str]]
+    units: Sequence[str] = ()
 
 
 def decode(content: bytes) -> tuple[str, str, list[Finding]]:
@@ -66,8 +68,8 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
         except UnicodeDecodeError:
             if b"\x00" in whole:
                 raise ValueError("it is not text") from None
-            text, encoding = whole.decode("latin-1"), "latin-1"
-            findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Latin-1"))
+            text, encoding = whole.decode("cp1252", "replace"), "cp1252"
+            findings.append(Finding("encoding", 1, "the text is not UTF-8 and was read as Windows-1252"))
     if "\x00" in text:
         raise ValueError("it is not text")
     if "\r" in text and "\n" not in text:
@@ -122,14 +124,14 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
 
 
 def _is_content(line: str) -> bool:
-    return bool(line.strip()) and not line.startswith("#")
+    return bool(line.strip()) and not line.startswith(("#", "%"))
 
 
 def _split(lines: Sequence[str], mark: str) -> list[list[str]]:
     """Splits lines into cells; comments and blank lines have none."""
     rows = []
     for line in lines:
-        cells = next(csv.reader([line], delimiter=mark, skipinitialspace=mark != "\t"), []) if _is_content(line) else []
+        cells = next(csv.reader([line.replace("\r", " ")], delimiter=mark, skipinitialspace=mark != "\t"), []) if _is_content(line) else []
         rows.append([cell.strip() for cell in cells])
     return rows
 
@@ -154,12 +156,14 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
         begin = next(number for number, row in enumerate(rows) if row) + (not no_header)
     while begin > 0 and len(rows[begin - 1]) == width and share(rows[begin - 1]) > 0:
         begin -= 1
-    block = begin
+    block = next((number for number in range(begin, 0, -1) if rows[number - 1]), 0)  # a blank line may follow the names
+    block = block if block and len(rows[block - 1]) == width else begin
+    top = block
     while block > 0 and rows[block - 1] and len(rows[block - 1]) <= width and (share(rows[block - 1]) == 0 or len(rows) == 1):
         block -= 1
-    names, skipped = [""] * width, sum(bool(row) for row in rows[:begin])
-    if block < begin and not no_header:
-        header = max(range(block, begin), key=lambda number: (len({cell for cell in rows[number] if cell}), -number))
+    names, units, skipped = [""] * width, [], sum(bool(row) for row in rows[:begin])
+    if block < top and not no_header:
+        header = max(range(block, top), key=lambda number: (len({cell for cell in rows[number] if cell}), -number))
         given = rows[header]
         short = width - len(given)
         if short and any(row[len(given) :] != [""] * short for row in sample):
@@ -167,9 +171,13 @@ def _lay_out(mark: str, rows: list[list[str]], no_header: bool) -> Dialect | Non
         names, skipped = [*given, *[""] * short], skipped - 1
         if not any(names):
             return None
-    elif block < begin and no_header:
+        others = [rows[number] for number in range(block, top) if number != header]
+        for place in [place for place, name in enumerate(names) if not name]:  # names in two lines, as under merged cells
+            names[place] = next((row[place] for row in others if place < len(row) and row[place]), "")
+        units = rows[header + 1] if header + 1 < top else []
+    elif block < top and no_header:
         begin, skipped = block, sum(bool(row) for row in rows[:block])
-    return Dialect(mark, names, begin, skipped, [row for row in rows[begin:] if row])
+    return Dialect(mark, names, begin, skipped, [row for row in rows[begin:] if row], units)
 
 
 def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
@@ -180,7 +188,7 @@ def _is_solid(sample: Sequence[Sequence[str]], place: int) -> bool:
 
 def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
     """Returns the dialect with names from the last comment above the data, as NumPy writes them, or None if it has not as many."""
-    comments = [line.lstrip("#").strip() for line in lines[: found.first_line] if line.startswith("#")]
+    comments = [line.lstrip("#%").strip() for line in lines[: found.first_line] if line.startswith(("#", "%"))]
     if not comments:
         return None
     mark = (
@@ -189,6 +197,6 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
         else re.escape(found.separator)
     )
     names = [name.strip() for name in re.split(mark, comments[-1])]
-    if len(names) != len(found.names) or not all(names) or all(_SOLID.match(name) for name in names):
+    if len(names) != len(found.names) or not all(names[1:]) or all(_SOLID.match(name) for name in names):
         return None
     return dataclasses.replace(found, names=names)

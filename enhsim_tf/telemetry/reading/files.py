@@ -1,5 +1,6 @@
 """Reads tables from files of every kind, from several files of one series, and from pandas objects."""
 
+import dataclasses
 import gzip
 import io
 import re
@@ -52,18 +53,14 @@ def files_of(folder: Path) -> list[Path]:
         folder: The folder.
     """
     for endings in ((".csv",), (".parquet",), (".tsv", ".txt"), _EXCEL):
-        found = [path for path in folder.iterdir() if path.is_file() and suffix_of(path) in endings and not path.name.startswith(".")]
+        found = [path for path in folder.iterdir() if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")]
         if found:
             return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)])
     return []
 
 
-def suffix_of(path: Path) -> str:
-    """Returns the ending of a file's name in lower case, without that of a packed file: `.csv` for `day1.CSV.gz`.
-
-    Args:
-        path: The file.
-    """
+def _suffix_of(path: Path) -> str:
+    """Returns the ending of a file's name in lower case, without that of a packed file: `.csv` for `day1.CSV.gz`."""
     suffix = path.suffix.lower()
     return (Path(path.stem).suffix.lower() or ".csv") if suffix in PACKED else suffix
 
@@ -142,14 +139,13 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
     dialect = find_dialect(text, name, options.no_header, "\t")
     names = [f"column {number}" if cell == "" else cell for number, cell in enumerate(dialect.names)]
     frame = pd.DataFrame([row[:width] for row in rows[dialect.first_line :]], columns=names).infer_objects()
-    return Table(frame, Places([(0, dialect.first_line + 1, name)]), None, tuple(findings))
+    return Table(frame, Places([(0, dialect.first_line + 1, name)]), None, tuple(findings), dict(zip(names, dialect.units, strict=False)))
 
 
 def _with_plain_columns(table: Table, name: str) -> Table:
     """Turns an index that means something into a column, and names into text."""
     frame = table.frame
-    if not isinstance(frame.index, pd.RangeIndex):
-        frame = frame.reset_index()
+    frame = frame.reset_index(drop=isinstance(frame.index, pd.RangeIndex))  # the rows of a slice are counted from 0 as well
     if frame.columns.nlevels > 1:
         raise InputError(f"Expected one line of column names. Received: {frame.columns.nlevels} levels in {name}. Join them.")
     if not 0 < len(frame.columns) <= MAX_COLUMNS:
@@ -157,7 +153,7 @@ def _with_plain_columns(table: Table, name: str) -> Table:
             f"Expected a table of 1 to {MAX_COLUMNS:,} columns. Received: {len(frame.columns):,} in {name}. Give another table."
         )
     frame = frame.set_axis([str(column).strip() for column in frame.columns], axis=1)
-    return Table(frame, table.places, table.decimal, table.findings)
+    return dataclasses.replace(table, frame=frame)
 
 
 def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
@@ -181,4 +177,4 @@ def _join(tables: Sequence[Table], paths: Sequence[Path]) -> Table:
     frame = pd.concat([table.frame[names] for table in tables], ignore_index=True)
     findings = [Finding("files", len(paths), f"files read one after the other: {len(paths)}, {paths[0].name} to {paths[-1].name}")]
     findings += list({finding.text: finding for table in tables for finding in table.findings}.values())
-    return Table(frame, Places(places), next(iter(decimals - {None}), None), tuple(findings))
+    return Table(frame, Places(places), next(iter(decimals - {None}), None), tuple(findings), tables[0].units)

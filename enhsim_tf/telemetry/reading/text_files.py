@@ -49,7 +49,9 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     if repeated:
         lines = ", ".join(str(row + dialect.first_line + 1) for row in repeated[:3])
         findings.append(Finding("header lines", len(repeated), f"lines that repeat the header, left out: {len(repeated):,} (line {lines})"))
-    return Table(frame, Places([(0, dialect.first_line + 1, name)]), decimal, tuple(findings))
+    return Table(
+        frame, Places([(0, dialect.first_line + 1, name)]), decimal, tuple(findings), dict(zip(names, dialect.units, strict=False))
+    )
 
 
 def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.BytesIO | io.StringIO:
@@ -74,8 +76,8 @@ def _read_rows(
     """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(_shows_comma(head[column]) for column in head) else None)
-    if sign is None and dialect.separator == ";" and _is_of_comma_country(head):
-        sign = ","
+    if sign is None and dialect.separator == ";":
+        sign = _sign_of_country(head, names, name)
     frame = _parse(stream, dialect, name, sign)
     if sign is None and any(is_text(frame[column]) and _shows_comma(frame[column]) for column in frame):
         sign, frame = ",", _parse(stream, dialect, name, ",")
@@ -89,12 +91,18 @@ def _shows_comma(cells: pd.Series) -> bool:
     return shows_comma(cells.iloc[:: max(1, len(cells) // _LOOK)].dropna().astype("str"))
 
 
-def _is_of_comma_country(head: pd.DataFrame) -> bool:
-    """Whether dates are written with points and all numbers with commas, as where the comma is the decimal sign."""
+def _sign_of_country(head: pd.DataFrame, names: Sequence[str], name: str) -> str | None:
+    """Returns the comma where dates are written with points and all numbers with commas, as where the comma is the decimal sign."""
     columns = [head[column].astype("str").str.strip() for column in head]
-    dates = any(cells.str.fullmatch(r"\d\d?\.\d\d?\.\d{4}.*").any() for cells in columns)
-    points = any(cells.str.fullmatch(r"[+-]?\d+\.\d+").any() for cells in columns)
-    return dates and not points and any(has_commas(cells) for cells in columns)
+    if not any(cells.str.fullmatch(r"\d\d?\.\d\d?\.\d{4}.*").any() for cells in columns):
+        return None
+    pointed = [column for column, cells in zip(head, columns, strict=True) if cells.str.fullmatch(r"[+-]?\d+\.\d+").any()]
+    if pointed and all(allows_point_thousands(columns[column][columns[column] != ""]) for column in pointed):
+        raise InputError(
+            f"Expected a decimal sign that can be told. Received: {head[pointed[0]].iloc[0]!r} in {names[pointed[0]]!r} of {name}, where a point may "
+            "separate thousands. Give decimal (--decimal . or --decimal ,)."
+        )
+    return "," if not pointed and any(has_commas(cells) for cells in columns) else None
 
 
 def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
