@@ -24,7 +24,10 @@ enhsim-tf fit --help shows the options of fit; generate, verify, score, update a
 python -m enhsim_tf.reproduce, reproduces the paper.
 """
 DETECTORS = tuple(map(option_name, (RESIDUAL, *all_detectors())))
-KINDS = "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain"
+KINDS = (
+    "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain, of each channel on its own;\n"
+    "another_time, delay, lost_coupling, common_shift, of several channels in one table"
+)
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
 
 
