@@ -1,18 +1,16 @@
-"""The ladder of enhancers: known processes are recovered by the rung that can express them, and held-out time stays unseen."""
+"""The candidates for the enhancer: known processes are recovered by the one that can express them, and held-out time stays unseen."""
 
 import numpy as np
 import pytest
-from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, RUNGS, fit_ladder, fit_rung, judge
-from enhsim_tf.enhancer.rung_networks import linear_network, sum_of_networks
-from enhsim_tf.enhancer.scaling import Scaling
 
-from enhsim_tf.common.training import dense_stack
-from enhsim_tf.enhancer import ladder
+from enhsim_tf.common import training
+from enhsim_tf.enhancer import candidates
+from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer, judge
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.names import CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
 
-pytestmark = pytest.mark.usefixtures("narrow_enhancer")
 WINDOW = 16
-FAST = (COARSE, LEVEL_AND_GAIN, RIDGE)
 
 
 def series(num_samples=2_400, seed=0, width=9):
@@ -30,6 +28,13 @@ def windows_of(coarse, target, num_windows=400):
 
 def noise(number, sd, seed=9):
     return sd * np.random.default_rng(seed).standard_normal(number)
+
+
+@pytest.fixture
+def narrow(monkeypatch):
+    """Trains networks of few units, which suffice for windows of 16 samples."""
+    monkeypatch.setattr(candidates, "_PAPER_UNITS", 256)
+    monkeypatch.setattr(candidates, "_SMALL_UNITS", 64)
 
 
 # blocks of time
@@ -59,60 +64,113 @@ def test_too_little_time_is_refused(refused):
         block_edges(0, 149, window=50)
 
 
-# units
+# one candidate
 
 
-def test_scaling_hand_worked():
-    inputs = np.array([[[0.0, 5.0], [2.0, 5.0]], [[4.0, 5.0], [6.0, 5.0]]])  # the second column is constant
-    scaling = Scaling.fit(inputs, np.array([[10.0, 30.0]]))
-    assert scaling.input_centre == (3.0, 5.0) and scaling.input_scale == (pytest.approx(5**0.5), 1.0)
-    assert (scaling.target_centre, scaling.target_scale) == (20.0, 10.0)
-    rows = scaling.scale_inputs(inputs[:1])
-    np.testing.assert_allclose(rows, [[-3 / 5**0.5, 0, -1 / 5**0.5, 0]], rtol=1e-6)
-    np.testing.assert_allclose(scaling.unscale_target(scaling.scale_target(np.array([[12.0]]))), [[12.0]])
-    assert Scaling.from_config(scaling.get_config()) == scaling
-
-
-# networks
-
-
-def test_the_sum_of_two_networks_is_the_sum_of_their_outputs():
-    rng = np.random.default_rng(0)
-    linear = linear_network(rng.standard_normal((6, 3)), rng.standard_normal(3), "ridge")
-    rest = dense_stack(6, (4, 5, 3), 1, "rest")
-    rows = rng.standard_normal((7, 6)).astype(np.float32)
-    expected = np.asarray(linear(rows)) + 0.25 * np.asarray(rest(rows))
-    np.testing.assert_allclose(np.asarray(sum_of_networks(linear, rest, 0.25)(rows)), expected, rtol=1e-5, atol=1e-6)
-
-
-# rungs
-
-
-def test_the_coarse_rung_returns_the_most_similar_column_unchanged():
+def test_the_coarse_candidate_returns_the_most_similar_column_of_each_channel_unchanged():
     coarse = series() * [1.0, 3.0] + [5.0, -40.0]
-    inputs, targets, starts = windows_of(coarse, coarse[:, 1] + noise(len(coarse), 0.1))
-    np.testing.assert_allclose(fit_rung(COARSE, inputs, targets, starts).predict(inputs), inputs[:, :, 1], rtol=1e-4, atol=1e-4)
+    target = coarse[:, ::-1] * [2.0, -1.0] + noise((len(coarse), 2), 0.1)
+    inputs, targets, starts = windows_of(coarse, target)
+    found = fit_enhancer(COARSE, inputs, targets, starts)
+    np.testing.assert_allclose(found.predict(inputs), inputs[:, :, ::-1], rtol=1e-4, atol=1e-4)
 
 
 def test_level_and_gain_are_those_of_least_squares():
     coarse = series()
-    target = 7 - 0.5 * coarse[:, 0] + noise(len(coarse), 0.05)
+    target = np.stack([7 - 0.5 * coarse[:, 0], 3 * coarse[:, 1] - 1], axis=1) + noise((len(coarse), 2), 0.05)
     inputs, targets, starts = windows_of(coarse, target)
-    gain, level = np.polyfit(inputs[:, :, 0].ravel(), targets.ravel(), 1)
-    np.testing.assert_allclose(fit_rung(LEVEL_AND_GAIN, inputs, targets, starts).predict(inputs), level + gain * inputs[:, :, 0], atol=1e-4)
+    predicted = fit_enhancer(LEVEL_AND_GAIN, inputs, targets, starts).predict(inputs)
+    for channel in range(2):
+        gain, level = np.polyfit(inputs[:, :, channel].ravel(), targets[:, :, channel].ravel(), 1)
+        np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
 
 
-def test_the_chosen_rung_does_not_depend_on_units():
+def test_ridge_of_several_channels_is_the_ridge_of_each():
     coarse = series()
-    target = 0.7 * coarse[:, 0] + 0.4 * np.roll(coarse[:, 1], 1) + noise(len(coarse), 0.05)
-    one = fit_ladder(*windows_of(coarse, target), FAST)
-    other = fit_ladder(*windows_of(coarse * [1e-4, 1e4] + [3.0, 1e5], 1e3 * target - 5e3), FAST)
-    assert one.chosen == other.chosen == RIDGE
-    assert one.errors[RIDGE] == pytest.approx(other.errors[RIDGE], rel=1e-3)
-    assert one.errors[LEVEL_AND_GAIN] == pytest.approx(other.errors[LEVEL_AND_GAIN], rel=1e-3)
+    mixed = np.stack([np.roll(coarse[:, 0], 2), 100 + 30 * coarse[:, 1]], axis=1) + noise((len(coarse), 2), [0.05, 30.0])
+    inputs, targets, starts = windows_of(coarse, mixed)
+    together, alone = (
+        fit_enhancer(RIDGE, inputs, targets, starts),
+        [fit_enhancer(RIDGE, inputs, targets[:, :, [channel]], starts) for channel in range(2)],
+    )
+    assert together.penalties == tuple(each.penalties[0] for each in alone) and together.penalties[0] < together.penalties[1]
+    for channel, each in enumerate(alone):
+        np.testing.assert_allclose(together.predict(inputs)[:, :, channel], each.predict(inputs)[:, :, 0], rtol=1e-4, atol=1e-4)
+
+
+def test_few_windows_of_many_columns_give_two_small_factors_and_the_same_map():
+    rng = np.random.default_rng(0)
+    inputs, starts = rng.standard_normal((20, WINDOW, 6)), WINDOW * np.arange(20)
+    targets = inputs[:, :, :4] * 5 + 2 + rng.standard_normal((20, WINDOW, 4))
+    found, single = fit_enhancer(RIDGE, inputs, targets, starts), fit_enhancer(RIDGE, inputs, targets[:, :, :1], starts)
+    assert [each.shape for each in found.factors] == [(WINDOW * 6, 20), (20, WINDOW * 4)]
+    np.testing.assert_allclose(found.predict(inputs)[:, :, 0], single.predict(inputs)[:, :, 0], rtol=1e-4, atol=1e-3)
+
+
+def test_penalties_that_were_chosen_are_used_again():
+    coarse = series()
+    windows = windows_of(coarse, coarse[:, [0]] + noise((len(coarse), 1), 0.5))
+    assert fit_enhancer(RIDGE, *windows, penalties=[123.0]).penalties == (123.0,)
+
+
+def test_one_column_and_channel_may_be_given_without_their_axes():
+    coarse = series()
+    inputs, targets, starts = windows_of(coarse, coarse[:, 0])
+    with_axis, without = (fit_enhancer(RIDGE, each, targets, starts) for each in (inputs[:, :, :1], inputs[:, :, 0]))
+    np.testing.assert_array_equal(with_axis.predict(inputs[:, :, :1]), without.predict(inputs[:, :, :1]))
+
+
+def test_the_papers_network_has_the_layers_of_figure_3(monkeypatch):
+    def dense_stack(inputs, units, seed, name):
+        raise KeyError(inputs, units)  # before it is trained
+
+    monkeypatch.setattr(training, "dense_stack", dense_stack)
+    with pytest.raises(KeyError) as asked:
+        fit_enhancer(NETWORK, *windows_of(series(), series()))
+    assert asked.value.args == (32, (32, 3_200, 3_200, 32))
+
+
+@pytest.mark.usefixtures("narrow")
+def test_the_papers_network_takes_all_columns_and_learns():
+    coarse = series(width=60)
+    inputs, targets, starts = windows_of(coarse, np.stack([coarse[:, 0] + coarse[:, 1], 5 - 9 * coarse[:, 0]], axis=1))
+    found = fit_enhancer(NETWORK, inputs, targets, starts, epochs=6)
+    errors = np.sqrt(np.mean((found.predict(inputs) - targets) ** 2, axis=(0, 1)))
+    assert (errors < 0.4 * targets.std(axis=(0, 1))).all()  # of the first channel, one coarse column alone leaves 0.7
+
+
+@pytest.mark.usefixtures("narrow")
+@pytest.mark.parametrize("name", [COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_NETWORK])
+def test_an_enhancer_of_arrays_is_the_same(name):
+    coarse = series(800)
+    inputs, targets, starts = windows_of(coarse, coarse**2, 60)
+    found = fit_enhancer(name, inputs, targets, starts, epochs=1)
+    again = Enhancer.from_arrays(found.settings, found.arrays)
+    assert again.name == name and again.settings == found.settings
+    np.testing.assert_array_equal(again.predict(inputs), found.predict(inputs))
+
+
+def test_the_sum_of_factors_and_layers_by_hand():
+    rng = np.random.default_rng(0)
+    first, second, kernel, last = (rng.standard_normal(size).astype(np.float32) for size in ((8, 2), (2, 12), (8, 5), (5, 12)))
+    bias, inner, centre, inputs = (rng.standard_normal(size).astype(np.float32) for size in (12, 5, 2, (3, 4, 2)))
+    found = Enhancer("ridge and network", 4, 2, 3, centre, bias, (first, second), ((kernel, inner), (last, bias)))
+    rows = (inputs - centre).reshape(3, 8)
+    expected = rows @ first @ second + bias + np.maximum(rows @ kernel + inner, 0) @ last + bias
+    np.testing.assert_allclose(found.predict(inputs), expected.reshape(3, 4, 3), rtol=1e-4, atol=1e-5)
 
 
 # the choice
+
+
+def test_the_choice_does_not_depend_on_units():
+    coarse = series()
+    target = np.stack([0.7 * coarse[:, 0] + 0.4 * np.roll(coarse[:, 1], 1), coarse[:, 1]], axis=1) + noise((len(coarse), 2), 0.05)
+    one = choose_enhancer(*windows_of(coarse, target))
+    other = choose_enhancer(*windows_of(coarse * [1e-4, 1e4] + [3.0, 1e5], target * [1e3, 1e-3] - [5e3, 2.0]))
+    assert one.enhancer.name == other.enhancer.name == RIDGE and one.note and other.note
+    for first, second in zip(one.judged[1:], other.judged[1:], strict=True):
+        assert first.name == second.name and first.error == pytest.approx(second.error, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -123,30 +181,27 @@ def test_the_chosen_rung_does_not_depend_on_units():
         (lambda coarse: np.convolve(coarse[:, 0], [0.5, 0.3, 0.2], "same") + 0.5 * coarse[:, 1], RIDGE),
     ],
 )
-def test_the_simplest_sufficient_rung_is_chosen(target, expected):
+def test_the_simplest_sufficient_candidate_is_chosen(target, expected):
     coarse = series()
-    found = fit_ladder(*windows_of(coarse, target(coarse) + noise(len(coarse), 0.1)), FAST)
-    assert found.chosen == expected
-    assert list(found.errors) == list(found.standard_errors) == list(FAST)
-
-
-def bent(coarse):
-    return coarse[:, 0] + 0.5 * coarse[:, 0] ** 2
+    found = choose_enhancer(*windows_of(coarse, target(coarse) + noise(len(coarse), 0.1)))
+    assert found.enhancer.name == found.without_fold.name == expected
+    assert [each.name for each in found.judged] == [COARSE, LEVEL_AND_GAIN, RIDGE]
+    assert "no network was trained" in found.note
 
 
 def test_a_network_is_chosen_where_the_map_is_not_linear():
     coarse = series(4_800, width=60)
-    target = bent(coarse) + noise(len(coarse), 0.05)
-    found = fit_ladder(*windows_of(coarse, target, 1_200), (RIDGE, RIDGE_AND_NETWORK), refit="chosen")
-    assert found.chosen == RIDGE_AND_NETWORK and found.errors[RIDGE_AND_NETWORK] < 0.6 * found.errors[RIDGE]
+    target = coarse[:, 0] + 0.5 * coarse[:, 0] ** 2 + noise(len(coarse), 0.05)
+    found = choose_enhancer(*windows_of(coarse, target, 1_200))
+    errors = {each.name: each.error for each in found.judged}
+    assert found.enhancer.name == RIDGE_AND_NETWORK and errors[RIDGE_AND_NETWORK] < 0.6 * errors[RIDGE] and not found.note
 
 
-def test_the_papers_network_takes_all_columns_and_learns():
-    coarse = series(width=60)
-    inputs, targets, starts = windows_of(coarse, coarse[:, 0] + coarse[:, 1])
-    found = fit_rung(NETWORK, inputs, targets, starts, epochs=6)
-    assert found.network.input_shape == (None, 2 * WINDOW) and found.network.output_shape == (None, WINDOW)
-    assert np.sqrt(np.mean((found.predict(inputs) - targets) ** 2)) < 0.4 * targets.std()  # one coarse column alone leaves 0.7
+def test_a_candidate_that_is_asked_for_is_used_whatever_its_error():
+    coarse = series()
+    named = []
+    found = choose_enhancer(*windows_of(coarse, coarse[:, 0] + coarse[:, 1]), LEVEL_AND_GAIN, on_candidate=named.append)
+    assert found.enhancer.name == LEVEL_AND_GAIN and named == [each.name for each in found.judged] == [COARSE, RIDGE, LEVEL_AND_GAIN]
 
 
 def test_the_comparison_hand_worked():
@@ -160,54 +215,55 @@ def test_the_comparison_hand_worked():
 def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monkeypatch):
     seen = []
     monkeypatch.setattr(
-        ladder, "fit_rung", lambda name, inputs, targets, starts, *rest: seen.append(starts) or fit_rung(name, inputs, targets, starts)
+        candidates,
+        "fit_enhancer",
+        lambda name, inputs, targets, starts, *rest: seen.append(starts) or fit_enhancer(name, inputs, targets, starts),
     )
     coarse = series()
     inputs, targets, starts = windows_of(coarse, coarse[:, 0])
-    fit_ladder(inputs, targets, starts, (RIDGE,))
-    judging, refitting = seen
+    choose_enhancer(inputs, targets, starts, RIDGE)
+    *judging, refitting = seen
     edges = block_edges(0, int(starts.max()) + WINDOW, WINDOW)
-    np.testing.assert_array_equal(judging, starts[split_fold(starts, WINDOW, edges, 0)[0]])
+    for each in judging:
+        np.testing.assert_array_equal(each, starts[split_fold(starts, WINDOW, edges, 0)[0]])
     np.testing.assert_array_equal(refitting, starts)
 
 
-def test_same_seed_same_ladder():
+@pytest.mark.usefixtures("narrow")
+def test_same_seed_same_choice():
     coarse = series(1_200)
     data = windows_of(coarse, coarse[:, 0] ** 2, 100)
-    one, other = (fit_ladder(*data, (RIDGE_AND_NETWORK,), seed=4, epochs=1) for _ in range(2))
+    one, other = (choose_enhancer(*data, RIDGE_AND_NETWORK, seed=4, epochs=1) for _ in range(2))
     assert one.judged == other.judged
-    np.testing.assert_array_equal(one.predict(data[0]), other.predict(data[0]))
-
-
-def test_only_the_chosen_rung_is_fitted_again_on_request():
-    coarse = series()
-    found = fit_ladder(*windows_of(coarse, coarse[:, 0]), FAST, refit="chosen")
-    assert set(found.rungs) == {found.chosen} and len(found.judged) == 3
+    np.testing.assert_array_equal(one.enhancer.predict(data[0]), other.enhancer.predict(data[0]))
 
 
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        ({"rungs": ("deep magic",)}, "deep magic"),
-        ({"rungs": ()}, "rungs"),
-        ({"refit": "none"}, "none"),
+        ({"wanted": "deep magic"}, "deep magic"),
         ({"targets": np.full((400, WINDOW), np.nan)}, "NaN"),
-        ({"targets": np.zeros((3, WINDOW))}, "(3, 16)"),
+        ({"targets": np.zeros((3, WINDOW))}, "(3, 16, 1)"),
+        ({"inputs": np.zeros((0, WINDOW, 2)), "targets": np.zeros((0, WINDOW)), "starts": np.zeros(0, int)}, "(0, 16, 2)"),
         ({"starts": np.zeros(400, int)}, "windows"),
     ],
 )
 def test_what_cannot_be_judged_is_refused(refused, change, word):
     inputs, targets, starts = windows_of(series(), series()[:, 0])
     with refused(word):
-        fit_ladder(**{"inputs": inputs, "targets": targets, "starts": starts, "rungs": FAST} | change)
+        choose_enhancer(**{"inputs": inputs, "targets": targets, "starts": starts} | change)
 
 
-def test_one_column_may_be_given_without_its_axis():
-    coarse = series()
-    inputs, targets, starts = windows_of(coarse, coarse[:, 0])
-    with_axis, without = (fit_rung(RIDGE, each, targets, starts) for each in (inputs[:, :, :1], inputs[:, :, 0]))
-    np.testing.assert_array_equal(with_axis.predict(inputs[:, :, :1]), without.predict(inputs[:, :, 0]))
+def test_an_unknown_candidate_is_not_fitted(refused):
+    with refused("'deep magic'"):
+        fit_enhancer("deep magic", *windows_of(series(), series()[:, 0]))
 
 
-def test_the_rungs_are_in_the_order_of_their_cost():
-    assert RUNGS == ("coarse", "level and gain", "ridge", "ridge and network", "network")
+def test_a_training_that_diverges_is_refused(refused, monkeypatch):
+    monkeypatch.setattr(candidates, "_train", lambda name, rows, wanted, outputs, *rest: [(np.full((32, 16), np.nan), np.zeros(16))])
+    with refused("diverged", "--enhancer ridge"):
+        fit_enhancer(NETWORK, *windows_of(series(), series()[:, 0]))
+
+
+def test_the_candidates_are_in_the_order_of_their_cost():
+    assert CANDIDATES == ("coarse", "level and gain", "ridge", "ridge and network", "network")
