@@ -2,7 +2,6 @@
 
 import contextlib
 import ctypes
-import functools
 import gc
 import os
 import signal
@@ -59,16 +58,16 @@ def memory_given_back():
 
 @pytest.fixture(scope="module")
 def narrow_enhancer():
-    """Fits simulators with an enhancer of 256 units instead of 3,200.
+    """Trains networks of 256 and 64 units instead of 3,200 and 256.
 
-    These tests check the path from telemetry to a simulator. The wide network takes far longer, and after each training
-    TensorFlow keeps 130 MB of its weights and moments until the process ends.
+    Tests with it check what is around a network. After each training of the wide one, TensorFlow keeps 130 MB of its weights and
+    moments until the process ends.
     """
-    from enhsim_tf.enhancer import network
+    from enhsim_tf.enhancer import candidates
 
-    plain = network.build_enhancer
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(network, "build_enhancer", functools.partial(plain, hidden_units=256))
+        patch.setattr(candidates, "_PAPER_UNITS", 256)
+        patch.setattr(candidates, "_SMALL_UNITS", 64)
         yield
 
 

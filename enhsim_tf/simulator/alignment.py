@@ -221,8 +221,9 @@ class Waves:
         """Builds the alignment again; raises ValueError if it is none."""
         simulators = [waves_or_level(each) for each in settings["simulators"]]
         waveforms = [arrays.get(f"waveform_{number}") for number in range(len(simulators))]
-        if len(simulators) != len(channels) or any(each is not None and each.shape != (_NUM_PHASES, window) for each in waveforms):
-            raise ValueError("waves that do not fit to the channels")
+        known = [each for each in waveforms if each is not None]
+        if len(simulators) != len(channels) or any(each.shape != (_NUM_PHASES, window) or not np.isfinite(each).all() for each in known):
+            raise ValueError("waves that do not fit to the channels, or are not finite")
         return cls(simulators, channels, interval_s, window, waveforms)
 
 

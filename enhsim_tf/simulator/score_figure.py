@@ -67,7 +67,7 @@ def score_figure(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: st
             for each in axes:
                 each.axvspan(begin, end, color=GENERATED, alpha=0.3, linewidth=0)
         if hasattr(frame.index, "tz"):
-            locator = matplotlib.dates.AutoDateLocator(maxticks=7)
+            locator = matplotlib.dates.AutoDateLocator(minticks=3, maxticks=7)
             axes[-1].xaxis.set_major_locator(locator)
             axes[-1].xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(locator))
             axes[-1].set_xlabel("time (UTC)")

@@ -61,7 +61,7 @@ class Scorer:
     ):
         self.simulator, self.options = simulator, options or ScoreOptions()
         self.window, self.stride = simulator.window, max(1, simulator.window // _STRIDES)
-        self.name = self.options.detector or str(simulator.trained.get("detector", DEFAULT))
+        self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
@@ -251,7 +251,7 @@ def _scored(simulator: EnhancedSimulator, telemetry: Recording, run: Recording |
 
 
 def _check(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
-    if telemetry.columns != simulator.channels and len(telemetry.columns) != 1 != len(simulator.channels):
+    if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
         )

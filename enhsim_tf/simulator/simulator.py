@@ -528,10 +528,19 @@ class EnhancedSimulator:
         if (levels is None) != (kind is Runs) or (levels is not None and not (np.isfinite(levels).all() and levels.size)):
             raise ValueError("levels that do not fit to the alignment")
         quantisation = [None if each is None else Levels(**each) for each in settings["quantisation"]]
-        if len(quantisation) != len(channels):
-            raise ValueError("quantisation of other channels")
+        steps = [number for each in quantisation if each is not None for number in (each.step, each.origin)]
+        if (
+            len(quantisation) != len(channels)
+            or not np.isfinite(steps).all()
+            or any(each is not None and each.step <= 0 for each in quantisation)
+        ):
+            raise ValueError("quantisation of other channels, or without levels")
         if nominal is not None:
             runs = [Run(arrays["nominal"][f"part_{number}"], float(offset)) for number, offset in enumerate(nominal["offsets_s"])]
             nominal = Recording(tuple(runs), channels, interval_s, nominal["start"], ", ".join(channels))
-        noise = model_from(settings["noise"], arrays["noise"])
+            if not all(np.isfinite(run.values).all() for run in runs):
+                raise ValueError("nominal telemetry that is not finite")
+        noise, shape = model_from(settings["noise"], arrays["noise"]), (1, window, len(channels))
+        if noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
+            raise ValueError("noise of another shape")
         return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"])

@@ -26,7 +26,7 @@ from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import make_plan
 from enhsim_tf.datasets.scenario_file import read_mix
 from enhsim_tf.datasets.shard import shard_file
-from tests.faults.small_data_set import PlainMaker, plan
+from tests.faults.small_data_set import PlainMaker, plain, plan
 
 ROOT = Path(__file__).parents[2]
 WORKS = ROOT / "tests" / "faults" / "small_data_set.py"
@@ -39,7 +39,7 @@ def serial(engine, work, numbers, workers=None):
 
 @pytest.fixture
 def here(monkeypatch):
-    """Generates data sets in this process, without networks. The fixture lists the shards that were generated."""
+    """Generates data sets in this process. The fixture lists the shards that were generated."""
     made = []
 
     class Maker(PlainMaker):
@@ -86,7 +86,7 @@ def test_the_manifest_contains_settings_and_records(undisturbed):
     manifest = json.loads((undisturbed / "_manifest.json").read_text())
     assert sorted(content_of(undisturbed)) == sorted([".lock", "_manifest.json", *(shard_file(shard) for shard in range(20))])
     assert (
-        manifest["format"] == "enhsim_tf.datasets.generate/2" and manifest["settings"]["seed"] == 3 and manifest["settings"]["window"] == 60
+        manifest["format"] == "enhsim_tf.datasets.generate/3" and manifest["settings"]["seed"] == 3 and manifest["settings"]["window"] == 60
     )
     assert manifest["settings"]["models"] == [{"name": "model-0", "share": 1.0, "sha256": "0" * 64}]
     assert [shard["rows"] for shard in manifest["shards"]] == [50] * 20
@@ -187,7 +187,7 @@ def test_a_removed_manifest_is_written_again(undisturbed, tmp_path, here):
         b"[]",
         b"null",
         b"\xff",
-        b'{"format": "enhsim_tf.datasets.generate/2", "settings": {}}',
+        b'{"format": "enhsim_tf.datasets.generate/3", "settings": {}}',
     ],
 )
 def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
@@ -310,7 +310,7 @@ def test_a_data_set_with_other_settings_is_left_unchanged(other, words, finished
 
 def test_a_run_with_other_library_versions_does_not_resume(undisturbed, tmp_path, here, monkeypatch, refused):
     folder, known = begun(tmp_path / "set", undisturbed), importlib.metadata.version
-    monkeypatch.setattr(importlib.metadata, "version", lambda name: "9.9" if name == "keras" else known(name))
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "9.9" if name == "numpy" else known(name))
     with refused("versions", "9.9"):
         generate_data_set(folder, plan())
 
@@ -457,17 +457,15 @@ def test_a_second_run_into_the_same_folder_is_refused(tmp_path):
         assert "no other run" in second.communicate()[1] and second.returncode == 2
 
 
-# the command, with networks
+# the command
 
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """A folder with two saved simulators with tiny networks."""
-    from tests.enhanced_simulator.test_simulator import small
-
+    """A folder with two saved simulators."""
     folder = tmp_path_factory.mktemp("models")
-    for seed, name in enumerate(("volts", "amps")):
-        small(window=60, seed=seed).save(folder / name)
+    for noise_sd, name in ((0.1, "volts"), (0.2, "amps")):
+        plain(noise_sd, channels=(name,)).save(folder / name)
     return folder
 
 

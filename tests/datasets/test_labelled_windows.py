@@ -2,12 +2,10 @@
 
 import hashlib
 
-import keras
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode
@@ -25,17 +23,15 @@ from enhsim_tf.datasets.labelled_windows import (
     write_windows_labelled,
 )
 from enhsim_tf.datasets.mix import make_mix
-from enhsim_tf.noise.surrogates import GaussianNoise
+from tests.known_simulators import of_waves
 
 WINDOW = 60
 COARSE = SquareWaveSimulator([SquareWave(48, low=-0.5, high=0.5)])
 
 
-def known(noise_sd=0.1, interval_s=2.0):
+def known(noise_sd=0.1, interval_s=2.0, channels=("volts",)):
     """A simulator of known processes: the coarse signal plus white noise."""
-    enhancer = keras.Sequential([keras.Input((WINDOW,)), keras.layers.Dense(WINDOW)])
-    enhancer.layers[0].set_weights([np.eye(WINDOW), np.zeros(WINDOW)])
-    return EnhancedSimulator(COARSE, enhancer, GaussianNoise(noise_sd, WINDOW), interval_s, trained={"telemetry": "volts"})
+    return of_waves([COARSE] * len(channels), WINDOW, noise_sd, interval_s, channels=channels)
 
 
 # options
@@ -48,6 +44,7 @@ def known(noise_sd=0.1, interval_s=2.0):
         ("drift:1:0", Degraded("drift", 1.0, 0.0)),
         ("period_change:0:0.99", Degraded("period_change", 0.0, 0.99)),
         ("dropout:1e-2", Degraded("dropout", 0.01)),
+        ("bus=2=stuck:0.5:0.1", Degraded("stuck", 0.5, 0.1, "bus=2")),
     ],
 )
 def test_scenarios_are_parsed(text, expected):
@@ -176,9 +173,9 @@ def test_labels_agree_with_the_generated_windows(written):
     assert list(frame.columns) == ["window", *LABELS] and len(frame) == 80
     for share in shares:
         rows = frame.iloc[first : first + share.num_windows]
-        expected = known().generate(share.num_windows, share.scenario, share.seed)
+        expected = known().generate(share.num_windows, share.scenario, share.seed)[:, :, 0]
         np.testing.assert_array_equal(np.stack(rows["window"]), expected)
-        mask = expected != known().generate(share.num_windows, None, share.seed)
+        mask = expected != known().generate(share.num_windows, None, share.seed)[:, :, 0]
         np.testing.assert_array_equal(np.stack(rows["mask"]), mask)
         changed = mask.any(axis=1)
         active = share.scenario if share.scenario and share.scenario.severity else None
@@ -195,7 +192,7 @@ def test_windows_that_a_scenario_does_not_change_are_labelled_nominal_and_counte
     stuck = Degraded("stuck", 0.25, 0.5)  # the period is 48 s, so the mechanism often stands still for 15 s anyway
     unchanged = write_windows_labelled(tmp_path / "x.parquet", known(), [Share(None, 10, 1), Share(stuck, 200, 2)])
     frame = pd.read_parquet(tmp_path / "x.parquet")[10:]
-    same = (known().generate(200, stuck, 2) == known().generate(200, None, 2)).all(axis=1)
+    same = (known().generate(200, stuck, 2) == known().generate(200, None, 2)).all(axis=(1, 2))
     assert unchanged == {stuck: same.sum()} and 20 < same.sum() < 180
     assert ((frame["scenario"] == "nominal").to_numpy() == same).all()
 
@@ -247,6 +244,28 @@ def test_same_seed_same_bytes(tmp_path):
     assert once == sums(5) and all(one != other for one, other in zip(once, sums(6), strict=True))
 
 
+def test_several_channels_have_columns_of_their_own(tmp_path, refused):
+    both, drift = known(channels=("volts", "amps")), Degraded("drift", 1.0, 0.5, "amps")
+    assert write_windows_labelled(tmp_path / "x.parquet", both, [Share(None, 3, 1), Share(drift, 5, 2)]) == {drift: 0}
+    frame = pd.read_parquet(tmp_path / "x.parquet")
+    assert list(frame) == ["window volts", "window amps", *LABELS, "mask volts", "mask amps"]
+    expected = np.concatenate([both.generate(3, None, 1), both.generate(5, drift, 2)])
+    for number, name in enumerate(both.channels):
+        np.testing.assert_array_equal(np.stack(frame[f"window {name}"]), expected[:, :, number])
+    changed = np.stack(frame["mask amps"])
+    assert not np.stack(frame["mask volts"]).any() and changed[3:, 31:].all() and not changed[:3].any()
+    np.testing.assert_array_equal(np.stack(frame["mask"]), changed)
+    series = series_labelled(both, 300, drift, 4)
+    assert list(series) == ["volts", "amps", *LABELS, "mask volts", "mask amps"]
+    nominal = both.generate_series(300, None, 4)
+    np.testing.assert_array_equal(series["volts"], nominal[:, 0])
+    np.testing.assert_array_equal(series["mask"], series["amps"] != nominal[:, 1])
+    assert write_series_labelled(tmp_path / "x.csv", both, 300, drift, 4, is_timeeval=True) == series["mask"].sum() > 0
+    assert list(pd.read_csv(tmp_path / "x.csv")) == ["timestamp", "volts", "amps", "is_anomaly"]
+    with refused("volts, amps", "'watts'"):
+        series_labelled(both, 300, Degraded("drift", 1.0, 0.5, "watts"))
+
+
 # series
 
 
@@ -255,9 +274,9 @@ def test_a_series_equals_that_of_the_simulator(tmp_path, scenario):
     write_series_labelled(tmp_path / "x.parquet", known(), 1_234, scenario, 9)
     frame = pd.read_parquet(tmp_path / "x.parquet")
     assert list(frame.columns) == ["time_s", "value", *LABELS]
-    np.testing.assert_array_equal(frame["value"], known().generate_series(1_234, scenario, 9))
+    np.testing.assert_array_equal(frame["value"], known().generate_series(1_234, scenario, 9)[:, 0])
     np.testing.assert_array_equal(frame["time_s"], 2.0 * np.arange(1_234))
-    mask = known().generate_series(1_234, scenario, 9) != known().generate_series(1_234, None, 9)
+    mask = (known().generate_series(1_234, scenario, 9) != known().generate_series(1_234, None, 9))[:, 0]
     assert mask.any() == bool(scenario and scenario.severity) and not mask[:370].any()  # 0.3 * 1234 = 370.2
     np.testing.assert_array_equal(frame["mask"], mask)
     np.testing.assert_array_equal(frame["scenario"] == "dropout", mask)
@@ -270,7 +289,7 @@ def test_a_series_equals_that_of_the_simulator(tmp_path, scenario):
 def test_a_series_has_several_events_and_is_nominal_between_them():
     schedule = [ScheduledMode("stuck", 1.0, 800, 100), ScheduledMode("drift", 0.5, 100, 60), ScheduledMode("dropout", 1.0, 400, 200)]
     frame = series_labelled(known(), 1_234, None, 9, schedule=schedule)
-    nominal = known().generate_series(1_234, None, 9)
+    nominal = known().generate_series(1_234, None, 9)[:, 0]
     np.testing.assert_array_equal(frame["mask"], frame["value"] != nominal)
     outside = np.ones(1_234, bool)
     for event in schedule:
@@ -313,24 +332,20 @@ def test_a_series_with_a_start_has_times(tmp_path):
 # failures
 
 
-class Broken(EnhancedSimulator):
-    """Fails after the first windows."""
-
-    def generate_labelled_chunks(self, *arguments):
-        yield from [(np.zeros((3, WINDOW), np.float32), np.zeros((3, WINDOW), bool))]
-        raise KeyboardInterrupt
-
-    def generate_labelled_series(self, *arguments, **options):
-        raise KeyboardInterrupt
-
-
 @pytest.mark.parametrize("there_before", [False, True])
-def test_a_failed_generation_writes_nothing(tmp_path, there_before):
-    broken = Broken(COARSE, known().enhancer, GaussianNoise(0.1, WINDOW))
+def test_a_failed_generation_writes_nothing(tmp_path, monkeypatch, there_before):
+    broken = known()
+
+    def chunks(*arguments):  # fails after the first windows
+        yield np.zeros((3, WINDOW, 1), np.float32), np.zeros((3, WINDOW, 1), bool)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(broken, "generate_labelled_chunks", chunks)
+    monkeypatch.setattr(broken, "generate_labelled_series", lambda *arguments, **options: next(iter(())))
     for name in ("windows.parquet", "series.parquet") if there_before else ():
         (tmp_path / name).write_text("the old one")
     with pytest.raises(KeyboardInterrupt):
         write_windows_labelled(tmp_path / "windows.parquet", broken, [Share(None, 10, 0)])
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(StopIteration):
         write_series_labelled(tmp_path / "series.parquet", broken, 100, None, 0)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["the old one"] * (2 * there_before)

@@ -10,19 +10,19 @@ from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, simulate_schedule
 from enhsim_tf.datasets.places import Place, length_limits, num_samples, parse_place, split_limits
 from enhsim_tf.datasets.schedule import draw_schedule
-from tests.faults.small_data_set import COARSE, INTERVAL_S, Plain
+from tests.faults.small_data_set import COARSE, INTERVAL_S
+from tests.known_simulators import of_waves
 
 MODES = [Degraded("stuck", 1.0), Degraded("drift", 0.5)]
 
 
-class Windowed(Plain):
-    window = 64
+SIMULATOR = of_waves([COARSE], 64, interval_s=INTERVAL_S)
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
     given, rng = [ScheduledMode("gain_loss", 1.0, 500, 100)], np.random.default_rng(seed)
-    schedule = draw_schedule(Windowed(), 3_000, given, MODES, 8, (10, 80), 30, rng)
+    schedule = draw_schedule(SIMULATOR, 3_000, given, MODES, 8, (10, 80), 30, rng)
     assert sorted(event.mode for event in schedule) == ["drift"] * 4 + ["gain_loss"] + ["stuck"] * 4 and given[0] in schedule
     for before, after in itertools.pairwise(schedule):
         assert after.begin - before.end >= 30
@@ -38,16 +38,16 @@ def test_drawn_events_change_the_coarse_run_and_keep_their_distance(seed):
 
 
 def test_the_same_seed_gives_the_same_schedule_and_changes_that_fade_do_not_meet():
-    first, again = (draw_schedule(Windowed(), 3_000, [], MODES, 8, (10, 80), 0, np.random.default_rng(3)) for _ in range(2))
+    first, again = (draw_schedule(SIMULATOR, 3_000, [], MODES, 8, (10, 80), 0, np.random.default_rng(3)) for _ in range(2))
     assert first == again
     assert min(after.begin - before.end for before, after in itertools.pairwise(first)) >= 9  # a fade is four samples long
 
 
 def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
     with refused("changes nothing at 100 drawn places"):
-        draw_schedule(Windowed(), 3_000, [], [Degraded("drift", 0.0)], 1, (10, 10), None, np.random.default_rng(0))
+        draw_schedule(SIMULATOR, 3_000, [], [Degraded("drift", 0.0)], 1, (10, 10), None, np.random.default_rng(0))
     with refused("room for events"):
-        draw_schedule(Windowed(), 300, [], MODES, 3, (100, 100), None, np.random.default_rng(0))
+        draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), None, np.random.default_rng(0))
 
 
 def test_places_are_parsed(refused):

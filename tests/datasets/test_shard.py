@@ -1,5 +1,6 @@
 """Shards: windows compared with closed forms, dependence on plan and number only, and invalid plans."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -9,12 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.common.atomic_files import write_json
+from enhsim_tf.common.atomic_files import sha256, write_json
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.folder import MANIFEST, check_folder
 from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare
 from enhsim_tf.datasets.plan import make_plan, plan_key
-from enhsim_tf.datasets.shard import draw_rows, make_windows, shard_file, shard_schema, systematic
-from tests.faults.small_data_set import COARSE, INTERVAL_S, WINDOW, Plain, PlainMaker, plan
+from enhsim_tf.datasets.shard import ShardMaker, draw_rows, make_windows, shard_file, shard_schema, systematic
+from tests.faults.small_data_set import COARSE, INTERVAL_S, WINDOW, PlainMaker, plain, plan
+from tests.known_simulators import of_waves
 
 EVERY_MODE = ("stuck", "drift", "gain_loss", "period_change")  # the modes without random draws
 ALL = Mix(0.2, tuple(ScenarioShare(mode, 0.2, (0.2, 0.9), (0.1, 0.7)) for mode in EVERY_MODE))
@@ -27,7 +30,7 @@ def table_of(maker, shard):
 
 def test_each_window_agrees_with_its_labels(tmp_path):
     maker = PlainMaker(plan(200, 100, mix=ALL), tmp_path)
-    maker.__class__ = type("Silent", (PlainMaker,), {"simulators": [Plain(noise_sd=0)]})
+    maker.__class__ = type("Silent", (PlainMaker,), {"simulators": [plain(noise_sd=0)]})
     times = INTERVAL_S * (np.arange(240)[:, None] + np.arange(WINDOW))  # all phases
     severities = []
     for shard in range(2):
@@ -36,12 +39,14 @@ def test_each_window_agrees_with_its_labels(tmp_path):
         assert record.rows == len(table) == 100
         asked = np.array(["nominal", *EVERY_MODE])[rows.scenario]
         assert {name: int((asked == name).sum()) for name in set(asked)} == dict.fromkeys(("nominal", *EVERY_MODE), 20)
-        nominal = COARSE.simulate(INTERVAL_S * (rows.start[:, None] + np.arange(WINDOW)))
+        nominal = plain(noise_sd=0).complete(
+            plain().alignment.draw(rows.start, [None] * 100, None), np.tile([[[0.0, 0.75]]], (100, 1, 1)), None
+        )[0]
         for number, row in enumerate(table.itertuples()):
             scenario = None if asked[number] == "nominal" else Degraded(asked[number], rows.severity[number], rows.onset[number])
             candidates = COARSE.simulate(times, scenario)
             assert np.abs(candidates - row.window).max(axis=1).min() < 1e-4  # the tolerance of a simulator without noise
-            mask = row.window != nominal[number]
+            mask = row.window != nominal[number, :, 0]
             np.testing.assert_array_equal(row.mask, mask)
             if mask.any():
                 assert (row.scenario, row.severity) == (asked[number], np.float32(rows.severity[number]))
@@ -54,15 +59,15 @@ def test_each_window_agrees_with_its_labels(tmp_path):
 
 
 def test_windows_have_the_levels_and_the_noise_of_their_simulator():
-    levels = np.array([(10.0, 1.0), (20.0, 2.0), (30.0, 3.0)])
+    levels = np.array([(10.0, 0.75), (20.0, 1.5), (30.0, 2.25)])[:, None]
     nominal = plan(600, 600, mix=Mix())
-    windows, _, _ = make_windows(nominal, [Plain(0, levels)], 0)
+    windows, _, _ = make_windows(nominal, [plain(0, levels=levels)], 0)
     at = {}
-    for shift, gain in levels:
-        inside = np.abs((windows - shift) / gain).max(axis=1) <= 0.7501  # the range of the coarse signal
+    for shift, gain in levels[:, 0]:
+        inside = np.abs((windows - shift) / gain).max(axis=(1, 2)) <= 1.0001  # the unit of the coarse signal
         at[shift] = inside.sum()
     assert sum(at.values()) == 600 and min(at.values()) > 200 - 5 * np.sqrt(600 * 2 / 9)
-    noise = make_windows(nominal, [Plain(0.3)], 0)[0] - make_windows(nominal, [Plain(0)], 0)[0]
+    noise = make_windows(nominal, [plain(0.3)], 0)[0] - make_windows(nominal, [plain(0)], 0)[0]
     assert np.std(noise) == pytest.approx(0.3, rel=5 / np.sqrt(2 * noise.size))
 
 
@@ -117,11 +122,10 @@ def test_the_content_of_a_shard_file(tmp_path):
 
 def test_a_worker_with_other_library_versions_is_refused(tmp_path, monkeypatch, refused):
     from enhsim_tf.datasets import plan as plan_module
-    from enhsim_tf.datasets.shard import ShardMaker
 
     maker = ShardMaker(plan(), tmp_path)
     monkeypatch.setattr(plan_module.importlib.metadata, "version", lambda name: "0.0")
-    with refused("every machine", "tensorflow"):
+    with refused("every machine", "numpy"):
         maker(0)
 
 
@@ -130,11 +134,9 @@ def test_a_worker_with_other_library_versions_is_refused(tmp_path, monkeypatch, 
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
-    """A read-only saved simulator with tiny networks."""
-    from tests.enhanced_simulator.test_simulator import small
-
+    """A read-only saved simulator."""
     folder = tmp_path_factory.mktemp("models") / "volts"
-    small(window=60).save(folder)
+    plain().save(folder)
     return folder
 
 
@@ -154,15 +156,33 @@ def test_a_plan_is_made_without_loading_the_model(model):
     assert str(model) not in json.dumps(made.settings())
 
 
-def test_shards_of_real_networks_equal_the_output_of_the_simulator(model, tmp_path):
-    from enhsim_tf.datasets.shard import ShardMaker
-
+def test_the_windows_of_a_shard_are_those_of_the_saved_simulator(model, tmp_path):
     made = make_plan(Mix(shard=40), model, seed=1, num_windows=80)
     maker = ShardMaker(made, tmp_path)
     windows = np.stack(table_of(maker, 1)[1]["window"])
-    (simulator,), (rows, _, noise) = maker.simulators, draw_rows(made, 1)
-    coarse = simulator.coarse.simulate(2.0 * (rows.start[:, None] + np.arange(60)))
-    np.testing.assert_allclose(windows, simulator.enhance(coarse) + simulator.noise.generate(40, noise), atol=1e-5)
+    rows, _, noise = draw_rows(made, 1)
+    coarse = COARSE.simulate(INTERVAL_S * (rows.start[:, None] + np.arange(60)))
+    np.testing.assert_allclose(windows, coarse + plain().noise.generate(40, noise)[:, :, 0], atol=1e-5)
+
+
+def test_channels_have_columns_of_their_own_and_one_scenario_may_concern_one_channel(tmp_path):
+    of_waves([COARSE, COARSE], 60, interval_s=2.0).save(tmp_path / "model")
+    mix = Mix(0.0, (ScenarioShare("drift", 1.0, (1.0, 1.0), (0.5, 0.5), "amps"),), shard=8)
+    made = make_plan(mix, tmp_path / "model", seed=1, num_windows=8)
+    (tmp_path / "set").mkdir()
+    _, table = table_of(ShardMaker(made, tmp_path / "set"), 0)
+    assert list(table) == ["window volts", "window amps", "scenario", "severity", "onset", "end", "mask", "mask volts", "mask amps"]
+    volts, amps, marks = (np.stack(table[f"mask{each}"]) for each in (" volts", " amps", ""))
+    assert not volts.any() and amps[:, 31:].all() and (marks == amps).all() and (table["onset"] == 31).all()
+    coarse = COARSE.simulate(2.0 * (draw_rows(made, 0)[0].start[:, None] + np.arange(60)))
+    drift = 1.5 * np.arange(30) / 29  # to the range of the levels
+    for name, ramp in (("volts", 0), ("amps", drift)):
+        left = np.stack(table[f"window {name}"]) - coarse
+        assert np.abs(left[:, 30:] - ramp).max() < 0.6, "white noise of 0.1 is left"
+    assert made.settings()["channels"] == ["volts", "amps"]
+    with_other = dataclasses.replace(mix, scenarios=(dataclasses.replace(mix.scenarios[0], channel="watts"),))
+    with pytest.raises(InputError, match="'watts' in the scenario"):
+        ShardMaker(make_plan(with_other, tmp_path / "model", 1, 8), tmp_path)(0)
 
 
 @pytest.mark.parametrize("file", ["arrays.npz", "settings.json", "manifest.json"])
@@ -188,9 +208,9 @@ def test_an_invalid_interval_is_refused(copied, interval, refused):
 
 
 def vouch(folder):
-    from tests.enhanced_simulator.test_simulator import vouch_for
-
-    vouch_for(folder)
+    """Makes the checksums of a saved simulator agree with its files again."""
+    manifest = json.loads((folder / "manifest.json").read_text())
+    write_json(folder / "manifest.json", manifest | {"sha256": {name: sha256(folder / name) for name in manifest["sha256"]}})
 
 
 @pytest.mark.parametrize("window", [None, True, 1, 60.0, "60", 10**12])
@@ -203,23 +223,23 @@ def test_an_invalid_window_is_refused(copied, window, refused):
 
 
 def test_a_model_replaced_after_planning_is_refused(copied, tmp_path, refused):
-    from enhsim_tf.datasets.shard import ShardMaker
-
     maker = ShardMaker(make_plan(Mix(), copied, 0, 10), tmp_path)
     path = copied / "settings.json"
-    path.write_text(path.read_text().replace('"offset": 0.1', '"offset": 0.2'))
+    path.write_text(path.read_text().replace('"seed": 0', '"seed": 1'))
     vouch(copied)
     with refused("at the start of the data set"):
         maker(0)
 
 
 def test_models_with_different_windows_are_refused(model, tmp_path, refused):
-    from tests.enhanced_simulator.test_simulator import small
-
-    small(window=64).save(tmp_path / "wide")
+    of_waves([COARSE], 64, interval_s=INTERVAL_S).save(tmp_path / "wide")
     (tmp_path / "narrow").symlink_to(model)
     mix = Mix(models=(ModelShare("a", "narrow", 0.5), ModelShare("b", "wide", 0.5)))
     with refused("same window", "60", "64"):
+        make_plan(mix, tmp_path, 0, 10)
+    of_waves([COARSE, COARSE], 60, interval_s=INTERVAL_S).save(tmp_path / "both")
+    mix = Mix(models=(ModelShare("a", "narrow", 0.5), ModelShare("b", "both", 0.5)))
+    with refused("same channels", "volts, amps"):
         make_plan(mix, tmp_path, 0, 10)
 
 
@@ -239,6 +259,6 @@ def test_data_sets_with_sizes_out_of_range_are_refused(changes, words, refused):
 
 def test_a_data_set_of_another_format_is_refused(tmp_path, refused):
     made = plan(40, 40)
-    write_json(tmp_path / MANIFEST, {"format": "enhsim_tf.datasets.generate/1", "settings": made.settings(), "shards": None})
-    with refused("generate/2", "generate/1", "another --out"):
+    write_json(tmp_path / MANIFEST, {"format": "enhsim_tf.datasets.generate/2", "settings": made.settings(), "shards": None})
+    with refused("generate/3", "generate/2", "another --out"):
         check_folder(tmp_path, made)

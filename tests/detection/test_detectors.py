@@ -6,6 +6,7 @@ import pytest
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAutoencoder
 from enhsim_tf.detection.detectors import (
+    Innovation,
     IsolationForestOnFeatures,
     LargestStep,
     LimitCheck,
@@ -26,6 +27,7 @@ DETECTORS = {
     "convolutional autoencoder": lambda seed=0: ConvolutionalAutoencoder(epochs=20, seed=seed),
     "largest step": lambda seed=0: LargestStep(),
     "moving deviation": lambda seed=0: MovingDeviation(width=20),
+    "innovation": lambda seed=0: Innovation(order=20),
 }
 SEEDED = ("isolation forest", "dense autoencoder", "convolutional autoencoder")
 MUST_SEE = {  # anomalies that each detector should find; a constant window is not anomalous for a network with a short receptive field
@@ -38,6 +40,7 @@ MUST_SEE = {  # anomalies that each detector should find; a constant window is n
     "convolutional autoencoder": ["noisy", "spike"],
     "largest step": ["noisy", "spike", "shifted"],
     "moving deviation": ["spike", "shifted"],
+    "innovation": ["stuck", "noisy", "spike", "shifted"],
 }
 
 
@@ -119,13 +122,77 @@ def test_same_seed_same_scores(name):
 
 
 def test_every_detector_and_control_has_a_name():
-    assert {name for name in DETECTORS if name not in registry.CONTROLS} <= set(registry.DETECTORS)  # others have tests of their own
+    assert set(DETECTORS) <= set(registry.all_detectors()) and len(set(registry.all_detectors())) == len(registry.all_detectors())
     assert list(registry.CONTROLS) == ["random score", "largest step", "moving deviation"]
-    made = {name: make(5) for name, make in {**registry.DETECTORS, **registry.CONTROLS}.items()}
+    made = {name: make(5) for name, make in {**registry.all_detectors(), **registry.CONTROLS}.items()}
     assert {name: type(detector) for name, detector in made.items() if name in DETECTORS} == {
         name: type(make()) for name, make in DETECTORS.items()
     }
     assert [made[name].seed for name in (*SEEDED, "PCA residual")] == [5] * 4
+
+
+# several channels
+
+
+def both_ways(number, seed, noise_sd=0.1):
+    """Windows of two channels, of which the second is the first upside down; each has noise of its own."""
+    first = waves(number, seed, noise_sd)
+    return np.stack(
+        [first, 10 - first + noise_sd * np.random.default_rng([seed, 1]).standard_normal(first.shape).astype(np.float32)], axis=2
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in DETECTORS if "autoencoder" not in name])
+def test_an_anomaly_of_one_channel_of_several_is_found(name):
+    detector = DETECTORS[name]().fit(both_ways(400, 0))
+    nominal, anomalous = both_ways(60, 3), both_ways(60, 4)
+    for begin, end in ((50, 51), (60, 90)):
+        anomalous[:, begin:end, 1] += 3
+    anomalous[:, 20:60, 1] += np.random.default_rng(9).standard_normal((60, 40))
+    scores, plain = detector.score(anomalous), detector.score(nominal)
+    assert scores.shape == plain.shape == (60,) and area(scores, plain) > 0.95
+
+
+@pytest.mark.parametrize("name", [name for name in DETECTORS if name not in SEEDED])
+def test_one_channel_has_the_same_scores_with_and_without_its_axis(name):
+    training, windows = waves(120, 0), waves(20, 1)
+    plain = DETECTORS[name](3).fit(training).score(windows)
+    np.testing.assert_allclose(DETECTORS[name](3).fit(training[:, :, None]).score(windows[:, :, None]), plain, rtol=1e-6, atol=1e-9)
+
+
+def vector_autoregression(number, seed, samples=120):
+    """Two channels: x(t) = A x(t - 1) + e(t), e normal with correlation 0.6."""
+    rng = np.random.default_rng(seed)
+    values = rng.multivariate_normal([0, 0], [[1, 0.6], [0.6, 1]], (number, samples + 50))
+    for t in range(1, samples + 50):
+        values[:, t] += values[:, t - 1] @ np.array([[0.7, 0.2], [-0.3, 0.5]]).T
+    return values[:, 50:] + [5.0, -30.0]
+
+
+def test_innovations_of_a_known_vector_autoregression_are_white_and_those_of_another_time_are_not():
+    detector = Innovation(order=2).fit(vector_autoregression(300, 0))
+    fresh = vector_autoregression(300, 1)
+    scores = detector.score(fresh)
+    assert scores.mean() == pytest.approx(2, rel=0.02)  # one for each channel
+    assert scores.std() == pytest.approx(np.sqrt(2 * 2 / 118), rel=0.15)  # of a mean of 118 sums of two squares
+    swapped = np.stack([fresh[:, :, 0], np.roll(fresh[:, :, 1], 150, axis=0)], axis=2)  # every channel looks as before
+    late = np.stack([fresh[:, :, 0], np.roll(fresh[:, :, 1], 30, axis=1)], axis=2)
+    for changed_relation in (swapped, late):
+        assert detector.score(changed_relation).mean() > 3 and area(detector.score(changed_relation), scores) > 0.999
+    assert area(LimitCheck().fit(fresh).score(swapped), LimitCheck().fit(fresh).score(fresh)) < 0.6
+
+
+def test_innovations_use_a_quarter_of_a_short_window_and_some_of_many_samples():
+    detector = Innovation(order=48, most_rows=500).fit(vector_autoregression(300, 0, 12))
+    assert detector.score(vector_autoregression(300, 1, 12)).mean() == pytest.approx(2, rel=0.1)
+
+
+def test_innovation_of_a_channel_that_is_a_copy_of_another_is_finite():
+    windows = waves(100, 0)[:, :, None] * np.ones(2)
+    assert np.isfinite(Innovation(4).fit(windows).score(windows)).all()
+
+
+# by hand
 
 
 def test_limit_check_by_hand():
@@ -167,6 +234,14 @@ def test_random_scores_depend_on_the_seed_only():
 def test_convolutional_autoencoder_takes_windows_of_any_length(samples):
     windows = waves(40, 0)[:, :samples]
     assert ConvolutionalAutoencoder(epochs=1).fit(windows).score(windows[:7]).shape == (7,)
+
+
+@pytest.mark.parametrize("kind", [ConvolutionalAutoencoder, DenseAutoencoder])
+def test_autoencoders_take_several_channels_one_after_the_other(kind):
+    windows = both_ways(40, 0)
+    joined = np.concatenate([windows[:, :, 0], windows[:, :, 1]], axis=1)
+    scores = (kind(epochs=1, seed=2).fit(each).score(each) for each in (windows, joined))
+    np.testing.assert_array_equal(*scores)
 
 
 def test_pca_residual_is_the_energy_outside_the_span():

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from enhsim_tf.enhanced_simulator.scoring import ScoreOptions
 from sklearn.covariance import EllipticEnvelope
 from sklearn.ensemble import IsolationForest
 from sklearn.neighbors import LocalOutlierFactor
@@ -20,6 +19,7 @@ from enhsim_tf.detection.estimators import EstimatorDetector, as_detector
 from enhsim_tf.detection.evaluation import evaluate_arm, make_trial
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS, option_name, register, unregister
+from enhsim_tf.simulator.options import ScoreOptions
 
 ESTIMATORS = {
     "isolation forest": lambda: IsolationForest(n_estimators=20, random_state=3),

@@ -113,6 +113,47 @@ def test_the_largest_of_equally_good_penalties_is_chosen():
     assert fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
 
 
+# -- several channels --------------------------------------------------------------------------------------------------------
+
+
+def _of_two_channels(num_windows):
+    """Targets whose outputs alternate between a channel with little noise and one with much."""
+    inputs, _, clean = _linear(num_windows, outputs=8)
+    noise = np.random.default_rng(5).standard_normal(clean.shape) * np.tile([0.1, 30.0], 4)
+    return inputs, clean + noise
+
+
+@pytest.mark.parametrize("num_windows", [20, 200])
+def test_channels_are_fitted_as_if_each_were_alone(num_windows):
+    inputs, targets = _of_two_channels(num_windows)
+    together, new = fit_ridge(inputs, targets, num_channels=2), _linear(5, seed=1)[0]
+    for channel in range(2):
+        alone = fit_ridge(inputs, targets[:, channel::2])
+        assert alone.penalty == together.chosen[channel]
+        np.testing.assert_allclose(together.errors[:, channel], alone.errors)
+        np.testing.assert_allclose(together.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
+    assert together.penalty == min(together.chosen) < max(together.chosen)
+
+
+def test_chosen_penalties_are_kept_and_nothing_is_cross_validated():
+    inputs, targets = _of_two_channels(60)
+    found, new = fit_ridge(inputs, targets, num_channels=2, chosen=(0.5, 70.0)), _linear(5, seed=1)[0]
+    assert found.chosen == (0.5, 70.0) and np.isnan(found.errors).all()
+    for channel, penalty in enumerate(found.chosen):
+        alone = fit_ridge(inputs, targets[:, channel::2], penalties=[penalty])
+        np.testing.assert_allclose(found.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize(("num_windows", "is_low_rank"), [(5, True), (6, False)])  # 5 * (24 + 7) < 24 * 7 <= 6 * (24 + 7)
+def test_few_windows_give_two_factors_with_the_map_of_the_full_matrix(num_windows, is_low_rank):
+    inputs, targets, _ = _linear(num_windows)
+    found, new = fit_ridge(inputs, targets, penalties=[3.0]), _linear(5, seed=1)[0]
+    assert (found.weights is None) == (found.factors is not None) == is_low_rank
+    design, centred = _standardised(inputs, inputs), targets - targets.mean(axis=0)
+    full = np.linalg.solve(design.T @ design + 3.0 * np.eye(24), design.T @ centred)
+    np.testing.assert_allclose(found.predict(new), targets.mean(axis=0) + _standardised(new, inputs) @ full, rtol=1e-5, atol=1e-5)
+
+
 # -- nearest windows ---------------------------------------------------------------------------------------------------------
 
 

@@ -7,19 +7,18 @@ import time
 
 from tests.datasets.test_generate import children_of, content_of
 from tests.faults.in_common import MISSED, ROOT, Bench, full_disk, interrupt, kill, read_only
+from tests.faults.small_data_set import plain
 
 MIX = "windows: 6000\nshard: 100\nseed: 5\nnominal: 0.5\nscenarios: [{mode: friction, share: 0.5, severity: [0, 1]}]\n"
 
 
 class DataSetBench(Bench):
-    """Tiny networks, a scenario file, and the data set of an undisturbed run."""
+    """A small simulator, a scenario file, and the data set of an undisturbed run."""
 
     same = "same bytes"
 
     def __init__(self, folder):
-        from tests.enhanced_simulator.test_simulator import small  # TensorFlow takes a while, and filling the README needs none
-
-        small(window=60).save(folder / "models" / "volts")
+        plain().save(folder / "models" / "volts")
         (folder / "mix.yaml").write_text(MIX)
         super().__init__(folder)
         self.expected = content_of(folder / "undisturbed")

@@ -12,30 +12,22 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from enhsim_tf.enhanced_simulator.noisy_output import NoisyOutput  # noqa: E402
-
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
 from enhsim_tf.datasets import generate  # noqa: E402
 from enhsim_tf.datasets.mix import Mix, ScenarioShare  # noqa: E402
 from enhsim_tf.datasets.plan import Model, Plan  # noqa: E402
 from enhsim_tf.datasets.shard import ShardMaker  # noqa: E402
-from enhsim_tf.noise.surrogates import GaussianNoise  # noqa: E402
+from tests.known_simulators import of_waves  # noqa: E402
 
 COARSE = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.21, duty=0.3, low=-0.25, high=0.25)])
 WINDOW, INTERVAL_S = 60, 2.0
 MIX = Mix(0.5, (ScenarioShare("stuck", 0.3, (0.2, 0.9), (0.0, 0.5)), ScenarioShare("gain_loss", 0.2, (0.5, 0.5), (0.25, 0.25))))
 
 
-class Plain(NoisyOutput):
-    """Stands in for an enhanced simulator, without a network: the coarse signal, a level, and white noise."""
-
-    def __init__(self, noise_sd=0.1, levels=None):
-        self.coarse, self.noise, self.levels, self.interval_s = COARSE, GaussianNoise(noise_sd, WINDOW), levels, INTERVAL_S
-        self.noise_sd, self.scale, self.quantisation = noise_sd, 1.0, None
-
-    def enhance(self, coarse):
-        return coarse
+def plain(noise_sd=0.1, **others):
+    """A simulator of the coarse signal and white noise, without a network."""
+    return of_waves([COARSE], WINDOW, noise_sd, INTERVAL_S, **others)
 
 
 class PlainMaker(ShardMaker):
@@ -46,7 +38,7 @@ class PlainMaker(ShardMaker):
     @property
     def simulators(self):
         time.sleep(self.delay_s)
-        return [Plain(0.1 * (number + 1)) for number, _ in enumerate(self.plan.models)]
+        return [plain(0.1 * (number + 1)) for number, _ in enumerate(self.plan.models)]
 
 
 class SlowMaker(PlainMaker):

@@ -3,8 +3,6 @@
 import hashlib
 import json
 
-from enhsim_tf.enhanced_simulator.model_folder import models_of, refuse_foreign
-from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,6 +11,8 @@ from enhsim_tf.datasets.generate import verify
 from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import make_plan
 from enhsim_tf.datasets.shard import shard_file
+from enhsim_tf.simulator.model_folder import models_of, refuse_foreign
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
 from tests.hostile.folders import PLAN, data_set, saved_model, write_data_set, write_model
 

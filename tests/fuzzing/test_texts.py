@@ -6,7 +6,6 @@ import io
 import numpy as np
 import pandas as pd
 import pytest
-from enhsim_tf.enhanced_simulator.model_folder import folder_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from enhsim_tf.cli.arguments import parse
 from enhsim_tf.common.parallel.engines import parse_workers
 from enhsim_tf.datasets.labelled_windows import parse_num_samples, parse_scenario, parse_start
 from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.simulator.model_folder import folder_of
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.influx_store import parse_location
 from enhsim_tf.telemetry.sources import read_source, read_telemetry

@@ -9,10 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.folder import JOURNAL, MANIFEST
 from enhsim_tf.datasets.mix import Mix, ScenarioShare
 from enhsim_tf.datasets.plan import FORMAT, Model, Plan
 from enhsim_tf.datasets.shard import shard_file
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from tests.known_simulators import of_waves
 
 PLAN = Plan(
     Mix(0.5, (ScenarioShare("stuck", 0.5, (0.2, 0.9), (0.0, 0.5)),)), (Model("model", Path("nowhere"), 1.0, "0" * 64, 60, 2.0),), 3, 20, 10
@@ -22,15 +26,23 @@ PLAN = Plan(
 @functools.cache
 def saved_model() -> dict[str, bytes]:
     """The files of a small saved simulator."""
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-
-    from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-    from enhsim_tf.enhancer.network import build_enhancer
-    from enhsim_tf.noise.window_bootstrap import WindowBootstrap
-
-    noise = WindowBootstrap(np.random.default_rng(0).standard_normal((5, 24)).astype(np.float32))
+    rng = np.random.default_rng(0)
+    sizes = ((24, 8), (8, 4), (4, 24))  # a linear map of low rank beside a network, so that every kind of array is there
+    kernels = [rng.standard_normal(size).astype(np.float32) / 5 for size in (*sizes, (24, 3), (3, 24))]
+    layers = tuple((kernel, np.zeros(kernel.shape[1], np.float32)) for kernel in kernels[:3])
+    zeros = np.zeros(24, np.float32)
+    enhancer = Enhancer("ridge and network", 24, 1, 1, np.zeros(1, np.float32), zeros, tuple(kernels[3:]), layers)
     coarse = SquareWaveSimulator([SquareWave(20.0, low=-1.0, high=1.0)])
-    simulator = EnhancedSimulator(coarse, build_enhancer(24, 4, 1), noise, 2.0, levels=np.ones((3, 2)), trained={"epochs": 1})
+    simulator = of_waves(
+        [coarse],
+        24,
+        interval_s=2.0,
+        enhancer=enhancer,
+        noise=WindowBootstrap(rng.standard_normal((5, 24, 1)).astype(np.float32)),
+        levels=np.ones((3, 1, 2)),
+        channels=("telemetry",),
+        trained={"epochs": 1},
+    )
     with tempfile.TemporaryDirectory() as folder:
         simulator.save(Path(folder) / "model")
         return {path.name: path.read_bytes() for path in (Path(folder) / "model").iterdir()}

@@ -1,23 +1,24 @@
 """A malicious model cannot run code or allocate more memory than its files justify. All checksums are correct, as an attacker would make them."""
 
 import io
+import json
 import os
 import pickle
 import zipfile
 
 import numpy as np
 import pytest
-from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
 
 from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import make_plan
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.sources import read_source, read_telemetry
 from tests.hostile.folders import arrays_of_model, npz_of, saved_model, write_model
 
 
 def test_the_model_as_it_was_written_loads(tmp_path):
     model = write_model(tmp_path / "model")
-    assert EnhancedSimulator.load(model).generate(2).shape == (2, 24) and make_plan(Mix(), model, 0, 5).window == 24
+    assert EnhancedSimulator.load(model).generate(2).shape == (2, 24, 1) and make_plan(Mix(), model, 0, 5).window == 24
 
 
 class Payload:
@@ -75,26 +76,42 @@ def test_a_compressed_bomb_is_refused(tmp_path, refused):
         EnhancedSimulator.load(write_model(tmp_path / "model", arrays_npz=content))
 
 
-KERNEL, LAST = "enhancer/kernel_0", "enhancer/kernel_2"
-NAN = np.full((24, 24), np.nan, np.float32)
+KERNEL, LAST, FACTOR, STARTS = "enhancer/kernel_0", "enhancer/kernel_2", "enhancer/factor_0", "noise/starts"
+NAN = np.full((24, 8), np.nan, np.float32)
 
 
 @pytest.mark.parametrize(
     "change",
     [
         lambda arrays: {KERNEL: np.zeros((24, 5), np.float32)},
-        lambda arrays: {KERNEL: np.zeros((24, 24, 1), np.float32)},
-        lambda arrays: {KERNEL: np.zeros((0, 24), np.float32)},
-        lambda arrays: {KERNEL: arrays[KERNEL].astype(np.float64)},
+        lambda arrays: {KERNEL: np.zeros((24, 8, 1), np.float32)},
+        lambda arrays: {KERNEL: np.zeros((0, 8), np.float32)},
         lambda arrays: {KERNEL: arrays[KERNEL].astype("U3")},
         lambda arrays: {KERNEL: NAN},
+        lambda arrays: {KERNEL: np.float32(1)},
         lambda arrays: {"enhancer/bias_0": np.zeros(3, np.float32)},
         lambda arrays: {LAST: np.zeros((4, 23), np.float32), "enhancer/bias_2": np.zeros(23, np.float32)},
-        lambda arrays: {"enhancer/kernel_ridge": np.zeros((24, 23), np.float32), "enhancer/bias_ridge": np.zeros(23, np.float32)},
+        lambda arrays: {FACTOR: np.zeros((24, 4), np.float32)},
+        lambda arrays: {FACTOR: np.full((24, 3), np.inf, np.float32)},
         lambda arrays: {"enhancer/kernel_7": NAN},
-        lambda arrays: {f"enhancer/{kind}_{number}": np.zeros(1, np.float32) for kind in ("kernel", "bias") for number in range(500)},
-        lambda arrays: {"noise/windows": NAN},
-        lambda arrays: {"noise/windows": np.zeros((2, 2, 2), np.float32)},
+        lambda arrays: {f"enhancer/{kind}_{number}": np.zeros((1, 1), np.float32) for kind in ("kernel", "bias") for number in range(500)},
+        lambda arrays: {"enhancer/centre": np.zeros(2, np.float32)},
+        lambda arrays: {"enhancer/bias": np.zeros(23, np.float32)},
+        lambda arrays: {"enhancer/column": np.array([1]), "enhancer/gain": np.ones(1, np.float32)},
+        lambda arrays: {"enhancer/column": np.array([-1]), "enhancer/gain": np.ones(1, np.float32)},
+        lambda arrays: {"enhancer/column": np.array([0])},
+        lambda arrays: {"noise/windows": np.full((5, 24, 1), np.nan, np.float32)},
+        lambda arrays: {"noise/windows": np.zeros((2, 2, 1), np.float32)},
+        lambda arrays: {"noise/windows": np.zeros((5, 23, 1), np.float32)},
+        lambda arrays: {"noise/windows": np.zeros((5, 24, 2), np.float32)},
+        lambda arrays: {"noise/windows": np.zeros((5, 24), np.float32)},
+        lambda arrays: {STARTS: np.arange(4)},
+        lambda arrays: {STARTS: np.full(5, -1)},
+        lambda arrays: {"levels/rows": np.full((3, 1, 2), np.inf)},
+        lambda arrays: {"levels/rows": np.zeros((0, 1, 2))},
+        lambda arrays: {"levels/rows": np.ones((3, 1, 3))},
+        lambda arrays: {"alignment/waveform_0": np.zeros((400, 23), np.float32)},
+        lambda arrays: {"alignment/waveform_0": np.full((400, 24), np.nan, np.float32)},
     ],
 )
 def test_arrays_that_are_no_model_are_refused(tmp_path, refused, change):
@@ -103,9 +120,46 @@ def test_arrays_that_are_no_model_are_refused(tmp_path, refused, change):
         EnhancedSimulator.load(write_model(tmp_path / "model", arrays_npz=npz_of(arrays | change(arrays))))
 
 
-@pytest.mark.parametrize("name", ["enhancer/kernel_0", "enhancer/bias_1", "noise/windows"])
+@pytest.mark.parametrize("name", [KERNEL, "enhancer/bias_1", "enhancer/centre", "enhancer/factor_1", "noise/windows", "levels/rows"])
 def test_a_missing_array_is_refused(tmp_path, refused, name):
     arrays = arrays_of_model()
     del arrays[name]
     with refused("arrays and settings of a model"):
         EnhancedSimulator.load(write_model(tmp_path / "model", arrays_npz=npz_of(arrays)))
+
+
+SETTINGS = json.loads(saved_model()["settings.json"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"alignment": {"kind": "magic"}},
+        {"alignment": SETTINGS["alignment"] | {"simulators": []}},
+        {"channels": []},
+        {"channels": ["telemetry", "other"]},
+        {"channels": "telemetry"},
+        {"window": 23},
+        {"window": "24"},
+        {"window": None},
+        {"interval_s": 0},
+        {"interval_s": "often"},
+        {"interval_s": 1e999},
+        {"enhancer": SETTINGS["enhancer"] | {"columns": 2}},
+        {"enhancer": SETTINGS["enhancer"] | {"window": -24}},
+        {"enhancer": SETTINGS["enhancer"] | {"window": 10**30}},
+        {"noise": {"kind": "pink"}},
+        {"noise": {"kind": "gaussian", "window": 24}},
+        {"quantisation": []},
+        {"quantisation": [{"step": 1}]},
+        {"quantisation": [{"step": 0.0, "origin": 0.0, "count": 2}]},
+        {"quantisation": [{"step": 1e999, "origin": 0.0, "count": 2}]},
+        {"nominal": {"start": None, "offsets_s": [0.0]}},
+        {"trained": [1]},
+    ],
+    ids=str,
+)
+def test_settings_that_are_no_model_are_refused(tmp_path, refused, change):
+    settings = json.dumps(SETTINGS | change).encode()
+    with refused("settings"):
+        EnhancedSimulator.load(write_model(tmp_path / "model", settings_json=settings))

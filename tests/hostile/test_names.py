@@ -12,12 +12,12 @@ import urllib.parse
 import numpy as np
 import pandas as pd
 import pytest
-from enhsim_tf.enhanced_simulator.model_folder import folder_of, models_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.common.atomic_files import encode_name
+from enhsim_tf.simulator.model_folder import folder_of, models_of
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source

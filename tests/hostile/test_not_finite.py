@@ -14,10 +14,10 @@ from enhsim_tf.enhanced_simulator.runs.options import RunOptions
 from enhsim_tf.enhanced_simulator.runs.scoring import score_run
 from enhsim_tf.enhanced_simulator.scoring import ScoreOptions, score_channel
 from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+from enhsim_tf.keras_tools.backend import keras
 
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
-from enhsim_tf.common.backend import keras
 from enhsim_tf.datasets.mix import Mix
 from enhsim_tf.datasets.plan import Model, Plan
 from enhsim_tf.datasets.shard import make_windows

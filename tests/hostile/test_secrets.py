@@ -7,10 +7,10 @@ import logging
 import pickle
 
 import pytest
-from enhsim_tf.enhanced_simulator.model_folder import folder_of
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.simulator.model_folder import folder_of
 from enhsim_tf.telemetry.influx_store import parse_location
 from enhsim_tf.telemetry.sources import read_source
 from tests.hostile.folders import write_model

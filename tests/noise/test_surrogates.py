@@ -4,18 +4,29 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise, JointAutoregression
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 
 def test_gaussian_noise_recovers_the_standard_deviation():
     windows = default_rng(0).normal(0, 0.3, (400, 500)).astype(np.float32)
     fitted = GaussianNoise.fit(windows)
-    assert fitted.standard_deviation == pytest.approx(0.3, rel=5 / np.sqrt(2 * windows.size))
+    assert float(fitted.root) == pytest.approx(0.3, rel=5 / np.sqrt(2 * windows.size))
     noise = fitted.generate(300, default_rng(1))
     assert noise.shape == (300, 500) and noise.dtype == np.float32
-    assert np.std(noise) == pytest.approx(fitted.standard_deviation, rel=5 / np.sqrt(2 * noise.size))
+    assert np.std(noise) == pytest.approx(float(fitted.root), rel=5 / np.sqrt(2 * noise.size))
     assert np.mean(noise[:, 1:] * noise[:, :-1]) / 0.09 == pytest.approx(0, abs=5 / np.sqrt(noise.size))
+
+
+def test_gaussian_noise_of_several_channels_keeps_their_covariance():
+    covariance = np.array([[4.0, 1.2, 0.0], [1.2, 1.0, 0.0], [0.0, 0.0, 0.0]])  # the third channel is constant
+    source = default_rng(0).multivariate_normal(np.zeros(3), covariance, (400, 100)).astype(np.float32)
+    fitted = GaussianNoise.fit(source)
+    assert fitted.root @ fitted.root.T == pytest.approx(covariance, abs=5 * 4 * np.sqrt(2 / 40_000))
+    noise = fitted.generate(500, default_rng(1))
+    assert noise.shape == (500, 100, 3) and noise.dtype == np.float32
+    assert np.cov(noise.reshape(-1, 3), rowvar=False) == pytest.approx(fitted.root @ fitted.root.T, abs=5 * 4 * np.sqrt(2 / 50_000))
+    assert fitted.generate_series(30, default_rng(1)).shape == (30, 3)
 
 
 def autocorrelation_of_second_order(first, second, max_lag):
@@ -87,6 +98,32 @@ def test_autoregression_of_generated_noise_is_the_one_it_came_from():
     source = GaussianAutoregression([0.5, 0.2, -0.3, 0.1], 0.1, 300)
     again = GaussianAutoregression.fit(source.generate(400, default_rng(0)), max_order=4)
     assert again.coefficients == pytest.approx(source.coefficients, abs=5 / np.sqrt(400 * 300))
+
+
+def test_joint_autoregression_recovers_the_channels_and_their_cross_correlation():
+    number, samples, correlation = 400, 300, 0.8
+    draws = default_rng(0).multivariate_normal([0, 0], [[1, correlation], [correlation, 1]], (number, samples))
+    values = draws.copy()
+    for t in range(1, samples):
+        values[:, t] += [0.9, -0.5] * values[:, t - 1]
+    fitted = JointAutoregression.fit(values[:, 100:] * [2.0, 7.0], max_order=1)
+    error = 5 / np.sqrt(number * 200)
+    for each, coefficient, scale in zip(fitted.channels, (0.9, -0.5), (2.0, 7.0), strict=True):
+        assert each.coefficients == pytest.approx([coefficient], abs=error) and each.innovation_sd == pytest.approx(scale, rel=error)
+    assert fitted.correlation == pytest.approx(np.array([[1, correlation], [correlation, 1]]), abs=error)
+    noise = fitted.generate(2_000, default_rng(1))[:, 150:]
+    assert noise.shape == (2_000, 50, 2) and noise.dtype == np.float32
+    # closed form of two AR(1): E xy = c / (1 - ab), E xx = 1 / (1 - a^2), E yy = 1 / (1 - b^2)
+    expected = correlation / (1 + 0.9 * 0.5) * np.sqrt((1 - 0.9**2) * (1 - 0.5**2))
+    assert np.corrcoef(noise.reshape(-1, 2), rowvar=False)[0, 1] == pytest.approx(expected, abs=0.01)
+    assert noise.std(axis=(0, 1)) == pytest.approx([2 / np.sqrt(1 - 0.81), 7 / np.sqrt(1 - 0.25)], rel=0.03)
+    assert fitted.generate_series(30, default_rng(1)).shape == (30, 2)
+
+
+def test_a_single_channel_has_the_same_noise_with_and_without_its_axis():
+    windows = second_order(1.2, -0.5, 50, 60, seed=0)
+    joint, plain = JointAutoregression.fit(windows[:, :, None], 4), GaussianAutoregression.fit(windows, 4)
+    np.testing.assert_array_equal(joint.generate(5, default_rng(2))[:, :, 0], plain.generate(5, default_rng(2)))
 
 
 def test_autoregressions_that_are_refused(refused):

@@ -23,6 +23,29 @@ def test_windows_are_real_ones():
 
 
 @pytest.mark.parametrize("follows_signal", [False, True])
+def test_all_channels_are_those_of_one_window(follows_signal):
+    windows = np.stack([ar1(20, 40), ar1(20, 40, seed=1)], axis=2)
+    signal = np.stack([sines(90, 40), 1e6 * sines(90, 40)], axis=2)
+    noise = MatchedWindowBootstrap.fit(windows, signal[:20]) if follows_signal else WindowBootstrap(windows)
+    drawn = noise.generate(60, default_rng(3), signal[:60])
+    assert drawn.shape == (60, 40, 2) and {row.tobytes() for row in drawn} <= {row.tobytes() for row in windows}
+    levels = np.ones((20, 40, 2)) * default_rng(0).standard_normal((20, 1, 1)) * [1.0, -3.0]  # the channels of a window belong together
+    constant = np.zeros((20, 40, 2))
+    noise = MatchedWindowBootstrap.fit(levels, constant) if follows_signal else WindowBootstrap(levels)
+    series = noise.generate_series(500, default_rng(0), np.zeros((500, 2)))
+    assert series.shape == (500, 2) and np.ptp(series) > 1
+    np.testing.assert_allclose(series[:, 1], -3 * series[:, 0], atol=1e-5)
+
+
+def test_every_channel_of_a_signal_counts_whatever_its_unit():
+    signal = np.stack([1e-6 * sines(400, 80, 1), np.full((400, 80), 1e3) + 1e-3 * sines(400, 80, 2)], axis=2)
+    windows = (signal - signal.mean(axis=(0, 1))) / signal.std(axis=(0, 1))
+    drawn = MatchedWindowBootstrap.fit(windows, signal).generate(400, default_rng(3), signal)
+    for channel in range(2):
+        assert np.corrcoef(drawn[:, :, channel].ravel(), windows[:, :, channel].ravel())[0, 1] > 0.8
+
+
+@pytest.mark.parametrize("follows_signal", [False, True])
 def test_each_window_is_drawn_once_before_any_is_drawn_again(follows_signal):
     windows, signal = ar1(20, 40), np.zeros((4_020, 40))
     noise = MatchedWindowBootstrap.fit(windows, signal[:20]) if follows_signal else WindowBootstrap(windows)
@@ -155,6 +178,7 @@ def test_a_signal_of_another_shape_is_refused(refused):
         lambda: noise.generate(3, default_rng(0)),
         lambda: noise.generate(3, default_rng(0), sines(4, 40)),
         lambda: noise.generate_series(90, default_rng(0), np.zeros(80)),
+        lambda: noise.generate(3, default_rng(0), sines(3, 40)[:, :, None]),
         lambda: MatchedWindowBootstrap.fit(ar1(30, 40), None),
         lambda: MatchedWindowBootstrap(ar1(30, 40), np.zeros((29, 40))),
         lambda: noise.generate(30, default_rng(0), np.full((30, 40), np.nan)),

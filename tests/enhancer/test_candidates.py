@@ -1,0 +1,269 @@
+"""The candidates for the enhancer: known processes are recovered by the one that can express them, and held-out time stays unseen."""
+
+import numpy as np
+import pytest
+
+from enhsim_tf.common import training
+from enhsim_tf.enhancer import candidates
+from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer, judge
+from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.names import CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
+
+WINDOW = 16
+
+
+def series(num_samples=2_400, seed=0, width=9):
+    """Two coarse columns: smooth random signals that do not repeat."""
+    rng = np.random.default_rng(seed)
+    smooth = np.stack([np.convolve(each, np.hanning(width), "same") for each in rng.standard_normal((2, num_samples))], axis=1)
+    return smooth / smooth.std(axis=0)
+
+
+def windows_of(coarse, target, num_windows=400):
+    starts = np.linspace(0, len(coarse) - WINDOW, num_windows).astype(int)
+    places = starts[:, None] + np.arange(WINDOW)
+    return coarse[places], target[places], starts
+
+
+def noise(number, sd, seed=9):
+    return sd * np.random.default_rng(seed).standard_normal(number)
+
+
+@pytest.fixture
+def narrow(monkeypatch):
+    """Trains networks of few units, which suffice for windows of 16 samples."""
+    monkeypatch.setattr(candidates, "_PAPER_UNITS", 256)
+    monkeypatch.setattr(candidates, "_SMALL_UNITS", 64)
+
+
+# blocks of time
+
+
+def test_blocks_cover_the_time_and_are_held_out_in_turn():
+    edges = block_edges(100, 1_000, window=50)
+    assert edges.tolist() == [100, 250, 400, 550, 700, 850, 1_000]  # 900 samples, three windows of 50 in each block
+    starts = np.arange(100, 951)
+    held = [split_fold(starts, 50, edges, fold)[1] for fold in range(3)]
+    assert sorted({int(starts[row]) for row in held[0]}) == [*range(100, 201), *range(550, 651)]
+    assert not set(held[0]) & set(held[1]) and not set(held[1]) & set(held[2])
+
+
+def test_training_windows_share_no_sample_with_held_out_windows():
+    starts = np.random.default_rng(0).integers(0, 900, 300)
+    edges = block_edges(0, 950, window=50)
+    for fold in range(3):
+        learnt, held_out = split_fold(starts, 50, edges, fold)
+        samples = {sample for start in starts[held_out] for sample in range(start, start + 50)}
+        assert len(learnt) and len(held_out)
+        assert not any(start in samples or start + 49 in samples for start in starts[learnt].tolist())
+
+
+def test_too_little_time_is_refused(refused):
+    with refused("windows of 50 samples"):
+        block_edges(0, 149, window=50)
+
+
+# one candidate
+
+
+def test_the_coarse_candidate_returns_the_most_similar_column_of_each_channel_unchanged():
+    coarse = series() * [1.0, 3.0] + [5.0, -40.0]
+    target = coarse[:, ::-1] * [2.0, -1.0] + noise((len(coarse), 2), 0.1)
+    inputs, targets, starts = windows_of(coarse, target)
+    found = fit_enhancer(COARSE, inputs, targets, starts)
+    np.testing.assert_allclose(found.predict(inputs), inputs[:, :, ::-1], rtol=1e-4, atol=1e-4)
+
+
+def test_level_and_gain_are_those_of_least_squares():
+    coarse = series()
+    target = np.stack([7 - 0.5 * coarse[:, 0], 3 * coarse[:, 1] - 1], axis=1) + noise((len(coarse), 2), 0.05)
+    inputs, targets, starts = windows_of(coarse, target)
+    predicted = fit_enhancer(LEVEL_AND_GAIN, inputs, targets, starts).predict(inputs)
+    for channel in range(2):
+        gain, level = np.polyfit(inputs[:, :, channel].ravel(), targets[:, :, channel].ravel(), 1)
+        np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
+
+
+def test_ridge_of_several_channels_is_the_ridge_of_each():
+    coarse = series()
+    mixed = np.stack([np.roll(coarse[:, 0], 2), 100 + 30 * coarse[:, 1]], axis=1) + noise((len(coarse), 2), [0.05, 30.0])
+    inputs, targets, starts = windows_of(coarse, mixed)
+    together, alone = (
+        fit_enhancer(RIDGE, inputs, targets, starts),
+        [fit_enhancer(RIDGE, inputs, targets[:, :, [channel]], starts) for channel in range(2)],
+    )
+    assert together.penalties == tuple(each.penalties[0] for each in alone) and together.penalties[0] < together.penalties[1]
+    for channel, each in enumerate(alone):
+        np.testing.assert_allclose(together.predict(inputs)[:, :, channel], each.predict(inputs)[:, :, 0], rtol=1e-4, atol=1e-4)
+
+
+def test_few_windows_of_many_columns_give_two_small_factors_and_the_same_map():
+    rng = np.random.default_rng(0)
+    inputs, starts = rng.standard_normal((20, WINDOW, 6)), WINDOW * np.arange(20)
+    targets = inputs[:, :, :4] * 5 + 2 + rng.standard_normal((20, WINDOW, 4))
+    found, single = fit_enhancer(RIDGE, inputs, targets, starts), fit_enhancer(RIDGE, inputs, targets[:, :, :1], starts)
+    assert [each.shape for each in found.factors] == [(WINDOW * 6, 20), (20, WINDOW * 4)]
+    np.testing.assert_allclose(found.predict(inputs)[:, :, 0], single.predict(inputs)[:, :, 0], rtol=1e-4, atol=1e-3)
+
+
+def test_penalties_that_were_chosen_are_used_again():
+    coarse = series()
+    windows = windows_of(coarse, coarse[:, [0]] + noise((len(coarse), 1), 0.5))
+    assert fit_enhancer(RIDGE, *windows, penalties=[123.0]).penalties == (123.0,)
+
+
+def test_one_column_and_channel_may_be_given_without_their_axes():
+    coarse = series()
+    inputs, targets, starts = windows_of(coarse, coarse[:, 0])
+    with_axis, without = (fit_enhancer(RIDGE, each, targets, starts) for each in (inputs[:, :, :1], inputs[:, :, 0]))
+    np.testing.assert_array_equal(with_axis.predict(inputs[:, :, :1]), without.predict(inputs[:, :, :1]))
+
+
+def test_the_papers_network_has_the_layers_of_figure_3(monkeypatch):
+    def dense_stack(inputs, units, seed, name):
+        raise KeyError(inputs, units)  # before it is trained
+
+    monkeypatch.setattr(training, "dense_stack", dense_stack)
+    with pytest.raises(KeyError) as asked:
+        fit_enhancer(NETWORK, *windows_of(series(), series()))
+    assert asked.value.args == (32, (32, 3_200, 3_200, 32))
+
+
+@pytest.mark.usefixtures("narrow")
+def test_the_papers_network_takes_all_columns_and_learns():
+    coarse = series(width=60)
+    inputs, targets, starts = windows_of(coarse, np.stack([coarse[:, 0] + coarse[:, 1], 5 - 9 * coarse[:, 0]], axis=1))
+    found = fit_enhancer(NETWORK, inputs, targets, starts, epochs=6)
+    errors = np.sqrt(np.mean((found.predict(inputs) - targets) ** 2, axis=(0, 1)))
+    assert (errors < 0.4 * targets.std(axis=(0, 1))).all()  # of the first channel, one coarse column alone leaves 0.7
+
+
+@pytest.mark.usefixtures("narrow")
+@pytest.mark.parametrize("name", [COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_NETWORK])
+def test_an_enhancer_of_arrays_is_the_same(name):
+    coarse = series(800)
+    inputs, targets, starts = windows_of(coarse, coarse**2, 60)
+    found = fit_enhancer(name, inputs, targets, starts, epochs=1)
+    again = Enhancer.from_arrays(found.settings, found.arrays)
+    assert again.name == name and again.settings == found.settings
+    np.testing.assert_array_equal(again.predict(inputs), found.predict(inputs))
+
+
+def test_the_sum_of_factors_and_layers_by_hand():
+    rng = np.random.default_rng(0)
+    first, second, kernel, last = (rng.standard_normal(size).astype(np.float32) for size in ((8, 2), (2, 12), (8, 5), (5, 12)))
+    bias, inner, centre, inputs = (rng.standard_normal(size).astype(np.float32) for size in (12, 5, 2, (3, 4, 2)))
+    found = Enhancer("ridge and network", 4, 2, 3, centre, bias, (first, second), ((kernel, inner), (last, bias)))
+    rows = (inputs - centre).reshape(3, 8)
+    expected = rows @ first @ second + bias + np.maximum(rows @ kernel + inner, 0) @ last + bias
+    np.testing.assert_allclose(found.predict(inputs), expected.reshape(3, 4, 3), rtol=1e-4, atol=1e-5)
+
+
+# the choice
+
+
+def test_the_choice_does_not_depend_on_units():
+    coarse = series()
+    target = np.stack([0.7 * coarse[:, 0] + 0.4 * np.roll(coarse[:, 1], 1), coarse[:, 1]], axis=1) + noise((len(coarse), 2), 0.05)
+    one = choose_enhancer(*windows_of(coarse, target))
+    other = choose_enhancer(*windows_of(coarse * [1e-4, 1e4] + [3.0, 1e5], target * [1e3, 1e-3] - [5e3, 2.0]))
+    assert one.enhancer.name == other.enhancer.name == RIDGE and one.note and other.note
+    for first, second in zip(one.judged[1:], other.judged[1:], strict=True):
+        assert first.name == second.name and first.error == pytest.approx(second.error, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("target", "expected"),
+    [
+        (lambda coarse: coarse[:, 0], COARSE),
+        (lambda coarse: 3 + 1.5 * coarse[:, 0], LEVEL_AND_GAIN),
+        (lambda coarse: np.convolve(coarse[:, 0], [0.5, 0.3, 0.2], "same") + 0.5 * coarse[:, 1], RIDGE),
+    ],
+)
+def test_the_simplest_sufficient_candidate_is_chosen(target, expected):
+    coarse = series()
+    found = choose_enhancer(*windows_of(coarse, target(coarse) + noise(len(coarse), 0.1)))
+    assert found.enhancer.name == found.without_fold.name == expected
+    assert [each.name for each in found.judged] == [COARSE, LEVEL_AND_GAIN, RIDGE]
+    assert "no network was trained" in found.note
+
+
+def test_a_network_is_chosen_where_the_map_is_not_linear():
+    coarse = series(4_800, width=60)
+    target = coarse[:, 0] + 0.5 * coarse[:, 0] ** 2 + noise(len(coarse), 0.05)
+    found = choose_enhancer(*windows_of(coarse, target, 1_200))
+    errors = {each.name: each.error for each in found.judged}
+    assert found.enhancer.name == RIDGE_AND_NETWORK and errors[RIDGE_AND_NETWORK] < 0.6 * errors[RIDGE] and not found.note
+
+
+def test_a_candidate_that_is_asked_for_is_used_whatever_its_error():
+    coarse = series()
+    named = []
+    found = choose_enhancer(*windows_of(coarse, coarse[:, 0] + coarse[:, 1]), LEVEL_AND_GAIN, on_candidate=named.append)
+    assert found.enhancer.name == LEVEL_AND_GAIN and named == [each.name for each in found.judged] == [COARSE, RIDGE, LEVEL_AND_GAIN]
+
+
+def test_the_comparison_hand_worked():
+    first, second = judge({"a": np.array([0.04, 0.06]), "b": np.array([0.01, 0.05])})
+    assert first.error == pytest.approx(0.05**0.5) and second.error == pytest.approx(0.03**0.5)
+    assert first.standard_error == pytest.approx(0.01 / (2 * 0.05**0.5))  # deviation 0.0141 of two, divided by root 2: 0.01
+    assert first.behind == pytest.approx(0.02) and first.behind_standard_error == pytest.approx(0.01)
+    assert second.behind == 0 and second.is_within and not first.is_within
+
+
+def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        candidates,
+        "fit_enhancer",
+        lambda name, inputs, targets, starts, *rest: seen.append(starts) or fit_enhancer(name, inputs, targets, starts),
+    )
+    coarse = series()
+    inputs, targets, starts = windows_of(coarse, coarse[:, 0])
+    choose_enhancer(inputs, targets, starts, RIDGE)
+    *judging, refitting = seen
+    edges = block_edges(0, int(starts.max()) + WINDOW, WINDOW)
+    for each in judging:
+        np.testing.assert_array_equal(each, starts[split_fold(starts, WINDOW, edges, 0)[0]])
+    np.testing.assert_array_equal(refitting, starts)
+
+
+@pytest.mark.usefixtures("narrow")
+def test_same_seed_same_choice():
+    coarse = series(1_200)
+    data = windows_of(coarse, coarse[:, 0] ** 2, 100)
+    one, other = (choose_enhancer(*data, RIDGE_AND_NETWORK, seed=4, epochs=1) for _ in range(2))
+    assert one.judged == other.judged
+    np.testing.assert_array_equal(one.enhancer.predict(data[0]), other.enhancer.predict(data[0]))
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"wanted": "deep magic"}, "deep magic"),
+        ({"targets": np.full((400, WINDOW), np.nan)}, "NaN"),
+        ({"targets": np.zeros((3, WINDOW))}, "(3, 16, 1)"),
+        ({"inputs": np.zeros((0, WINDOW, 2)), "targets": np.zeros((0, WINDOW)), "starts": np.zeros(0, int)}, "(0, 16, 2)"),
+        ({"starts": np.zeros(400, int)}, "windows"),
+    ],
+)
+def test_what_cannot_be_judged_is_refused(refused, change, word):
+    inputs, targets, starts = windows_of(series(), series()[:, 0])
+    with refused(word):
+        choose_enhancer(**{"inputs": inputs, "targets": targets, "starts": starts} | change)
+
+
+def test_an_unknown_candidate_is_not_fitted(refused):
+    with refused("'deep magic'"):
+        fit_enhancer("deep magic", *windows_of(series(), series()[:, 0]))
+
+
+def test_a_training_that_diverges_is_refused(refused, monkeypatch):
+    monkeypatch.setattr(candidates, "_train", lambda name, rows, wanted, outputs, *rest: [(np.full((32, 16), np.nan), np.zeros(16))])
+    with refused("diverged", "--enhancer ridge"):
+        fit_enhancer(NETWORK, *windows_of(series(), series()[:, 0]))
+
+
+def test_the_candidates_are_in_the_order_of_their_cost():
+    assert CANDIDATES == ("coarse", "level and gain", "ridge", "ridge and network", "network")

@@ -1,0 +1,48 @@
+"""Simulators that are not fitted: what they generate is known in closed form, and they need no network."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.noise.surrogates import GaussianNoise
+from enhsim_tf.simulator.alignment import Waves
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+
+
+def unchanged(window: int, number: int = 1, gain: float = 1.0) -> Enhancer:
+    """An enhancer that multiplies each of its columns by a gain and changes nothing else.
+
+    Args:
+        window: Length of a window in samples.
+        number: Number of columns and channels.
+        gain: The gain.
+    """
+    main = np.arange(number), np.full(number, gain, np.float32)
+    return Enhancer(
+        "level and gain", window, number, number, np.zeros(number, np.float32), np.zeros(window * number, np.float32), main=main
+    )
+
+
+def of_waves(
+    waves: Sequence[SquareWaveSimulator], window: int, noise_sd: float = 0.1, interval_s: float = 1.0, **others
+) -> EnhancedSimulator:
+    """A simulator whose telemetry are the waves themselves plus white noise.
+
+    Args:
+        waves: The waves of each channel.
+        window: Length of a window in samples.
+        noise_sd: Standard deviation of the noise of each channel.
+        interval_s: Sampling interval in seconds.
+        **others: Further arguments of `EnhancedSimulator`, which replace those of this function.
+    """
+    channels = others.pop("channels", ("volts", "amps")[: len(waves)])
+    given = {
+        "alignment": Waves(waves, channels, interval_s, window),
+        "enhancer": unchanged(window, len(waves)),
+        "noise": GaussianNoise(noise_sd * np.eye(len(waves)), window),
+        "levels": np.array([[level_offset_and_scale(each) for each in waves]]),
+        "trained": {"seed": 0},
+    }
+    return EnhancedSimulator(**given | others, channels=channels, interval_s=interval_s)
