@@ -99,11 +99,12 @@ def narrow_enhancer():
     These tests check the path from telemetry to a simulator. The wide network takes far longer, and after each training
     TensorFlow keeps 130 MB of its weights and moments until the process ends.
     """
-    from enhsim_tf.enhancer import network
+    from enhsim_tf.enhancer import candidates, network
 
     plain = network.build_enhancer
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(network, "build_enhancer", functools.partial(plain, hidden_units=256))
+        patch.setattr(candidates, "_PAPER_UNITS", 256)
         yield
 
 

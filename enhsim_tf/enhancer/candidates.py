@@ -16,6 +16,7 @@ from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
 from enhsim_tf.enhancer.ridge import fit_ridge
 
+_PAPER_UNITS = 3_200  # units of each of the two wide layers of the paper's network
 _SMALL_UNITS = 256  # units of each hidden layer of the network on what ridge regression leaves
 _SMALL_RATE, _PAPER_RATE = 5e-4, 1e-3  # initial learning rates, which fall to zero along a cosine
 _BATCH_SIZE = 15  # of both networks, as in the paper
@@ -242,7 +243,7 @@ def _train(name: str, rows: np.ndarray, wanted: np.ndarray, outputs: int, seed: 
     from enhsim_tf.keras_tools.backend import keras
     from enhsim_tf.keras_tools.training import dense_stack, fit_windows
 
-    units = (outputs, 3_200, 3_200, outputs) if name == NETWORK else (_SMALL_UNITS, _SMALL_UNITS, outputs)
+    units = (outputs, _PAPER_UNITS, _PAPER_UNITS, outputs) if name == NETWORK else (_SMALL_UNITS, _SMALL_UNITS, outputs)
     network = dense_stack(rows.shape[1], units, seed, "enhancer")
     rate = _PAPER_RATE if name == NETWORK else _SMALL_RATE
     falling = keras.optimizers.schedules.CosineDecay(rate, epochs * -(-len(rows) // _BATCH_SIZE))
