@@ -8,12 +8,17 @@ import numpy as np
 
 from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
+from enhsim_tf.datasets.labelled_windows import Share, write_windows_labelled
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.keras_tools.backend import tf
 from enhsim_tf.keras_tools.training import fit_windows
 from enhsim_tf.noise.discriminator import build_discriminator
 from enhsim_tf.noise.gan import NoiseGAN
 from enhsim_tf.noise.generator import build_generator
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
+from enhsim_tf.simulator.alignment import Waves
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -43,17 +48,20 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
 
 
 def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator:
-    """Builds an untrained simulator of the paper's size. Its speed does not depend on its weights."""
+    """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
-    networks = NoiseGAN(build_generator(window), build_discriminator(window))
-    return EnhancedSimulator(SquareWaveSimulator(waves), build_enhancer(window, hidden_units), networks)
+    layers = tuple(tuple(layer.get_weights()) for layer in build_enhancer(window, hidden_units).layers)
+    enhancer = Enhancer(NETWORK, window, 1, 1, np.zeros(1, np.float32), np.zeros(window, np.float32), layers=layers)
+    residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
+    alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, window)
+    return EnhancedSimulator(alignment, enhancer, WindowBootstrap.fit(residuals), levels=np.array([[0.0, 1.0]]))
 
 
-def enhance_and_noise(num_windows: int, **size: int) -> Work:
-    """Prepares the enhancement of existing coarse windows and the generation of their noise, in memory."""
-    made = simulator(**size)
-    coarse = made.generate_coarse(num_windows)
-    return lambda: made.enhance(coarse) + made.noise.generate(num_windows, seed=0), num_windows
+def enhance_and_noise(num_windows: int, window: int = 500, **size: int) -> Work:
+    """Prepares the enhancement of existing coarse windows and the generation of the paper's noise, in memory."""
+    made, gan = simulator(window, **size), NoiseGAN(build_generator(window), build_discriminator(window))
+    coarse = example_windows(num_windows, window)[0][:, :, None]
+    return lambda: made.enhance(coarse)[:, :, 0] + gan.generate(num_windows, seed=0), num_windows
 
 
 def generate(num_windows: int, **size: int) -> Work:
@@ -63,9 +71,9 @@ def generate(num_windows: int, **size: int) -> Work:
 
 
 def generate_to_parquet(num_windows: int, **size: int) -> Work:
-    """Prepares `EnhancedSimulator.generate_to_parquet` into a temporary folder."""
+    """Prepares the writing of labelled windows to a Parquet file in a temporary folder."""
     made, folder = simulator(**size), tempfile.TemporaryDirectory()
-    return lambda: made.generate_to_parquet(os.path.join(folder.name, "windows.parquet"), num_windows), num_windows
+    return lambda: write_windows_labelled(os.path.join(folder.name, "windows.parquet"), made, [Share(None, num_windows, 0)]), num_windows
 
 
 def matrix_product(size: int = 3_200) -> Work:
