@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-GROUPS = ("enhancer", "gan", "generation", "starting")
+GROUPS = ("enhancer", "gan", "generation", "tool", "starting")
 RESULTS = Path(__file__).parent / "results.json"
 
 

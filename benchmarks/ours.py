@@ -10,10 +10,14 @@ from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.backend import tf
 from enhsim_tf.common.training import fit_windows
+from enhsim_tf.datasets.labelled_windows import Share, write_windows_labelled
+from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.names import NETWORK
 from enhsim_tf.enhancer.network import build_enhancer
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.paper import noise as of_paper
 from enhsim_tf.paper.settings import Settings, make_settings
+from enhsim_tf.simulator.alignment import Waves
 
 
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -51,8 +55,11 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
 def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator:
     """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
-    residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window)).astype(np.float32)
-    return EnhancedSimulator(SquareWaveSimulator(waves), build_enhancer(window, hidden_units), WindowBootstrap.fit(residuals))
+    layers = tuple(tuple(layer.get_weights()) for layer in build_enhancer(window, hidden_units).layers)
+    enhancer = Enhancer(NETWORK, window, 1, 1, np.zeros(1, np.float32), np.zeros(window, np.float32), layers=layers)
+    residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
+    alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, window)
+    return EnhancedSimulator(alignment, enhancer, WindowBootstrap.fit(residuals), levels=np.array([[0.0, 1.0]]))
 
 
 def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:
@@ -62,7 +69,7 @@ def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3
 
     settings = make_settings(window=window, hidden_units=hidden_units)
     enhancer, generator = build(settings), of_paper.build_generator(settings)
-    coarse = simulator(window, 8).generate_coarse(num_windows)
+    coarse = example_windows(num_windows, window)[0]
     noise = np.random.default_rng(0)
     return lambda: enhance(enhancer, coarse) + of_paper.generate_noise(generator, num_windows, settings, noise), num_windows
 
@@ -74,9 +81,9 @@ def generate(num_windows: int, **size: int) -> Work:
 
 
 def generate_to_parquet(num_windows: int, **size: int) -> Work:
-    """Prepares `EnhancedSimulator.generate_to_parquet` into a temporary folder."""
+    """Prepares the writing of labelled windows to a Parquet file in a temporary folder."""
     made, folder = simulator(**size), tempfile.TemporaryDirectory()
-    return lambda: made.generate_to_parquet(os.path.join(folder.name, "windows.parquet"), num_windows), num_windows
+    return lambda: write_windows_labelled(os.path.join(folder.name, "windows.parquet"), made, [Share(None, num_windows, 0)]), num_windows
 
 
 def matrix_product(size: int = 3_200) -> Work:

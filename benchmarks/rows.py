@@ -7,11 +7,13 @@ from two consecutive measurements. The table reports the median and the range of
 import dataclasses
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from benchmarks import tool as of_tool
 from benchmarks.worker import Worker
 
 PARAMETERS = 13_697_400
@@ -31,9 +33,12 @@ class Budget:
     copied_bytes: int = TRAFFIC
     size: dict = dataclasses.field(default_factory=dict)  # of the enhancer, if it differs from the paper's
     gan_size: dict = dataclasses.field(default_factory=dict)
+    fits: int = 3
+    rows: tuple[int, ...] = (2_700, 1_000_000, 100_000)  # samples of a fit and of scoring one channel, and of a fit of ten channels
+    labelled_windows: int = 100_000
 
 
-QUICK = Budget(2, 2, 1, 1, 64, 10_000, {"window": 125, "hidden_units": 32}, {"window": 125, "filters": 8})
+QUICK = Budget(2, 2, 1, 1, 64, 10_000, {"window": 125, "hidden_units": 32}, {"window": 125, "filters": 8}, 1, (1_000, 2_000, 1_000), 100)
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:
@@ -129,6 +134,31 @@ def generation(budget: Budget) -> Iterator[dict]:
     yield compared("generation of a window, coarse simulator included", found["generate"], "matrix-product rate", product)
     window = "generation of a window to Parquet"
     yield compared(window, found["generate_to_parquet"], "generation in memory", found["generate"], target=1.67)
+
+
+def tool(budget: Budget) -> Iterator[dict]:
+    """Benchmarks the tool without a network: processor time of whole commands against what they may take, and generation against NumPy."""
+    short, long, joint = budget.rows
+    with tempfile.TemporaryDirectory() as folder:
+        model = f"{folder}/model"
+        works = {
+            f"default fit, {short:,} samples": (("fit", "1", str(short), model), 10),
+            f"default fit, ten channels jointly, {joint:,} rows": (("fit", "10", str(joint)), 60),
+            f"score, {long:,} samples": (("score", model, str(long)), 5),
+            f"score by the residual, {long:,} samples": (("score", model, str(long), "residual"), 10),
+            f"{budget.labelled_windows:,} labelled windows to Parquet": (("windows", model, str(budget.labelled_windows), folder), 5),
+        }
+        for work, (arguments, bar) in works.items():
+            ours = [of_tool.seconds_of(*arguments) for _ in range(budget.fits)]
+            yield compared(work, ours, f"{bar} s of processor time", [bar] * len(ours), "s", target=1.0)
+    number = 6 * budget.windows
+    workers = {
+        name: Worker("tool", "generation", noise=name, num_windows=number) for name in ("residual windows", "matched residual windows")
+    }
+    workers["NumPy"] = Worker("tool", "product_gather_sum", num_windows=number)
+    found = measure(workers, budget.repetitions)
+    for name, target in (("residual windows", 2.0), ("matched residual windows", 4.0)):
+        yield compared(f"generation of a window, ridge and {name}", found[name], "product, gather and sum", found["NumPy"], target=target)
 
 
 def starting(budget: Budget) -> Iterator[dict]:

@@ -47,7 +47,8 @@ class SquareWave:
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """Evaluates the wave at times in seconds; returns a float64 array of the same shape."""
-        cycle = np.mod(np.asarray(time_s, np.float64) / self.period_s + self.phase, 1.0)
+        cycle = np.asarray(time_s, np.float64) / self.period_s + self.phase
+        cycle -= np.floor(cycle)  # the same as a modulus, in a fraction of the time
         above = cycle < self.duty
         if self.num_levels == 2:
             share = above.astype(np.float64)

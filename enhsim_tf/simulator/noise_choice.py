@@ -212,6 +212,10 @@ class HeldOutJudge:
             covariance = np.einsum("wsa,wsb->wab", centred, centred)
             size = np.sqrt(np.maximum(np.einsum("waa->wa", covariance), 1e-12))
             columns.append((covariance / (size[:, :, None] * size[:, None]))[:, *np.triu_indices(noise.shape[2], 1)])
+            # where the signal of the first channel of a pair is high minus where it is low
+            sign = np.sign(windows.clean - windows.clean.mean(axis=(0, 1)))
+            by_signal = np.einsum("wsa,wsb->wab", sign * centred, centred) / (size[:, :, None] * size[:, None])
+            columns.append(by_signal[:, ~np.eye(noise.shape[2], dtype=bool)])
         return np.concatenate(columns, axis=1)
 
     def _seen(self, windows: NoiseWindows) -> np.ndarray:

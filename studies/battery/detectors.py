@@ -1,14 +1,14 @@
 """The enhanced simulator as a source of training data for detectors and as a reference, judged on the fine simulator with noise."""
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from enhsim_tf.enhancer.ladder import fit_rung
 
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
+from enhsim_tf.enhancer.candidates import fit_enhancer
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from studies.battery.errors import about
 from studies.battery.faults import ALL, Fault
@@ -42,18 +42,20 @@ class Judge:
     Args:
         recorded: The runs.
         pairs: The windows that the simulator is fitted to.
-        candidate: The enhancer, one of `errors.CANDIDATES`.
+        candidate: The enhancer, one of `enhancer.names.CANDIDATES`.
         seed: Seed of everything drawn.
     """
 
     def __init__(self, recorded: Recorded, pairs: PairWindows, candidate: str, seed: int):
         self.recorded, self.pairs, self.candidate, self.seed = recorded, pairs, candidate, seed
-        self.enhance = self._fit(slice(None)).predict
+        self.enhance = self._fit(slice(None))
         self.num_fit, self.num_coarse = (len(recorded.get(part, "coarse")) // ORBIT_SAMPLES - 1 for part in ("fit", "coarse"))
         self.num_stretches = max(1, len(recorded.get("test", "coarse")) // len(recorded.get("fault", "coarse")))
 
-    def _fit(self, rows: Any) -> Any:
-        return fit_rung(self.candidate, self.pairs.coarse[rows], self.pairs.telemetry[rows], self.pairs.starts[rows], self.seed)
+    def _fit(self, rows: Any) -> Callable[[np.ndarray], np.ndarray]:
+        pairs = self.pairs
+        enhancer = fit_enhancer(self.candidate, pairs.coarse[rows], pairs.telemetry[rows], pairs.starts[rows], self.seed)
+        return lambda coarse: enhancer.predict(coarse)[:, :, 0]
 
     @functools.cached_property
     def residuals(self) -> np.ndarray:
@@ -65,7 +67,7 @@ class Judge:
         edges = block_edges(int(starts.min()), int(starts.max()) + WINDOW, WINDOW)
         for fold in range(_NUM_FOLDS):
             learnt, rest = split_fold(starts, WINDOW, edges, fold)
-            found.append(self.pairs.telemetry[rest] - self._fit(learnt).predict(self.pairs.coarse[rest]))
+            found.append(self.pairs.telemetry[rest] - self._fit(learnt)(self.pairs.coarse[rest]))
         return np.concatenate(found)
 
     @functools.cached_property

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from enhsim_tf.enhancer.ladder import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK, fit_ladder, fit_rung
-from enhsim_tf.enhancer.scaling import Scaling
 
 from enhsim_tf.detection.metrics import threshold
+from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer
+from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
 from studies.battery.faults import ALL, Fault
@@ -16,8 +16,6 @@ from studies.battery.windows import NUM_FAULT, NUM_TEST, PairWindows, coarse_win
 
 Predict = Callable[[np.ndarray], np.ndarray]
 
-CANDIDATES = (COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_NETWORK)
-"""The enhancers that are chosen among, with every coarse column as input, the simplest first."""
 ENHANCERS = {
     "coarse itself": (COARSE, 3),
     "level and gain": (LEVEL_AND_GAIN, 1),
@@ -49,30 +47,30 @@ def fit_enhancers(pairs: PairWindows, names: tuple[str, ...], seed: int, paper_e
         For each name a function from coarse windows of all columns to enhanced windows.
     """
 
-    def with_columns(predict: Predict, columns: int) -> Predict:
-        return lambda inputs: predict(inputs[:, :, :columns])
+    def fitted(kind: str, columns: int) -> Predict:
+        epochs = {"epochs": paper_epochs} if kind == NETWORK else {}
+        enhancer = fit_enhancer(kind, pairs.coarse[:, :, :columns], pairs.telemetry, pairs.starts, seed, **epochs)
+        return lambda windows: enhancer.predict(windows[:, :, :columns])[:, :, 0]
 
     found = {}
     for name in names:
         kind, columns = ENHANCERS[name]
-        inputs = pairs.coarse[:, :, :columns]
         if kind == "nearest":
-            number = choose_num_neighbours(inputs, pairs.telemetry, pairs.starts)
+            number = choose_num_neighbours(pairs.coarse, pairs.telemetry, pairs.starts)
             found[name] = lambda windows, number=number: nearest_windows(pairs.coarse, pairs.telemetry, windows, number)
         elif kind == COARSE:
             found[name] = lambda windows: windows[:, :, 0]
         else:
-            epochs = {"epochs": paper_epochs} if kind == NETWORK else {}
-            found[name] = with_columns(fit_rung(kind, inputs, pairs.telemetry, pairs.starts, seed, **epochs).predict, columns)
+            found[name] = fitted(kind, columns)
     return found
 
 
 def choice_rows(pairs: PairWindows, seed: int) -> list[dict[str, Any]]:
-    """Chooses one of `CANDIDATES` on held-out blocks of the orbits that it is fitted to, with a row for each candidate."""
-    ladder = fit_ladder(pairs.coarse, pairs.telemetry, pairs.starts, CANDIDATES, seed, refit="chosen")
+    """Chooses an enhancer of all coarse columns as `fit` does, with a row for each candidate that was tried."""
+    choice = choose_enhancer(pairs.coarse, pairs.telemetry, pairs.starts, seed=seed)
     return [
-        {"candidate": each.name, "error": each.error, "standard_error": each.standard_error, "is_chosen": each.name == ladder.chosen}
-        for each in ladder.judged
+        {"candidate": each.name, "error": each.error, "standard_error": each.standard_error, "is_chosen": each.name == choice.enhancer.name}
+        for each in choice.judged
     ]
 
 
@@ -116,14 +114,18 @@ def trust_rows(recorded: Recorded, pairs: PairWindows) -> list[dict[str, Any]]:
         recorded: The runs.
         pairs: The windows that the enhancers are fitted to.
     """
-    scaling = Scaling.fit(pairs.coarse, pairs.telemetry)
-    score = OutOfRange().fit(scaling.scale_inputs(pairs.coarse))
-    limit = threshold(score.score(scaling.scale_inputs(coarse_windows(recorded, "coarse", NUM_WINDOWS))), _RATE)
+    centre, scale = (np.asarray(measure(pairs.coarse, axis=(0, 1), dtype=np.float64)) for measure in (np.mean, np.std))
+
+    def in_unit(windows: np.ndarray) -> np.ndarray:
+        return ((windows - centre) / scale).reshape(len(windows), -1).astype(np.float32)
+
+    score = OutOfRange().fit(in_unit(pairs.coarse))
+    limit = threshold(score.score(in_unit(coarse_windows(recorded, "coarse", NUM_WINDOWS))), _RATE)
     rows = []
     for fault in (None, *ALL):
         part, number = ("test", NUM_TEST) if fault is None else ("fault", NUM_FAULT)
         windows = coarse_windows(recorded, part, number, fault)
-        rows.append(about(fault) | {"out_of_range": float(np.mean(score.score(scaling.scale_inputs(windows)) > limit))})
+        rows.append(about(fault) | {"out_of_range": float(np.mean(score.score(in_unit(windows)) > limit))})
     return rows
 
 

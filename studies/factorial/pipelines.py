@@ -9,7 +9,6 @@ import numpy as np
 
 from enhsim_tf.detection import evaluation
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.enhancer.training_pairs import paired_windows
 from enhsim_tf.noise.surrogates import GaussianAutoregression
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.windows import random_window_starts
@@ -28,6 +27,7 @@ from studies.factorial.cells import (
     cells_by_source,
 )
 from studies.robustness.replicate import Replicate
+from studies.robustness.second_pipeline import paired_windows
 
 if TYPE_CHECKING:
     import pandas as pd

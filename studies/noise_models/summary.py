@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from enhsim_tf.enhanced_simulator.noise_choice import MAX_ALARM_EXCESS, MAX_RECALL_LOSS, CandidateJudgement, choose
 
+from enhsim_tf.simulator.noise_choice import MAX_ALARM_EXCESS, MAX_RECALL_LOSS, CandidateJudgement, choose
 from studies.common.noise_gallery import LOOKED_AT
 from studies.common.tables import KeptTables
 

@@ -4,14 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.enhancer.baselines import nearest_window_means
-from enhsim_tf.enhancer.training_pairs import cut_pairs, window_errors
+from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
+from enhsim_tf.simulator.alignment import Waves
 from enhsim_tf.telemetry.telemanom import LabelledChannel
-from enhsim_tf.telemetry.windows import disjoint_starts, evenly_spaced_starts
+from enhsim_tf.telemetry.windows import cut_windows, disjoint_starts, evenly_spaced_starts
 from studies.spacecraft.judging import windows_that_meet
 
 if TYPE_CHECKING:
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 METHODS = ("coarse", "ridge", "nearest windows", "enhanced")
 
@@ -36,20 +36,38 @@ def error_rows(
     window, train, test = simulator.window, channel.train, channel.test
     begins = disjoint_starts(len(test), window)
     begins = begins[~windows_that_meet(begins, window, channel.labels.sequences).any(axis=0)]
-    pairs = cut_pairs([test], simulator.coarse, begins, window, follow=True)
-    aligned = ridge.align_to_enhanced(pairs)
-    starts = evenly_spaced_starts([train], window, num_windows)
-    learnt = ridge.align_to_enhanced(cut_pairs([train], ridge.coarse, starts, window, follow=True))
+    targets = cut_windows(test.values, begins, window)[:, :, None]
+    square, aligned = _waves(simulator, False).align(targets), _waves(ridge, True).align(targets)
     estimates = {
-        "coarse": pairs.coarse_rescaled,
-        "ridge": ridge.follow(aligned),
-        "nearest windows": nearest_window_means(learnt, aligned, train.interval_s),
-        "enhanced": simulator.follow(simulator.align_to_enhanced(pairs)),
+        "coarse": square.shift[:, None] + square.gain[:, None] * square.coarse,
+        "ridge": ridge.enhance(*aligned),
+        "nearest windows": aligned.shift[:, None] + aligned.gain[:, None] * _nearest(ridge, train.values, num_windows, aligned.coarse),
+        "enhanced": simulator.enhance(*_waves(simulator, True).align(targets)),
     }
+    deviation = targets.std(axis=(1, 2), dtype=np.float64)
+    deviation = np.where(deviation > 0, deviation, np.nan)  # the quotient is undefined for constant targets
     rows = []
     for method in METHODS:
-        errors = window_errors(estimates[method], pairs.target)
+        errors = np.sqrt(np.mean((estimates[method] - targets) ** 2, axis=(1, 2), dtype=np.float64)) / deviation
         errors = errors[~np.isnan(errors)]
         lower, median, upper = np.quantile(errors, [0.25, 0.5, 0.75]).tolist()
         rows.append({"method": method, "lower": lower, "nrmse": median, "upper": upper, "windows": len(errors)})
     return rows
+
+
+def _waves(simulator: "EnhancedSimulator", is_enhanced: bool) -> Waves:
+    """The alignment by the square wave itself, or by its waveform as the simulator enhances it."""
+    waves = simulator.alignment
+    waveforms = [simulator.enhance(waves.phases(0)[:, :, None])[:, :, 0]] if is_enhanced else None
+    return Waves(waves.simulators, waves.channels, waves.interval_s, waves.window, waveforms)
+
+
+def _nearest(ridge: "EnhancedSimulator", train: np.ndarray, num_windows: int, coarse: np.ndarray) -> np.ndarray:
+    """The means of the train windows, in units of the wave, whose coarse windows are nearest."""
+    starts = evenly_spaced_starts([train], ridge.window, num_windows)
+    windows, waves = cut_windows(train, starts, ridge.window)[:, :, None], _waves(ridge, True)
+    learnt, shift, gain = waves.align(windows)
+    kept = ~waves.is_flat(gain)
+    inputs, targets = learnt[kept], ((windows - shift[:, None])[kept] / gain[kept][:, None])[:, :, 0].astype(np.float32)
+    number = choose_num_neighbours(inputs, targets, starts[kept])
+    return nearest_windows(inputs, targets, coarse, number)[:, :, None]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.detection.discord import left_discord
+from enhsim_tf.detection.registry import RESIDUAL
 from enhsim_tf.detection.residual_size import ResidualSize
 from enhsim_tf.telemetry.telemanom import LabelledChannel
 from enhsim_tf.telemetry.windows import cut_windows
@@ -14,7 +15,7 @@ from studies.spacecraft.judging import STRIDES, Judge
 from studies.spacecraft.training_data import REAL
 
 if TYPE_CHECKING:
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 REFERENCE = "reference"
 """What the table names as the training data of detectors that judge the residual of a simulator."""
@@ -36,7 +37,8 @@ def reference_rows(
         simulators: Simulators that were fitted to its train part, with the window of `judge`, by the name of their residual detector.
         settings: All settings; `labelled` and `seed` are used.
     """
-    from enhsim_tf.enhanced_simulator.residual_detector import AlignedResidual
+    from enhsim_tf.simulator.options import ScoreOptions
+    from enhsim_tf.simulator.scoring import Scorer
 
     window, seed, train = judge.window, settings.seed, channel.train.values
     number = settings.labelled.num_arm_windows
@@ -44,12 +46,12 @@ def reference_rows(
     past = cut_windows(train, starts, window)
     rows = []
     for name, simulator in simulators.items():
-        series = simulator.generate_series(number // 2 * window, seed=seed + 1)  # of 1,000 windows, as in the command `score`
+        series = simulator.generate_series(number // 2 * window, seed=seed + 1)[:, 0]  # of 1,000 windows, as in the command `score`
         generated = cut_windows(series, np.arange(0, len(series) - window + 1, max(1, window // STRIDES)), window)
-        aligned = AlignedResidual(simulator).fit(simulator.generate(number, seed=seed))
-        sizes = [aligned.sizes(windows) for windows in (judge.windows, generated, past)]
+        scorer = Scorer(simulator, ScoreOptions(RESIDUAL, number, settings.labelled.false_alarm_rate, seed))
+        sizes = [scorer.score_windows(windows[:, :, None]) for windows in (judge.windows, generated, past)]
         for ending, bound in BOUNDS.items():
-            detector = ResidualSize(bound).fit_sizes(np.array([aligned.size.typical]))
+            detector = ResidualSize(bound).fit_sizes(np.array([scorer.detector.typical]))
             rows.append({"training": REFERENCE, "detector": name + ending} | judge.judge(*map(detector.score_sizes, sizes)))
     late = starts[starts >= len(train) // 3]  # the first windows have hardly any before them
     before = left_discord(train, late, window)

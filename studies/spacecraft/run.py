@@ -16,7 +16,8 @@ from studies.common.settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 TABLES = ("channels", "enhancement", "detectors")
 SIMULATORS = {"network": "the paper's network", "ridge": "tuned ridge regression"}
@@ -93,7 +94,7 @@ def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stag
     }
 
     def judge(folder: Path) -> None:
-        from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+        from enhsim_tf.simulator.simulator import EnhancedSimulator
 
         simulators = {enhancer: EnhancedSimulator.load(path / "simulator") for enhancer, path in fits.items()}
         for table, rows in judge_channel(channel, simulators, settings, stages).items():
@@ -104,8 +105,8 @@ def tables_of_channel(channel: LabelledChannel, settings: Settings, stages: Stag
 
 
 def _fit(folder: Path, channel: LabelledChannel, enhancer: str, settings: Settings, stages: Stages) -> None:
-    from enhsim_tf.enhanced_simulator.fit_options import FitOptions
-    from enhsim_tf.enhanced_simulator.fitting import fit_simulator
+    from enhsim_tf.simulator.fitting import fit
+    from enhsim_tf.simulator.options import FitOptions
 
     chosen = settings.labelled
     options = FitOptions(
@@ -116,8 +117,8 @@ def _fit(folder: Path, channel: LabelledChannel, enhancer: str, settings: Settin
         seed=settings.seed,
         enhancer=enhancer,
     )
-    simulator = fit_simulator([channel.train], options, 0, stages.progress)
-    if getattr(simulator.coarse, "is_constant", False):
+    simulator, _ = fit(channel.train, options=options, progress=stages.progress)
+    if simulator.alignment.simulators[0].is_constant:
         raise InputError(
             f"Expected a periodic channel, because the study compares enhancers of square waves. Received: {channel.labels.channel}, "
             "whose coarse simulator is a constant level. Use another channel."
@@ -136,7 +137,7 @@ def judge_channel(
 
     network, ridge = simulators["network"], simulators["ridge"]
     chosen, train, window = settings.labelled, channel.train, network.window
-    period = max(wave.period_s for wave in network.coarse.waves) / train.interval_s
+    period = max(wave.period_s for wave in network.alignment.simulators[0].waves) / train.interval_s
     judge = Judge(channel, window, period, chosen.false_alarm_rate)
     real = real_windows(train, window, chosen.num_arm_windows)
     generated = generators(train, network, ridge, settings, stages.progress)

@@ -5,21 +5,22 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from enhsim_tf.enhanced_simulator.checks import check_finite
 
 from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.simulator.checks import check_finite
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
+from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, random_window_starts
 from studies.common.settings import Settings
 from studies.spacecraft.judging import Judge, cross_fitted_scores
 
 if TYPE_CHECKING:
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
 
 REAL = "real"
+_START_RANGE = 1_000_000  # generated windows begin at a random sample below this one
 TRAINING = {
     REAL: "the channel's own nominal train part",
     "coarse": "the coarse simulator at the levels of the train part",
@@ -53,7 +54,9 @@ def generators(
     """
     chosen, window = settings.labelled, simulator.window
     number = chosen.num_arm_windows
-    residuals = simulator.residual_windows(train, chosen.num_windows, np.random.default_rng([settings.seed, 1]))
+    starts = random_window_starts([train], window, chosen.num_windows, np.random.default_rng([settings.seed, 1]))
+    windows = cut_windows(train.values, starts, window)[:, :, None]
+    residuals = (windows - simulator.enhance(*simulator.alignment.align(windows)))[:, :, 0]
     noises = {
         "GAN": lambda: _fit_paper_gan(residuals, chosen.num_iterations, settings.seed, progress),
         "Gaussian": lambda: GaussianNoise.fit(residuals),
@@ -63,14 +66,22 @@ def generators(
 
     def with_noise(fit: Callable[[], Any]) -> Callable[[int], np.ndarray]:
         fit = functools.cache(fit)  # one model for training and thresholds
-        return lambda seed: simulator.generate_clean(number, seed=seed) + fit().generate(number, np.random.default_rng(seed))
+        return lambda seed: simulator.generate_clean(number, seed=seed)[:, :, 0] + fit().generate(number, np.random.default_rng(seed))
 
     return {
-        "coarse": lambda seed: simulator.generate_coarse(number, seed=seed),
-        "enhanced": lambda seed: simulator.generate_clean(number, seed=seed),
+        "coarse": lambda seed: _coarse_windows(simulator, number, seed),
+        "enhanced": lambda seed: simulator.generate_clean(number, seed=seed)[:, :, 0],
         **{f"enhanced + {name}": with_noise(fit) for name, fit in noises.items()},
-        "ridge + residual windows": lambda seed: ridge.generate(number, seed=seed),
+        "ridge + residual windows": lambda seed: ridge.generate(number, seed=seed)[:, :, 0],
     }
+
+
+def _coarse_windows(simulator: "EnhancedSimulator", number: int, seed: int) -> np.ndarray:
+    """Square waves of random phases, at offsets and gains of the train part."""
+    rng = np.random.default_rng(seed)
+    drawn = simulator.alignment.draw(rng.integers(0, _START_RANGE, number), [None] * number, rng).coarse[:, :, 0]
+    shift, gain = simulator.levels[rng.integers(0, len(simulator.levels), number), 0].T
+    return (shift[:, None] + gain[:, None] * drawn).astype(np.float32)
 
 
 def _fit_paper_gan(residuals: np.ndarray, num_iterations: int, seed: int, progress: Progress) -> Any:

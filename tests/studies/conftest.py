@@ -23,7 +23,7 @@ def numbers_of():
 @pytest.fixture
 def narrow_networks(monkeypatch):
     """Every enhancer has 64 units in each hidden layer instead of 3,200."""
-    from enhsim_tf.enhancer import network
+    from enhsim_tf.enhancer import candidates, network
 
     wide = network.build_enhancer
 
@@ -31,3 +31,4 @@ def narrow_networks(monkeypatch):
         return wide(window, 64, seed=seed)
 
     monkeypatch.setattr(network, "build_enhancer", narrow)
+    monkeypatch.setattr(candidates, "_PAPER_UNITS", 64)

@@ -4,8 +4,8 @@ import sys
 
 import numpy as np
 import pytest
-from enhsim_tf.enhancer.ladder import RIDGE
 
+from enhsim_tf.enhancer.names import RIDGE
 from studies.battery import classifiers, detectors, errors, simulate, windows
 from studies.battery.__main__ import command
 from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, Judge, alarm_rows
