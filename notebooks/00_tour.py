@@ -238,8 +238,9 @@ with drawing(alt, 2, 2.6, title, sharey=True) as panels:
 # %% [markdown]
 # *What to see:* trained on the clean signal, every detector raises a false alarm on every window. With the GAN's noise the result depends
 # on the detector. Plain Gaussian noise of the right size gives few false alarms with all three, because the real noise of this example is
-# white; its price is that the autoencoder finds fewer faults. Trained on raw square waves, a detector raises few alarms for a bad reason:
-# it cannot follow their edges, so its threshold is high, and it finds fewer faults than after training on real telemetry. The dotted line
+# white; its price is that the autoencoder finds fewer faults. Trained on raw square waves, the PCA residual and the forest raise few alarms
+# for a bad reason: they cannot follow the edges, so their thresholds are high, and they find fewer faults than after training on real
+# telemetry. The dotted line
 # marks the 1 % that was asked for. Recall counts only beside few false alarms: who always alarms finds everything.
 
 # %%
@@ -252,7 +253,7 @@ for arm in arms:
 if budget == "full":  # noise of the wrong size would teach a detector nothing
     assert rates["enhanced"].min() > 0.5
     assert rates["enhanced + GAN noise"][0] > 0.9 and rates["enhanced + Gaussian noise"].max() < 0.15
-    assert rates["coarse"].max() < 0.05 and (recall["coarse"] < recall["real"] - 0.1).all()
+    assert rates["coarse"][:2].max() < 0.05 and (recall["coarse"][:2] < recall["real"][:2] - 0.1).all()
 
 # %% [markdown]
 # ## Where each stage fails
@@ -268,8 +269,8 @@ if budget == "full":  # noise of the wrong size would teach a detector nothing
 # %% [markdown]
 # The verdicts below are those of the one seed that this book shows. (The lessons were not all executed on the same machine. On another
 # processor, the same seed trains a GAN whose measures differ a little.) The published verdicts rest on several readings of the paper, seeds
-# and processors ([readings](../studies/readings/README.md)). (*AUC*: the area under the curve of a classifier that tries to tell generated from real: 0.5 if it cannot, 1 if it
-# always can.)
+# and processors ([readings](../studies/readings/README.md)). (*AUC*: the area under the curve of a classifier that tries to tell
+# generated from real: 0.5 if it cannot, 1 if it always can.)
 
 # %%
 claim("C6", "C8", "C9")

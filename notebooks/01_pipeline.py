@@ -87,9 +87,9 @@ assert difference < 1e-5
 #
 # ## Exercises
 #
-# **1.** A detector needs days, not windows. The next cell puts 100 generated windows of noise end to end on the enhanced signal, as figure 7
-# does. Has the series seams? Complete the function: the mean size of the step from sample to sample, at each of the 500 places within a
-# window.
+# **1.** A detector needs days, not windows. The next cell puts 100 generated windows of noise end to end on the enhanced signal, as
+# figure 7 does. Has the series seams? Complete the function: the mean size of the step from sample to sample, at each of the 500 places
+# within a window.
 
 # %%
 window = pipeline.settings.window

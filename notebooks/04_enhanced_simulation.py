@@ -173,9 +173,9 @@ claim("C1", "C2", "C3")
 # %% [markdown]
 # ## The verdicts
 #
-# The last limit of C1, below ridge regression, and the last one of C2, twice the time of one line of NumPy, are hurdles of this project. They
-# are shown and do not decide. The speed (C2) depends on the machine and on what else it does. Elsewhere in this book it comes from another
-# run, and differs.
+# The last limit of C1, below ridge regression, and the last one of C2, twice the time of one line of NumPy, are hurdles of this project.
+# They are shown and do not decide. The speed (C2) depends on the machine and on what else it does. Elsewhere in this book it comes from
+# another run, and differs.
 
 # %%
 records = verdict(pipeline, "C1", "C2", "C3")

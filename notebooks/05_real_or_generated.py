@@ -73,7 +73,8 @@ assert auc > 0.8
 show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* little at a glance. But what is shared is invisible in a single window. Here are the mean of the four real windows and the mean of the four generated ones:
+# *What to see:* little at a glance. But what is shared is invisible in a single window. Here are the mean of the four real windows and
+# the mean of the four generated ones:
 
 # %%
 four_generated = pipeline.generate_noise(4, pipeline.draw("figure 6"))
@@ -122,8 +123,8 @@ assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[budget]
 show(pipeline, "fig07_real_or_generated_series")
 
 # %% [markdown]
-# *What to see:* all stretches keep the rhythm of the satellite for as long as you look. The next cell makes one of each kind anew, as long as the
-# whole test part.
+# *What to see:* all stretches keep the rhythm of the satellite for as long as you look. The next cell makes one of each kind anew, as
+# long as the whole test part.
 
 # %%
 orbit, size = 480, pipeline.settings.window  # samples

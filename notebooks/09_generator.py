@@ -102,7 +102,8 @@ for ours, theirs in zip(generator.get_weights(), packaged.get_weights()):
     np.testing.assert_allclose(ours, theirs, atol=1e-5)
 moved = float(np.abs(generator.get_weights()[0] - first[0]).max())
 say(
-    f"Loss before the update: **{loss:.2f}**; guessing gives {np.log(2):.2f}. Neither network is trained. The weights of the first layer moved by up to {moved:.4f}."
+    f"Loss before the update: **{loss:.2f}**; guessing gives {np.log(2):.2f}. Neither network is trained. "
+    f"The weights of the first layer moved by up to {moved:.4f}."
 )
 
 # %% [markdown]

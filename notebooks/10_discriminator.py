@@ -44,8 +44,8 @@ discriminator = keras.Sequential(
 show(pipeline, "fig10_discriminator")
 
 # %% [markdown]
-# *What to see:* the maximum in the third row. (Dropout, from the author's code, sets a random 30 % of its inputs to zero in training, and does
-# nothing afterwards.) Each filter is a pattern of 20 samples. It is compared with the window at 121 places, and
+# *What to see:* the maximum in the third row. (Dropout, from the author's code, sets a random 30 % of its inputs to zero in training,
+# and does nothing afterwards.) Each filter is a pattern of 20 samples. It is compared with the window at 121 places, and
 # only the best match is kept: the discriminator knows that a pattern was *somewhere*, not where, and not how often.
 
 # %%
@@ -81,8 +81,8 @@ np.testing.assert_allclose(by_hand, of_keras, atol=1e-5)  # 32-bit sums of 20 pr
 #
 # $$L_D=-\tfrac12\,\mathrm{mean}\,\ln D(x)-\tfrac12\,\mathrm{mean}\,\ln\left(1-D(G(z))\right).$$
 #
-# The paper "trains on the entire batch (200 rows) of real and generated data", so there is one step for both terms. (The author's code takes
-# one for each.) The generated windows are given: no gradient goes to the generator.
+# The paper "trains on the entire batch (200 rows) of real and generated data", so there is one step for both terms. (The author's code
+# takes one for each.) The generated windows are given: no gradient goes to the generator.
 
 # %%
 import tensorflow as tf
@@ -99,9 +99,9 @@ def update_discriminator(discriminator, optimizer, real, generated):
 
 
 # %% [markdown]
-# The package has the same step. The loop below compares them over five updates, without dropout, whose random draws would differ. The package
-# computes convolution and maximum by a faster path in another order of summation; the tolerance, a tenth of what a weight moves, allows for
-# its rounding.
+# The package has the same step. The loop below compares them over five updates, without dropout, whose random draws would differ. The
+# package computes convolution and maximum by a faster path in another order of summation; the tolerance, a tenth of what a weight moves,
+# allows for its rounding.
 
 # %%
 import dataclasses

@@ -99,9 +99,9 @@ def train_step(real, latent, latent_again):
 #
 # ## The same numbers as the package
 #
-# `NoiseGAN` in `enhsim_tf/paper/noise.py` is a Keras model with this step. Both start from the same weights and get the same rows and latent
-# vectors; without dropout, whose draws would differ. After five iterations Adam has moved weights by up to 0.005. Rounding is magnified by
-# Adam, which divides small gradients by their own size; the tolerance is a fifth of that movement.
+# `NoiseGAN` in `enhsim_tf/paper/noise.py` is a Keras model with this step. Both start from the same weights and get the same rows and
+# latent vectors; without dropout, whose draws would differ. After five iterations Adam has moved weights by up to 0.005. Rounding is
+# magnified by Adam, which divides small gradients by their own size; the tolerance is a fifth of that movement.
 
 # %%
 import dataclasses
@@ -136,8 +136,8 @@ for ours, theirs in ((a, b) for pair in pairs for a, b in zip(*(model.get_weight
 # %% [markdown]
 # ## Training, and the noise forming
 #
-# From here on with dropout, the loop goes on to the paper's number of iterations. Every 20 iterations, we keep what the generator makes of the
-# same 500 latent vectors.
+# From here on with dropout, the loop goes on to the paper's number of iterations. Every 20 iterations, we keep what the generator makes
+# of the same 500 latent vectors.
 
 # %%
 for drop in drops:
@@ -266,8 +266,8 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** The author's code reads the paper otherwise: *two* updates of the discriminator, one on real rows and one on generated ones. Write this
-# pair of updates. The check compares it with the package's setting `update="two of 200"`.
+# **2.** The author's code reads the paper otherwise: *two* updates of the discriminator, one on real rows and one on generated ones.
+# Write this pair of updates. The check compares it with the package's setting `update="two of 200"`.
 
 
 # %%

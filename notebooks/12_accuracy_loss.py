@@ -15,7 +15,7 @@
 
 # %%
 import numpy as np
-from lesson_tools import ROOT, check_answer, claim, drawing, open_pipeline, say, show, verdict
+from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show, verdict
 
 from enhsim_tf.common.plot_style import GENERATED, QUIET
 
@@ -26,27 +26,32 @@ claim("C4", "C5")
 # ## How the curves are measured
 #
 # Every 100 iterations, the discriminator judges 200 new real rows and 200 new generated ones. With its probabilities $D$, accuracy and
-# loss are two lines of NumPy:
+# loss are two lines of NumPy. Here they are for the networks after the paper's number of iterations:
 
 # %%
 import keras
 import tensorflow as tf
 
-gan = experiment.simulator.noise
-noise = pipeline.noise_windows("train", pipeline.settings.num_windows, "noise windows")
-rows, seeds = tf.constant(noise[:, :, None]), keras.random.SeedGenerator(pipeline.settings.seed + 1)
+from enhsim_tf.paper.noise import NoiseGAN, build_discriminator
 
-real = tf.gather(rows, keras.random.randint((gan.batch_size,), 0, len(noise), seed=seeds))
-generated = gan.generator(keras.random.normal((gan.batch_size, 16), seed=seeds), training=False)
+settings = pipeline.settings
+discriminator = build_discriminator(settings)
+discriminator.load_weights(pipeline.gan_folder / "discriminator.weights.h5")
+noise = pipeline.noise_windows("train", settings.num_windows, "noise windows")
+real = np.random.default_rng(0).choice(noise, settings.rows)[:, :, None]
+latent = keras.random.normal((settings.rows, 16), seed=keras.random.SeedGenerator(settings.seed))
+generated = pipeline.generator(latent, training=False)
 by_hand = {}
 for kind, batch, is_real in (("real", real, True), ("generated", generated, False)):
-    D = np.asarray(gan.discriminator(batch, training=False), float)
+    D = np.asarray(discriminator(batch, training=False), float)
     by_hand[f"accuracy_{kind}"] = np.mean((D > 0.5) == is_real)
     by_hand[f"loss_{kind}"] = np.mean(-np.log(D if is_real else 1 - D))
 
-packaged = gan._evaluate(rows)  # what the package records; the same draws
+gan = NoiseGAN(pipeline.generator, discriminator, settings)
+gan.compile()
+packaged = gan.test_step(tf.constant(real))  # what the package records; it draws the same latent vectors
 for name, value in by_hand.items():
-    np.testing.assert_allclose(value, packaged[name], rtol=1e-4)  # Keras computes the loss in 32 bits
+    np.testing.assert_allclose(value, float(packaged[name]), rtol=1e-4)  # Keras computes the loss in 32 bits
 say(", ".join(f"{name.replace('_', ', ')}: **{value:.2f}**" for name, value in by_hand.items()) + ".")
 
 # %% [markdown]
@@ -54,25 +59,26 @@ say(", ".join(f"{name.replace('_', ', ')}: **{value:.2f}**" for name, value in b
 # chance in the figure.
 
 # %%
-history = show(pipeline, "fig12_accuracy_loss")
+show(pipeline, "fig12_accuracy_loss")
+num_records = settings.iterations // settings.record_every
+history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* the discriminator learns first. Then the generator catches up, and both losses stay near ln 2. In the second half, when
-# one accuracy rises, the other falls: the discriminator has an opinion, but it is about as often wrong as right.
+# *What to see:* both losses stay near ln 2 all the time. When one accuracy rises, the other falls: the discriminator has an opinion, but
+# it is about as often wrong as right.
 
 # %%
 last = {key: float(values[-1]) for key, values in history.items()}
 both = (last["accuracy_real"] + last["accuracy_generated"]) / 2
 mean_loss = (last["loss_real"] + last["loss_generated"]) / 2
-half = slice(len(history["iteration"]) // 2, None)
-of_real, of_generated = (history[f"accuracy_{kind}"][half] for kind in ("real", "generated"))
+of_real, of_generated = (history[f"accuracy_{kind}"] for kind in ("real", "generated"))
 varies = of_real.std() > 0 and of_generated.std() > 0  # at smoke budget they may not
 together = np.corrcoef(of_real, of_generated)[0, 1] if varies else 0.0
 say(
     f"At the end, over both kinds: accuracy **{both:.2f}**, loss **{mean_loss:.2f}** (ln 2 = {np.log(2):.2f}). Correlation of the two "
-    f"accuracies in the second half: **{together:.2f}**."
+    f"accuracies: **{together:.2f}**."
 )
-assert abs(both - 0.5) < 0.2
+assert abs(both - 0.5) < {"full": 0.2, "smoke": 0.6}[budget]
 assert abs(mean_loss - np.log(2)) < {"full": 0.15, "smoke": 3.0}[budget]
 assert budget == "smoke" or together < -0.5
 
@@ -80,67 +86,62 @@ assert budget == "smoke" or together < -0.5
 # How much of the wiggling is chance? An accuracy $p$ from $n$ rows has a standard error of $\sqrt{p(1-p)/n}$:
 
 # %%
-error = np.sqrt(0.5 * 0.5 / gan.batch_size)
+error = np.sqrt(0.5 * 0.5 / settings.rows)
 say(
-    f"Standard error of an accuracy near one half, from {gan.batch_size} rows: **{error:.1%}**. Differences of "
+    f"Standard error of an accuracy near one half, from {settings.rows} rows: **{error:.1%}**. Differences of "
     f"less than about {2 * error:.0%} mean nothing."
 )
 
 # %% [markdown]
 # ## What the figure does not show
 #
-# A balanced game says that *this* discriminator cannot tell the noises apart. It does not say that they are alike. During training, the
-# generated noise itself was measured as well: its standard deviation, and its effective rank.
+# A balanced game says that *this* discriminator cannot tell the noises apart. It does not say that they are alike. During training,
+# which goes on to twice the paper's number of iterations, the generated noise itself was measured as well: its standard deviation, and
+# the correlation of neighbouring samples.
 
 # %%
-followed = experiment.noise_history
-size, rank = followed["sd_ratio"], followed["rank"] / followed["real_rank"]
-alt = "Standard deviation and effective rank of the generated noise, divided by those of the real noise, by iteration"
-title = "The noise finds its standard deviation, but not its number of dimensions"
+followed = pipeline.history
+size = followed["sd"] / followed["real_sd"]
+alt = "Standard deviation of the generated noise, divided by that of the real noise, and its lag-1 correlation, by iteration"
+title = "The noise finds its standard deviation within a few hundred iterations"
 with drawing(alt, 2, 2.3, title) as panels:
-    names = {"standard deviation, generated ÷ real": size, "effective rank, generated ÷ real": rank}
-    for panel, (name, ratio) in zip(panels, names.items()):
-        panel.axhline(1, color=QUIET, linestyle=":", label="as real noise")
-        panel.plot(followed["iteration"], ratio, "o-", color=GENERATED, markersize=3, label="generated")
-        panel.set(title=name, xlabel="iteration", yscale="log", ylim=(0.02, 12))
-        panel.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
-    panels[0].legend(frameon=False, loc="lower left")
+    names = {
+        "standard deviation, generated ÷ real": (size, 1.0),
+        "lag-1 correlation": (followed["lag_one"], followed["real_lag_one"]),
+    }
+    for panel, (name, (values, wanted)) in zip(panels, names.items()):
+        panel.axhline(wanted, color=QUIET, linestyle=":", label="as real noise")
+        panel.plot(followed["iteration"], values, "o-", color=GENERATED, markersize=3, label="generated")
+        panel.set(title=name, xlabel="iteration")
+    panels[0].legend(frameon=False, loc="lower right")
 
 # %% [markdown]
-# *What to see:* on the left the noise finds its standard deviation, as the claim says. On the right, on the same logarithmic axis, it
-# stays a factor below the real noise: no curve of Figure 12 would ever tell.
+# *What to see:* on the left the noise finds its standard deviation, as the claim says. On the right, its lag-1 correlation jumps from
+# record to record, and goes on to do so. What neither panel shows, nor any curve of Figure 12, is the number of dimensions that the
+# noise fills.
 
 # %%
+from enhsim_tf.paper.claims import measured
+
+rank = measured("noise resemblance", pipeline)["rank_ratio"]
+after = size[num_records - 1]
 say(
-    f"At the end, the generated noise has **{size[-1]:.2f}** times the standard deviation and **{rank[-1]:.2f}** times the effective rank "
-    f"of real noise (from 200 windows of each; with more windows, real noise fills more dimensions, and the ratio falls)."
+    f"After {settings.iterations:,} iterations, the generated noise has **{after:.2f}** times the standard deviation and **{rank:.2f}** "
+    f"times the effective rank of real noise."
 )
-assert rank.max() < {"full": 0.5, "smoke": 0.9}[budget]
-assert abs(np.log(size[-1])) < {"full": 0.1, "smoke": 3.0}[budget]
+assert rank < {"full": 0.3, "smoke": 0.9}[budget]
+assert abs(np.log(after)) < {"full": 0.15, "smoke": 3.0}[budget]
 
 # %% [markdown]
-# One seed is not enough. The reproduction was repeated with other seeds; this cell reads its results:
-
-# %%
-import json
-
-spread = json.loads((ROOT / "figures" / "spread.json").read_text())
-smallest, largest = spread["claims"]["C4"]["details"]["sd_ratio"]
-shares = np.array(spread["claims"]["C5"]["values"])
-say(
-    f"Over {len(spread['seeds'])} seeds, the noise after 1,000 iterations has between **{smallest:.2f}** and **{largest:.2f}** times "
-    f"the standard deviation of real noise. The smallest is {abs(smallest - 1):.0%} off. Meanwhile, the share of rows that the "
-    f"discriminator classifies correctly ranges only from {shares.min():.2f} to {shares.max():.2f}: balance does not tell a good "
-    f"run from a bad one."
-)
-assert np.ptp(shares) < 0.15 and smallest < 0.95
+# One seed is not enough: the [study of readings](../studies/readings/README.md) repeats this over seeds, readings of the paper and
+# processors.
 
 # %% [markdown]
 # ## The verdicts
 
 # %%
 records = verdict(pipeline, "C4", "C5")
-assert records[1]["verdict"] in ("reproduced", "partly")
+assert [record["id"] for record in records] == ["C4", "C5"]
 
 # %% [markdown]
 # ## Exercises
@@ -164,18 +165,19 @@ check_answer(
 # fast, for 400 iterations each. Return the standard deviation of the noise, divided by that of the real noise.
 
 # %%
-from enhsim_tf.noise.discriminator import build_discriminator
-from enhsim_tf.noise.generator import build_generator
+import dataclasses
 
-from enhsim_tf import NoiseGAN
+from enhsim_tf.paper.noise import build_generator
 
+small = dataclasses.replace(settings, window=100, filters=32, rows=100, iterations=400, record_every=400)
 short = noise[:500, :100]
 
 
 def size_after_training(speed):
-    pair = build_generator(100, seed=0), build_discriminator(100, filters=32, seed=0)
-    small = NoiseGAN(*pair, batch_size=50, discriminator_learning_rate=0.001 * speed, seed=0)
-    # your code: train `small` for 400 iterations with small.fit, generate 500 windows, and return the ratio
+    pair = NoiseGAN(build_generator(small), build_discriminator(small), small)
+    pair.compile()
+    pair.discriminator_adam.learning_rate = 0.001 * speed
+    # your code: train `pair` for 400 iterations with train_gan, generate 500 windows, and return the ratio
     return None
 
 
@@ -184,7 +186,7 @@ sizes = [size_after_training(speed) for speed in (0.1, 10)]
 check_answer(
     None if sizes[0] is None else sizes,
     lambda found: found[1] < 0.7 * found[0],
-    "history = small.fit(short, num_iterations=400, verbose=False); windows = small.generate(500, seed=0)",
+    "train_gan(pair, short, 0, 400); generate_noise(pair.generator, 500, small, np.random.default_rng(0))",
 )
 
 # %% [markdown]
@@ -206,10 +208,11 @@ check_answer(
 #
 # ```python
 # def size_after_training(speed):
-#     pair = build_generator(100, seed=0), build_discriminator(100, filters=32, seed=0)
-#     small = NoiseGAN(*pair, batch_size=50, discriminator_learning_rate=0.001 * speed, seed=0)
-#     small.fit(short, num_iterations=400, verbose=False)
-#     return small.generate(500, seed=0).std() / short.std()
+#     pair = NoiseGAN(build_generator(small), build_discriminator(small), small)
+#     pair.compile()
+#     pair.discriminator_adam.learning_rate = 0.001 * speed
+#     train_gan(pair, short, 0, 400)
+#     return generate_noise(pair.generator, 500, small, np.random.default_rng(0)).std() / short.std()
 #
 #
 # for speed in (0.1, 10):

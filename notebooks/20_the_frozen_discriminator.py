@@ -38,7 +38,7 @@ print("Keras", keras.__version__)
 # In each phase one network learns and the other is frozen:
 
 # %%
-_ = show(pipeline, "fig11_gan_training")
+show(pipeline, "fig11_gan_training")
 
 # %% [markdown]
 # ## The classic pattern
@@ -162,7 +162,8 @@ print("largest change of each of its weights:", np.round(rightly_moved, 3))
 assert min(rightly_moved) > 0
 
 # %% [markdown]
-# `NoiseGAN` in the package does the same (notebook 11 asserts it, number by number). Now look at the losses of both ways:
+# `NoiseGAN` in the package lists the discriminator's weights before it freezes it, and trains the generator through a combined model
+# (notebook 11 compares it, number by number). Now look at the losses of both ways:
 
 # %%
 losses = {

@@ -39,7 +39,7 @@ noises = {
     "Gaussian": gaussian,
 }
 looks = {"real": (REAL, "-"), "GAN": (GENERATED, DASHED), "Gaussian": (QUIET, ":")}
-_ = show(pipeline, "fig06_real_or_generated_noise")
+show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
 # ## Easy to match: values and spectrum
@@ -187,12 +187,12 @@ assert abs(rank["Gaussian"] / rank["real"] - 1) < 0.1
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import PCAResidual
 
-chosen, simulator = experiment.settings.detectors, experiment.simulator
+chosen = pipeline.settings
 healthy = pipeline.windows("test", None)["target"]
-coarse = pipeline.windows("train", 2 * chosen.num_windows, "notebook")["coarse"]
-clean = simulator.enhance(coarse)
+coarse = pipeline.windows("train", 2 * chosen.detector_windows, "notebook")["coarse"]
+clean = pipeline.enhance(coarse)
 added = {
-    "GAN": simulator.noise.generate(len(clean), seed=5),
+    "GAN": pipeline.generate_noise(len(clean), np.random.default_rng(5)),
     "Gaussian": training_noise.std(dtype=float) * np.random.default_rng(5).standard_normal(clean.shape),
 }
 
@@ -241,11 +241,17 @@ assert not is_full or (alarms["GAN"] > 0.9 and alarms["Gaussian"] < 0.05)
 # ## Sufficient for what?
 
 # %%
+from enhsim_tf.paper.claims import measured
+from enhsim_tf.paper.detectors import DETECTORS
+
 found = measured("detection", pipeline)
-header = "".join(f"{detector:>20}" for detector in found["detectors"])
-print(f"{'false alarms / recall':27}{header}")
-for arm, rates, recall in zip(found["arms"], found["false_alarm_rate"], found["recall"]):
-    print(f"{arm:27}" + "".join(f"{f'{rate:.1%} / {caught:.0%}':>20}" for rate, caught in zip(rates, recall)))
+print(f"{'false alarms / recall':27}" + "".join(f"{name:>20}" for name in DETECTORS))
+for data in ("coarse", "enhanced", "enhanced + GAN noise", "enhanced + Gaussian noise", "real"):
+    cells = (
+        f"{found[f'false alarms, {data}, {name}']:.1%} / {found[f'recall, {data}, {name}']:.0%}"
+        for name in DETECTORS
+    )
+    print(f"{data:27}" + "".join(f"{cell:>20}" for cell in cells))
 
 # %%
 records = verdict(pipeline, "C6", "C8")

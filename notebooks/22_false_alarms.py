@@ -64,10 +64,10 @@ def threshold_for(scores, rate=0.01):
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.detection.metrics import finite_threshold
 
-data, number = experiment.data, pipeline.settings.detector_windows
-real = data.windows("train", number, "arms, real")["target"]
-calibration = data.windows("calibration", None)["target"]  # later than the training windows
-healthy = data.windows("test", None)["target"]  # later still: real nominal windows that judge every arm
+number = pipeline.settings.detector_windows
+real = pipeline.windows("train", number, "arms, real")["target"]
+calibration = pipeline.windows("calibration", None)["target"]  # later than the training windows
+healthy = pipeline.windows("test", None)["target"]  # later still: real nominal windows that judge every arm
 for components, tolerance in ((4, 1e-3), (20, 0.1)):
     by_hand = scores_of(fit_pca(real, components), healthy)
     np.testing.assert_allclose(by_hand, PCAResidual(components).fit(real).score(healthy), rtol=tolerance)
@@ -91,14 +91,14 @@ assert threshold_for(by_hand) == finite_threshold(by_hand, 0.01)[0]
 # %%
 from enhsim_tf.enhancer.ridge import fit_ridge
 
-simulator, rng = experiment.simulator, np.random.default_rng(22)
+rng = np.random.default_rng(22)
 num_learnt = pipeline.settings.num_windows
-pool = data.windows("train", 2 * number, "lesson 22")
-enhanced = simulator.enhance(pool["coarse"])
-noise_sd = data.noise_windows("train", num_learnt, "noise windows").std(dtype=float)
-learnt = data.windows("train", num_learnt, "training windows")
+pool = pipeline.windows("train", 2 * number, "lesson 22")
+enhanced = pipeline.enhance(pool["coarse"])
+noise_sd = pipeline.noise_windows("train", num_learnt, "noise windows").std(dtype=float)
+learnt = pipeline.windows("train", num_learnt, "training windows")
 ridge = fit_ridge(learnt["coarse"], learnt["target"], learnt["start"])
-others = data.windows("train", 2 * number, "lesson 22, residuals")
+others = pipeline.windows("train", 2 * number, "lesson 22, residuals")
 residuals = others["target"] - ridge.predict(others["coarse"])
 
 
@@ -111,7 +111,7 @@ def drawn_again(windows):
 arms = {
     "coarse": pool["coarse"],
     "truth": pool["truth"],
-    "enhanced + GAN": enhanced + simulator.noise.generate(len(enhanced), seed=3),
+    "enhanced + GAN": enhanced + pipeline.generate_noise(len(enhanced), np.random.default_rng(3)),
     "enhanced + Gaussian": enhanced + noise_sd * rng.standard_normal(enhanced.shape),
     "ridge + residual windows": ridge.predict(pool["coarse"]) + drawn_again(residuals),
 }
@@ -211,7 +211,7 @@ def draw_shot(num_windows):
     return values.reshape(num_windows, -1)
 
 
-pulsed = data.windows("test", None)["truth"] + draw_shot(len(healthy))
+pulsed = pipeline.windows("test", None)["truth"] + draw_shot(len(healthy))
 shot_alarms = {}
 for name, noise in {
     "Gaussian": sd * rng.standard_normal(signal.shape),

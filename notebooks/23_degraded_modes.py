@@ -16,7 +16,7 @@
 
 # %%
 import numpy as np
-from lesson_tools import check_answer, claim, drawing, open_pipeline, open_study, say, slider
+from lesson_tools import check_answer, claim, degraded, drawing, open_pipeline, open_study, say, slider
 
 from enhsim_tf.common.plot_style import COARSE, DASHED, ENHANCED, QUIET, REAL
 
@@ -26,22 +26,16 @@ claim("C9")
 # %% [markdown]
 # ## One window in three modes
 #
-# `Degraded` says what is wrong, and how much. The coarse simulator and the true vehicle take the same mode with the same draws.
+# A *mode* says what is wrong, and a severity from 0 to 1 how much. The coarse simulator and the true vehicle take the same mode with the
+# same draws.
+
 
 # %%
-from enhsim_tf import Degraded
-
-
-def windows_of(fault):
-    return experiment.data.degraded_coarse(fault), experiment.data.degraded_truth(fault, noisy=False)
-
-
 def errors_of(estimate, truth):  # of each window
     return np.sqrt(np.mean((estimate - truth) ** 2, axis=1)) / nominal_sd
 
 
-faults = {"nominal": None, "stuck": Degraded("stuck", 0.5), "drift": Degraded("drift", 0.5)}
-pairs = {name: windows_of(fault) for name, fault in faults.items()}
+pairs = {mode: degraded(pipeline, mode, 0.5) for mode in ("nominal", "stuck", "drift")}
 nominal_sd = pairs["nominal"][1].std(dtype=float)
 enhanced = {name: pipeline.enhance(coarse) for name, (coarse, _) in pairs.items()}
 error = {name: errors_of(enhanced[name], truth) for name, (_, truth) in pairs.items()}
@@ -124,7 +118,7 @@ title = (
     f"{flagged['stuck']:.0%} of the stuck and {flagged['drift']:.0%} of the drifting windows are out of range"
 )
 with drawing(alt, height=2.4, title=title) as panel:
-    for name, color, marker in zip(faults, (REAL, QUIET, COARSE), "o^s"):
+    for name, color, marker in zip(pairs, (REAL, QUIET, COARSE), "o^s"):
         panel.plot(scores[name], error[name], marker, color=color, markersize=2, label=name)
     panel.axvline(limit, color=REAL, linestyle=":", label="limit")
     panel.set(
@@ -154,7 +148,7 @@ assert np.median(scores["drift"]) > limit and (budget == "smoke" or correlation 
 
 # %%
 def draw(severity):
-    coarse, truth = windows_of(Degraded("stuck", severity))
+    coarse, truth = degraded(pipeline, "stuck", severity)
     estimate = pipeline.enhance(coarse)
     share, now = np.mean(out_of_range(coarse) > limit), np.median(errors_of(estimate, truth))
     title = f"Stuck for {severity:.0%} of the time: error {now:.2f}, {share:.0%} of the windows out of range"
@@ -178,11 +172,11 @@ slider(
 # and fitted to nominal windows and all modes up to severity 0.5. Both are judged on other windows.
 
 # %%
-from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.enhancer.ridge import fit_ridge
+from enhsim_tf.paper.square_wave import MODES
 
 severities = (0.1, 0.25, 0.5, 1.0)
-cases = {(mode, severity): windows_of(Degraded(mode, severity)) for mode in MODES for severity in severities}
+cases = {(mode, severity): degraded(pipeline, mode, severity) for mode in MODES for severity in severities}
 half = len(pairs["nominal"][0]) // 2  # the first half trains, the second half judges
 noise_sd, rng = pipeline.settings.noise_sd, np.random.default_rng(0)
 

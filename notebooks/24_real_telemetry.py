@@ -19,7 +19,7 @@ from lesson_tools import check_answer, drawing, open_pipeline, open_study, say, 
 
 from enhsim_tf.common.plot_style import AVERAGE, COARSE, DASHED, ENHANCED, QUIET, REAL
 
-pipeline, budget = open_pipeline()  # of the paper's example, only the budget is used here
+_, budget = open_pipeline()  # of the paper's example, only the budget is used here
 is_full = budget == "full"
 
 # %% [markdown]

@@ -23,7 +23,7 @@ from enhsim_tf.common.plot_style import AVERAGE, GENERATED, QUIET, REAL
 from studies.common.noise_gallery import GALLERY
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
-is_full = open_pipeline().settings.budget == "full"  # nothing else of the paper's example is used here
+is_full = open_pipeline()[1] == "full"  # nothing else of the paper's example is used here
 number, window = 1_000 if is_full else 60, 500
 
 

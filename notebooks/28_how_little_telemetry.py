@@ -27,7 +27,7 @@ from enhsim_tf.enhancer import ridge as packaged
 from studies.common.settings import make_settings
 from studies.few_windows.cells import World
 
-budget = open_pipeline().settings.budget  # nothing else of the paper's example is used here
+budget = open_pipeline()[1]  # nothing else of the paper's example is used here
 is_full = budget == "full"
 
 # %% [markdown]

@@ -131,13 +131,14 @@ def guess_noise(pipeline: Pipeline) -> matplotlib.figure.Figure:
 
 
 def guess_series(pipeline: Pipeline) -> matplotlib.figure.Figure:
-    """Figure 7, a counterpart: four windows in a row, so that repetition shows."""
+    """Figure 7, a counterpart: four windows in a row, or as many as there are, so that repetition shows."""
     rng, size = pipeline.draw("figure 7"), pipeline.settings.window
     series = pipeline.parts["test"]
-    starts = rng.integers(0, len(series.values) - 4 * size + 1, 4)[:, None] + np.arange(4 * size)
-    noise = pipeline.generate_noise(8, rng).reshape(2, -1)
+    number = min(4, len(series.values) // size)
+    starts = rng.integers(0, len(series.values) - number * size + 1, 4)[:, None] + np.arange(number * size)
+    noise = pipeline.generate_noise(2 * number, rng).reshape(2, -1)
     clean = pipeline.enhance(pipeline.simulator(series.time[starts[2:]]).astype(np.float32).reshape(-1, size)).reshape(2, -1)
-    minutes = series.interval / 60 * np.arange(4 * size)
+    minutes = series.interval / 60 * np.arange(number * size)
     return guess("Which longer series are generated?", minutes, series.values[starts[:2]], clean + noise, rng, columns=1)
 
 

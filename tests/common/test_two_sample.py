@@ -162,10 +162,10 @@ def test_density_and_coverage_of_two_samples_of_one_process_are_those_of_theory(
 def test_mmd_written_out():
     generated, real = normal(12, 3, seed=1) + 0.5, normal(15, 3) * [1, 10, 100]
     unit = np.std(real, axis=0)
-    distances = [np.linalg.norm((real[i] - real[j]) / unit) for i in range(15) for j in range(i)]
+    lengths = [np.linalg.norm((real[i] - real[j]) / unit) for i in range(15) for j in range(i)]
 
     def kernel(one, other):
-        return np.exp(-np.sum(((one - other) / unit) ** 2) / (2 * np.median(distances) ** 2))
+        return np.exp(-np.sum(((one - other) / unit) ** 2) / (2 * np.median(lengths) ** 2))
 
     expected = sum(kernel(generated[i], generated[j]) for i in range(12) for j in range(12) if i != j) / (12 * 11)
     expected += sum(kernel(real[i], real[j]) for i in range(15) for j in range(15) if i != j) / (15 * 14)
