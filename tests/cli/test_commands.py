@@ -17,6 +17,7 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
 from enhsim_tf.cli.options import channels_by_model, cleaning_options
+from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
@@ -195,6 +196,14 @@ def test_generate_writes_training_data_with_a_fitted_simulator(fitted, told, tmp
     )
     assert frame["onset"].min() >= 16 - 4 and np.stack(frame["window"]).shape == (40, 64)
     assert 10 < np.stack(frame["window"]).mean() < 30  # in the telemetry's unit
+
+
+def test_a_constant_level_has_a_range_too(told, tmp_path):
+    of_waves([ConstantLevel(20.0, 1.0)], 60, levels=np.array([[[20.0, 1.0]]])).save(tmp_path / "models" / "level")
+    code, out, errors = told(
+        "generate", "models", "--windows", 10, "--scenario", "drift:1", "--scenario", "gain_loss:1", "--out", "x.parquet"
+    )
+    assert (code, errors) == (0, []) and "drift at 1: 100% of such" in out and "gain_loss at 1: 0% of such" in out
 
 
 def test_generate_writes_a_series_with_times(fitted, told, tmp_path):
