@@ -83,6 +83,11 @@ class Plan:
                 raise InputError(
                     f"Expected models of the same channels: {', '.join(first.channels)[:120]}. Received: {', '.join(model.channels)[:120]} in {model.name!r}."
                 )
+            for channel in (part.channel for part in self.mix.scenarios):
+                if channel not in (None, *model.channels):
+                    raise InputError(
+                        f"Expected a channel, one of: {', '.join(model.channels)[:200]}. Received: {channel!r} in the scenario."
+                    )
         if not 1 <= self.num_windows <= MOST_WINDOWS:
             raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: {self.num_windows:,}.")
         values = self.window * len(self.channels)
@@ -155,19 +160,20 @@ def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) 
         num_windows: Total number of windows.
 
     Raises:
-        InputError: If a model is missing or damaged, or if the models have different windows or intervals.
+        InputError: If a model is missing or damaged, if the models have different windows or intervals, or if scenarios are asked of a model
+            of recorded runs, which are nominal.
     """
     folder = Path(folder).absolute()
     shares = mix.models or (ModelShare(folder.name, ".", 1.0),)
     if len(shares) > MOST_MODELS:
         raise InputError(f"Expected at most {MOST_MODELS} models. Received: {len(shares)}.")
-    models = tuple(_model_of(share, folder / share.folder) for share in shares)
+    models = tuple(_model_of(share, folder / share.folder, mix) for share in shares)
     return Plan(
         mix, models, seed, num_windows, mix.shard or max(1, min(_SHARD, _SHARD_VALUES // (models[0].window * len(models[0].channels))))
     )
 
 
-def _model_of(share: ModelShare, folder: Path) -> Model:
+def _model_of(share: ModelShare, folder: Path, mix: Mix) -> Model:
     """Reads checksum, window length and interval of a saved simulator without loading its networks."""
     check_saved(folder)
     settings = settings_of(folder)
@@ -176,4 +182,10 @@ def _model_of(share: ModelShare, folder: Path) -> Model:
         raise InputError(f"Expected interval_s to be a number above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
     if type(window) is not int or not 2 <= window <= MOST_VALUES:
         raise InputError(f"Expected window to be a number of samples in settings.json. Received: {str(window)[:40]} in {folder}.")
+    alignment = settings.get("alignment")
+    if mix.scenarios and isinstance(alignment, dict) and alignment.get("kind") == "runs":
+        raise InputError(
+            f"Expected no scenario of a model of recorded runs. Received: {mix.scenarios[0].mode} for {folder}. "
+            "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
+        )
     return Model(share.name, folder, share.share, sha256(folder / MANIFEST), window, float(interval_s), channels_of(folder))

@@ -6,6 +6,7 @@ Each simulator gets a folder of its own, for example `MODEL_DIR/volts/`, with th
 
 import contextlib
 import dataclasses
+import multiprocessing
 import os
 import sys
 import traceback
@@ -286,4 +287,5 @@ def _tell_if_heard(line: str) -> None:
     try:
         tell(line)
     except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it at exit
+        if multiprocessing.parent_process() is not None:  # the command itself ends with the code of a closed pipe when its fit is saved
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115  Python flushes it at exit

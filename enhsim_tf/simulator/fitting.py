@@ -35,6 +35,7 @@ from enhsim_tf.telemetry.windows import evenly_spaced_starts, random_window_star
 _ALIGNMENTS = 2  # rounds in which windows are aligned with the waveform that ridge regression has learnt
 _NUM_WAVEFORM = 1_000  # most windows from which a waveform is learnt
 _NUM_LEVELS = 500  # most windows whose offset and gain are kept
+_LEAST_FOLLOWED = 0.1  # share of the windows that have to follow a square wave for a shape to be learnt from them
 _MOST_VALUES = 1_500_000  # of all training windows, which bounds time and memory of a fit of many channels
 _LEAST_WINDOWS = 300  # training windows, however many channels
 
@@ -200,7 +201,7 @@ def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tu
         coarse, shift, gain = waves.align(targets)
         kept = ~waves.is_flat(gain)
         for channel in range(targets.shape[2]):
-            if not kept.any() and not waves.simulators[channel].is_constant:
+            if kept.mean() < _LEAST_FOLLOWED and not waves.simulators[channel].is_constant:
                 raise _FlatError(channel)
         safe = np.where(gain != 0, gain, 1.0)
         wanted = ((targets - shift[:, None]) / safe[:, None]).astype(np.float32)

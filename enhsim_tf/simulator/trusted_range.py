@@ -37,6 +37,9 @@ class TrustedRange:
         learnt, held_out = (self._drawn(None, _NUM_NOMINAL, seed) for seed in range(2))
         spread = np.std(learnt, axis=(0, 1), dtype=np.float64)
         self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), np.where(spread > 0, spread, 1.0)
+        self._range, self._limit = None, _LEAST_LIMIT
+        if not np.ptp(learnt, axis=0).any():  # constant levels: whatever differs from them is outside
+            return
         self._range = OutOfRange().fit(self._rows(learnt))
         limit, _ = metrics.finite_threshold(self._range.score(self._rows(held_out)), rate)
         self._limit = max(limit, _LEAST_LIMIT)
@@ -53,7 +56,9 @@ class TrustedRange:
         Returns:
             One score per window, float64 of shape `(windows,)`.
         """
-        return self._range.score(self._rows(coarse)) / self._limit
+        rows = self._rows(coarse)
+        scores = np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64)) if self._range is None else self._range.score(rows)
+        return scores / self._limit
 
     def score_run(self, coarse: np.ndarray) -> np.ndarray:
         """Scores a run of shape `(samples, columns)`: the mean score of the windows that contain each sample, float32 of shape `(samples,)`."""

@@ -5,18 +5,16 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-from enhsim_tf.enhanced_simulator.fit_many import CoarseRun, fit_channels
-from enhsim_tf.enhanced_simulator.runs import fitting
-from enhsim_tf.enhanced_simulator.runs.options import RunOptions
-from enhsim_tf.enhancer.ladder import COARSE, RIDGE
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli.options import load
 from enhsim_tf.coarse_simulator.recording_files import read_recording
+from enhsim_tf.simulator.fit_many import CoarseRun, fit_channels
+from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.sources import read_source
 
-TINY = ["--window", "32", "--num-windows", "60", "--epochs", "1", "--noise", "residual-windows"]
+TINY = FitOptions(window=32, num_windows=60, enhancer="ridge", noise="residual windows")
 
 
 def coarse(num_samples=1_500, seed=0):
@@ -41,7 +39,7 @@ def fault(num_samples=300):
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
-    """A read-only folder with telemetry, coarse runs and a fitted run model."""
+    """A read-only folder with telemetry, coarse runs and a fitted simulator of recorded runs."""
     folder = tmp_path_factory.mktemp("world")
     run = coarse()
     frames = {
@@ -49,7 +47,7 @@ def world(tmp_path_factory):
         "telemetry": telemetry(run),
         "fault": fault(),
         "new": telemetry(fault(), seed=9),
-        "later": run.assign(utc=run["utc"] + pd.Timedelta("400d")),
+        "later": run.assign(utc=run["utc"] + pd.Timedelta("400D")),
         "untimed": run.drop(columns="utc"),
         "still": run.assign(volts=1.0, watts=2.0),
         "short": run.iloc[:20],
@@ -57,18 +55,15 @@ def world(tmp_path_factory):
     }
     for name, frame in frames.items():
         frame.to_csv(folder / f"{name}.csv", index=False)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fitting, "RUNGS", (COARSE, RIDGE))
-        said = []
-        failed = fit_channels(
-            read_source(folder / "telemetry.csv"),
-            folder / "models",
-            RunOptions(window=32, num_windows=300, noise="residual windows"),
-            Cleaning(),
-            0,
-            said.append,
-            run=CoarseRun(str(folder / "simulator.csv")),
-        )
+    said = []
+    _, failed = fit_channels(
+        read_source(folder / "telemetry.csv"),
+        folder / "models",
+        FitOptions(window=32, num_windows=300, noise="residual windows"),
+        Cleaning(),
+        said.append,
+        run=CoarseRun(str(folder / "simulator.csv")),
+    )
     assert not failed
     (folder / "said.txt").write_text("\n".join(said))
     return folder
@@ -83,27 +78,19 @@ def run_command(arguments, capsys):
 # from end to end
 
 
-def test_the_fit_reports_the_pairing_and_the_ladder(world):
+def test_the_fit_reports_the_pairing_and_the_candidates(world):
     said = (world / "said.txt").read_text()
-    assert "delay: none found" in said and "Enhancers, error on held-out blocks" in said and "Chosen: ridge" in said
+    assert "delay: none found" in said and "enhancers, error on held-out blocks" in said and "Used: ridge" in said
     assert {path.name for path in (world / "models" / "celsius").iterdir()} >= {"manifest.json", "report.json", "report.png", "arrays.npz"}
 
 
 def test_fit_as_a_command(world, tmp_path, capsys):
-    arguments = [
-        "fit",
-        world / "telemetry.csv",
-        "--coarse",
-        world / "simulator.csv",
-        "--out",
-        tmp_path / "m",
-        "--enhancer",
-        "level-and-gain",
-    ]
-    code, out, errors = run_command([*arguments, "--coarse-column", "volts", "--delay", "10", *TINY], capsys)
+    arguments = ["fit", world / "telemetry.csv", "--coarse", world / "simulator.csv", "--out", tmp_path / "m", "--window", "32"]
+    arguments += ["--enhancer", "level-and-gain", "--coarse-column", "volts", "--delay", "10", "--noise", "residual-windows"]
+    code, out, errors = run_command(arguments, capsys)
     assert code == 0 and not errors
-    assert any("delay: 10 s as given" in line for line in out) and any("Chosen: level and gain, as asked for" in line for line in out)
-    assert load(tmp_path / "m" / "celsius").columns == ("volts",)
+    assert any("delay: 10 s as given" in line for line in out) and any("Used: level and gain" in line for line in out)
+    assert load(tmp_path / "m" / "celsius").alignment.columns == ("volts",)
 
 
 def test_two_commands_give_labelled_training_data(world, tmp_path, capsys):
@@ -124,7 +111,7 @@ def test_scores_are_those_of_the_difference(world, tmp_path, capsys):
     code, out, _ = run_command(
         ["score", world / "models", world / "new.csv", "--coarse", world / "fault.csv", "--windows", 300, "--out", path], capsys
     )
-    assert code == 0 and "on the difference from the enhanced run" in out[-2]
+    assert code == 0 and "of 300 scored samples" in out[-2]
     assert "events.csv" in out[-1] and "false alarms per day" in out[-1]
     frame = pd.read_csv(path)
     assert list(frame.columns)[1:] == ["value", "enhanced", "score", "flag", "out_of_range"] and len(frame) == 300
@@ -132,11 +119,16 @@ def test_scores_are_those_of_the_difference(world, tmp_path, capsys):
     assert list(pd.read_csv(tmp_path / "scores.events.csv").columns)[:3] == ["begin", "end", "peak"]
 
 
-def test_without_a_run_a_model_generates_and_scores_as_before(world, tmp_path, capsys):
+def test_windows_of_the_nominal_run_need_no_run(world, tmp_path, capsys):
     assert run_command(["generate", world / "models", "--windows", "5", "--out", tmp_path / "w.parquet"], capsys)[0] == 0
     assert np.stack(pd.read_parquet(tmp_path / "w.parquet")["window"]).shape == (5, 32)
-    code, out, _ = run_command(["score", world / "models", world / "new.csv", "--windows", 100, "--out", tmp_path / "s.csv"], capsys)
-    assert code == 0 and any("without --coarse, the values are judged, not their difference" in line for line in out)
+
+
+def test_update_as_a_command(world, tmp_path, capsys):
+    arguments = ["update", world / "models", world / "telemetry.csv", "--coarse", world / "simulator.csv", "--out", tmp_path / "new"]
+    code, out, errors = run_command(arguments, capsys)
+    assert code == 0 and not errors and any("updated with 1,500 samples" in line for line in out)
+    assert load(tmp_path / "new" / "celsius").trained["updates"][0]["num_samples"] == 1_500
 
 
 def test_the_wide_table_may_hold_the_columns_in_another_order_and_rate(world, tmp_path, capsys):
@@ -191,8 +183,7 @@ def test_bad_fault_runs(world, tmp_path, capsys, change, words):
 )
 def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
     run = dataclasses.replace(run, source=str(world / run.source))
-    options = RunOptions(window=32, num_windows=60, noise="residual windows")
-    failed = fit_channels(read_source(world / source), tmp_path / "models", options, Cleaning(), 0, print, run=run)
+    _, failed = fit_channels(read_source(world / source), tmp_path / "models", TINY, Cleaning(), print, run=run)
     (line,) = failed.values()
     assert line.startswith("Expected ") and "Received: " in line and all(word in line for word in words)
     assert not list((tmp_path / "models").iterdir())
@@ -202,7 +193,7 @@ def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
     ("arguments", "words"),
     [
         (["fit", "telemetry.csv", "--delay", "3"], ["--delay", "--coarse"]),
-        (["fit", "telemetry.csv", "--enhancer", "level-and-gain"], ["enhancer", "ridge and network"]),
+        (["fit", "telemetry.csv", "--coarse-column", "volts"], ["--coarse-column", "--coarse"]),
         (["generate", "models", "--copies", "3", "--windows", "2"], ["--copies", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--windows", "2"], ["--windows", "--coarse"]),
         (["generate", "models", "--coarse", "fault.csv", "--scenario", "stuck:0.5"], ["--scenario", "--coarse"]),
@@ -211,9 +202,10 @@ def test_runs_that_cannot_be_paired(world, tmp_path, source, run, words):
         (["generate", "models", "--continuous", "1h", "--scenario", "stuck:0.5"], ["generate MODEL_DIR --coarse"]),
         (["generate", "models", "--continuous", "1h", "--at", "stuck:0.5@10/20"], ["generate MODEL_DIR --coarse"]),
         (["generate", "models", "--windows", "4", "--scenario", "stuck:0.5"], ["generate MODEL_DIR --coarse"]),
-        (["generate", "models", "--windows", "4", "--workers", "1"], ["a model of recorded runs"]),
+        (["generate", "models", "--windows", "4", "--scenario", "stuck:0.5", "--workers", "1"], ["a model of recorded runs"]),
         (["generate", "models", "--coarse", "short.csv"], ["at least one window of 32 samples"]),
-        (["score", "models", "new.csv", "--coarse-time", "utc"], ["--coarse-time", "--coarse"]),
+        (["score", "models", "new.csv"], ["--coarse", "simulator.csv", "Received: none"]),
+        (["update", "models", "new.csv"], ["--coarse", "Received: none"]),
         (["score", "models", "new.csv", "--coarse", "later.csv"], ["overlaps the telemetry in time"]),
     ],
 )

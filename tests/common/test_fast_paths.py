@@ -3,13 +3,15 @@ import numpy as np
 import pytest
 import tensorflow as tf
 
+from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common import convolution_maximum as fast_path
 from enhsim_tf.common.convolution_maximum import convolution_maximum, num_layers_computed
 from enhsim_tf.common.fused_adam import fused_adam
 from enhsim_tf.common.training import fit_windows
 from enhsim_tf.enhancer.network import enhance
-from enhsim_tf.noise.surrogates import GaussianNoise
 from enhsim_tf.paper import noise as of_paper
+from tests.known_simulators import of_waves
 from tests.paper.conftest import tiny_settings
 
 WINDOW, FILTERS, WIDTH, STRIDE = 63, 14, 20, 4  # the last sample lies under no filter
@@ -180,52 +182,28 @@ def test_fused_adam_moves_the_weights_as_adam_does():
     assert np.abs(moved[0]).max() > 0.1
 
 
-def small_simulator():
-    from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
-
-    enhancer, _, _ = enhancer_and_windows()
-    waves = SquareWaveSimulator([SquareWave(period_s=10.0, low=-0.5, high=0.5)])
-    return EnhancedSimulator(waves, enhancer, GaussianNoise(0.1, 24), offset=1.0, scale=2.0)
-
-
-@pytest.mark.parametrize("mode", [None, "friction", "dropout"])
+@pytest.mark.parametrize("mode", [None, "drift", "stuck"])
 def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
-    from enhsim_tf.enhanced_simulator import simulator as enhanced_simulator
+    from enhsim_tf.simulator import simulator as module
 
-    from enhsim_tf import Degraded
-
-    simulator, scenario = small_simulator(), mode and Degraded(mode)
+    waves = [SquareWaveSimulator([SquareWave(period_s=period, low=-0.5, high=0.5)]) for period in (10.0, 17.0)]
+    simulator, scenario = of_waves(waves, 24), mode and Degraded(mode)
     whole = simulator.generate(23, scenario, seed=5)
-    monkeypatch.setattr(enhanced_simulator, "_CHUNK", 4)
+    monkeypatch.setattr(module, "_CHUNK_VALUES", 4 * 24 * 2)
+    assert [len(chunk) for chunk in simulator.generate_chunks(23, scenario, seed=5)] == [4] * 5 + [3]
     np.testing.assert_allclose(simulator.generate(23, scenario, seed=5), whole, atol=1e-6)
-    coarse = simulator.generate_coarse(23, scenario, seed=5)
-    if mode is None:  # a degraded window is the degraded run only where the mode has changed it
+    if mode is None:
         noise = simulator.noise.generate(23, np.random.default_rng([5, 1]))
-        np.testing.assert_allclose(whole, simulator.enhance(coarse) + noise, atol=1e-6)
+        np.testing.assert_allclose(whole, simulator.generate_clean(23, seed=5) + noise, atol=1e-6)
     assert np.abs(whole - simulator.generate(23, scenario, seed=6)).max() > 0.01
 
 
 def test_windows_do_not_depend_on_the_batch_size():
-    simulator, coarse = small_simulator(), small_simulator().generate_coarse(23)
-    expected = simulator.enhancer.predict(coarse, verbose=0)
+    network, coarse, _ = enhancer_and_windows()
+    expected = network.predict(coarse, verbose=0)
     for batch_size in (1, 5, 23, 1_000):
-        np.testing.assert_allclose(enhance(simulator.enhancer, coarse, batch_size), expected, atol=1e-6)
-    assert enhance(simulator.enhancer, coarse[:0]).shape == (0, 24)
-
-
-def test_parquet_holds_the_generated_windows(tmp_path, monkeypatch):
-    import pandas as pd
-    import pyarrow.parquet as pq
-    from enhsim_tf.enhanced_simulator import simulator as enhanced_simulator
-
-    monkeypatch.setattr(enhanced_simulator, "_CHUNK", 10)
-    simulator, path = small_simulator(), tmp_path / "new" / "windows.parquet"
-    simulator.generate_to_parquet(path, 23, seed=5)
-    np.testing.assert_array_equal(np.stack(pd.read_parquet(path)["window"]), simulator.generate(23, seed=5))
-    about = pq.ParquetFile(path)
-    assert about.metadata.num_row_groups == 3 and about.metadata.row_group(0).column(0).compression == "ZSTD"
-    assert str(about.schema_arrow.field("window").type) == "fixed_size_list<element: float>[24]"
-    assert [file.name for file in path.parent.iterdir()] == ["windows.parquet"]
+        np.testing.assert_allclose(enhance(network, coarse, batch_size), expected, atol=1e-6)
+    assert enhance(network, coarse[:0]).shape == (0, 24)
 
 
 def test_a_failed_generation_leaves_the_old_file(tmp_path):

@@ -14,6 +14,9 @@ import pytest
 from enhsim_tf.common import console
 from enhsim_tf.common.console import SILENT, Progress, time_left
 from enhsim_tf.common.stages import Stages, Turns
+from enhsim_tf.simulator.fitting import fit
+from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.telemetry.series import Telemetry
 from tests.paper.conftest import TINY_OPTIONS, tiny_settings
 
 ROOT = Path(__file__).parents[2]
@@ -130,25 +133,14 @@ def test_the_enhancer_reports_finished_epochs():
     assert done == pytest.approx([1 / 3, 2 / 3, 1, 4 / 3, 5 / 3, 2])
 
 
-@pytest.mark.parametrize("follow", [False, True])
-def test_a_fit_counts_the_epochs_of_all_training_rounds(at_once, follow, monkeypatch, capsys):
-    from enhsim_tf.enhanced_simulator.simulator import EnhancedSimulator
-
-    from enhsim_tf.enhancer import network
-    from enhsim_tf.telemetry.series import Telemetry
-
-    build = network.build_enhancer
-    monkeypatch.setattr(network, "build_enhancer", lambda window, seed: build(window, 8, seed=seed))
+def test_a_fit_names_its_steps_where_it_is_asked_to(capsys):
     rng, told = np.random.default_rng(0), []
     telemetry = Telemetry((np.sin(np.arange(1_500) / 5) + 0.1 * rng.standard_normal(1_500)).astype(np.float32))
-    given = {"window": 60, "num_windows": 30, "epochs": 3, "noise": "gaussian", "follow": follow, "verbose": 0}
+    options = FitOptions(window=60, num_windows=60, enhancer="ridge", noise="gaussian")
     for progress in (SILENT, Progress(told.append, "volts: ")):
-        EnhancedSimulator.fit(telemetry, **given, progress=progress)
+        fit(telemetry, options=options, progress=progress)
         assert capsys.readouterr() == ("", ""), "its lines go where they were asked for"
-    found = [SPOKEN.fullmatch(line).groups()[:3] for line in told]
-    epochs = [int(number) for what, number, total in found if (what, total) == ("volts: enhancer, epoch", "3")]
-    assert epochs == sorted(epochs) and set(epochs) == {1, 2, 3}
-    assert all("epoch" in what for what, *_ in found)
+    assert told == [f"volts: {step} ..." for step in ("enhancer coarse", "enhancer ridge", "noise", "detectors")]
 
 
 # -- stages, replicates and channels ---------------------------------------------------------------------------------------
@@ -247,21 +239,33 @@ def table(folder):
     return folder / "x.csv"
 
 
-FIT = ("--num-windows", "30", "--epochs", "3", "--noise", "gaussian", "--enhancer", "network")
+FIT = ("--num-windows", "60", "--noise", "gaussian", "--enhancer", "ridge")
 
 
 def test_fitting_processes_name_their_channel(tmp_path, environment):
-    command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--out", tmp_path / "models", "--workers", "2", *FIT]
+    command = [
+        sys.executable,
+        "-m",
+        "enhsim_tf",
+        "fit",
+        table(tmp_path),
+        "--out",
+        tmp_path / "models",
+        "--separately",
+        "--workers",
+        "2",
+        *FIT,
+    ]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=600)
     assert (done.returncode, done.stderr) == (0, "")
-    assert spoken_in(done.stdout) == {f"{name}: enhancer, epoch": (3, 3) for name in ("volts", "amperes")}
+    assert {f"{name}: enhancer ridge ..." for name in ("volts", "amperes")} <= set(done.stdout.splitlines())
 
 
 @pytest.mark.skipif(os.name != "posix", reason="exit code 141 is POSIX")
 def test_a_closed_output_pipe_does_not_stop_the_fits(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--column", "volts", "--out", tmp_path / "models", *FIT]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True)
-    assert process.stdout.readline().startswith("volts: enhancer, epoch 1 of 3")
+    assert process.stdout.readline() == "reading ...\n"
     process.stdout.close()
     error = process.stderr.read()
     assert (process.wait(), error) == (141, "")

@@ -61,6 +61,11 @@ def npz_of(arrays: dict[str, np.ndarray]) -> bytes:
     return sink.getvalue()
 
 
+def settings_for(channel: str) -> bytes:
+    """The settings of the saved simulator, for a channel of another name."""
+    return json.dumps(json.loads(saved_model()["settings.json"]) | {"channels": [channel]}).encode()
+
+
 def write_model(folder: Path, **changed: bytes) -> Path:
     """Writes a saved simulator with some files changed and correct checksums.
 

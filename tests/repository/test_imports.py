@@ -4,19 +4,18 @@ Which package may import which is declared in `pyproject.toml` and checked by `l
 """
 
 import importlib
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "enhsim_tf"
 WITH_NETWORKS = """common.backend common.training common.fused_adam common.blockwise_training common.convolution_maximum
-    enhancer.network enhancer.ladder enhancer.rung_networks
-    enhanced_simulator.simulator enhanced_simulator.training enhanced_simulator.fitting enhanced_simulator.choosing
-    enhanced_simulator.updating
-    enhanced_simulator.runs.model enhanced_simulator.runs.fitting enhanced_simulator.runs.residuals enhanced_simulator.runs.saving""".split()
+    enhancer.network""".split()
 NOT_TRIED = ("paper", "__main__")
 
 
@@ -37,20 +36,29 @@ def test_modules_without_networks_import_no_tensorflow():
     assert ended.returncode == 0, ended.stderr
 
 
+def test_a_fit_generated_data_scores_and_anomalies_need_no_tensorflow(tmp_path):
+    values = np.sin(np.arange(1_500) / 6) + 0.1 * np.random.default_rng(0).standard_normal((2, 1_500))
+    np.savetxt(tmp_path / "x.csv", values.T, delimiter=",", header="a,b", comments="")
+    fit = ["fit", "x.csv", "--out", "models", "--window", "64", "--num-windows", "60"]  # a linear map: no network is tried
+    generate = ["generate", "models", "--windows", "9", "--scenario", "stuck:1", "--out", "x.parquet"]
+    score = ["score", "models", "x.csv", "--windows", "40", "--out", "scores.csv"]
+    inject = ["inject", "x.csv", "--kinds", "ramp", "--out", "labelled"]
+    script = (
+        f"import sys\nfrom enhsim_tf.__main__ import main\nfor words in {[fit, generate, score, inject]}:\n    assert main(words) == 0\n"
+        "    assert not {'tensorflow', 'keras'} & set(sys.modules), words"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert ended.returncode == 0, ended.stderr
+
+
 def test_public_names_resolve_to_their_objects():
     import enhsim_tf
 
-    assert {"EnhancedSimulator", "build_enhancer", "InputError"} <= set(enhsim_tf.__all__)
+    assert {"EnhancedSimulator", "fit", "score", "update", "InputError"} <= set(enhsim_tf.__all__)
     for name in enhsim_tf.__all__:
         value = getattr(enhsim_tf, name)
         assert value.__name__ == name and value is getattr(importlib.import_module(value.__module__), name)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = enhsim_tf.nothing
-
-
-def test_the_simulator_is_found_in_its_package():
-    from enhsim_tf.enhanced_simulator import EnhancedSimulator, simulator
-
-    assert EnhancedSimulator is simulator.EnhancedSimulator
-    with pytest.raises(ImportError):
-        from enhsim_tf.enhanced_simulator import nothing  # noqa: F401
