@@ -143,24 +143,28 @@ class MatchedWindowBootstrap:
         for begin in range(0, number, max(1, _BATCH // len(known))):
             rows = slice(begin, begin + max(1, _BATCH // len(known)))
             apart = np.maximum(length - 2 * wanted[rows] @ known.T + np.einsum("ij,ij->i", wanted[rows], wanted[rows])[:, None], 0.0)
-            reach = np.maximum(np.partition(apart, nearest - 1, axis=1)[:, nearest - 1], equal)
-            is_near = apart <= reach[:, None]
-            drawn[rows] = self.windows[_draw_near(is_near, sparing, rng)]
+            near = np.argpartition(apart, nearest - 1, axis=1)[:, :nearest]
+            reach = np.maximum(np.take_along_axis(apart, near, axis=1).max(axis=1), equal)
+            candidates = [near[row] if reach[row] > equal else np.flatnonzero(apart[row] <= equal) for row in range(len(apart))]
+            drawn[rows] = self.windows[_draw_near(candidates, sparing, rng)]
             if with_mean:
-                means[rows] = ((is_near.astype(np.float32) @ flat) / is_near.sum(axis=1, keepdims=True)).reshape(-1, *shape)
+                is_near = np.zeros(apart.shape, np.float32)
+                for row, some in enumerate(candidates):
+                    is_near[row, some] = 1 / len(some)
+                means[rows] = (is_near @ flat).reshape(-1, *shape)
         return drawn, means if with_mean else 0.0
 
 
-def _draw_near(is_near: np.ndarray, sparing: "_Sparing", rng: np.random.Generator) -> np.ndarray:
-    """Draws one of the windows that are marked in each row, one that shares no sample with those drawn before if there is one."""
-    order = rng.random(is_near.shape, np.float32)
-    chosen = np.argmax(np.where(is_near, order, -1), axis=1)
-    for row in range(len(chosen)):
-        if not sparing.is_free.any():
+def _draw_near(candidates: list[np.ndarray], sparing: "_Sparing", rng: np.random.Generator) -> np.ndarray:
+    """Draws one of the candidates of each row, one that shares no sample with those drawn before if there is one."""
+    places = rng.random(len(candidates))
+    chosen = np.array([some[int(place * len(some))] for some, place in zip(candidates, places, strict=True)])
+    for row, some in enumerate(candidates):
+        if not sparing.num_free:
             break
-        free = is_near[row] & sparing.is_free
-        if free.any():
-            chosen[row] = np.argmax(np.where(free, order[row], -1))
+        free = some[sparing.is_free[some]]
+        if len(free):
+            chosen[row] = free[int(places[row] * len(free))]
             sparing.take(chosen[row])
     return chosen
 
@@ -176,13 +180,14 @@ class _Sparing:
 
     def __init__(self, starts: np.ndarray | None, number: int, window: int):
         starts = window * np.arange(number) if starts is None else starts
-        self.is_free, self._order = np.ones(number, bool), np.argsort(starts, kind="stable")
+        self.is_free, self.num_free, self._order = np.ones(number, bool), number, np.argsort(starts, kind="stable")
         apart = ((starts - window, "right"), (starts + window, "left"))
         self._first, self._last = (np.searchsorted(starts[self._order], edge, side) for edge, side in apart)
 
     def take(self, chosen: int) -> None:
         """Notes that a window was drawn."""
         self.is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
+        self.num_free = int(np.count_nonzero(self.is_free))
 
 
 def _draw_sparingly(sparing: _Sparing, number: int, rng: np.random.Generator) -> np.ndarray:

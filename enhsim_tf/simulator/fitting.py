@@ -166,7 +166,9 @@ def _fit_aligned(
     name = options.enhancer if not is_level else COARSE
     choice = choose_enhancer(coarse, wanted, times[kept], name, options.seed, options.epochs, _told(progress))
     simulator = EnhancedSimulator(waves, choice.enhancer, None, channels, learnt.interval_s, np.zeros((1, len(channels), 2)))
-    shift, gain = waves.align(cut(series, evenly_spaced_starts(series, window, _NUM_LEVELS), window))[1:]
+    places = evenly_spaced_starts(series, window, _NUM_LEVELS)
+    shift, gain = waves.align(cut(series, places, window))[1:]
+    simulator.level_step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
     followed = ~waves.is_flat(gain)
     if not followed.any():
         raise _FlatError(0)

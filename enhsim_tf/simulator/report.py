@@ -98,7 +98,7 @@ class Report:
                 f"{RATE:.0%} set. Do not trust its alarms"
             )
         used = next((each for each in self.noise_candidates if each["is_chosen"]), None)
-        if used is not None and used["auc"] > TOLD_APART:
+        if used is not None and (used["auc"] or 0) > TOLD_APART:
             found.append(
                 f"WARNING: a classifier tells generated noise from real (AUC {used['auc']:.2f}; real from real {used['real_auc']:.2f})"
             )
@@ -120,7 +120,7 @@ class Report:
 
     def _of_noise(self) -> str:
         judged = "; ".join(
-            f"{each['name']} {each['auc']:.2f}, {each['alarms']:.1%} and {each['recall']:.0%}" for each in self.noise_candidates
+            f"{each['name']} {_auc(each)}, {each['alarms']:.1%} and {each['recall']:.0%}" for each in self.noise_candidates
         )
         if not judged:
             return f"noise: {self.noise_model}"
@@ -220,6 +220,10 @@ def make_report(
         outside,
         examples,
     )
+
+
+def _auc(row: Mapping[str, Any]) -> str:
+    return "-" if row["auc"] is None else f"{row['auc']:.2f}"
 
 
 def _coarse_prediction(choice: Choice, coarse: np.ndarray, real: np.ndarray) -> np.ndarray:

@@ -47,6 +47,7 @@ class EnhancedSimulator:
         quantisation: Levels to which each channel is rounded, or None.
         nominal: Nominal telemetry of the fit, with which thresholds are set. None if there is none.
         trained: Record of the fit, in plain JSON types.
+        level_step: Samples between the times of two rows of `levels`. None: half a window.
 
     Example:
     >>> simulator, report = fit(telemetry)
@@ -66,12 +67,14 @@ class EnhancedSimulator:
         quantisation: Sequence[Levels | None] | None = None,
         nominal: Recording | None = None,
         trained: Mapping[str, Any] | None = None,
+        level_step: float | None = None,
     ):
         self.alignment, self.enhancer, self.noise, self.nominal = alignment, enhancer, noise, nominal
         self.channels, self.interval_s = tuple(channels), float(interval_s)
         self.levels = None if levels is None else np.asarray(levels, np.float64).reshape(-1, len(self.channels), 2)
         self.quantisation = tuple(quantisation) if quantisation is not None else (None,) * len(self.channels)
         self.trained = dict(trained or {})
+        self.level_step = float(level_step or max(1, enhancer.window // 2))
 
     @property
     def window(self) -> int:
@@ -392,7 +395,8 @@ class EnhancedSimulator:
         """Returns offset and gain of consecutive windows: those seen in training, forwards and backwards from a random time."""
         cycle = np.concatenate([self.levels, self.levels[-2:0:-1]])
         begin = np.random.default_rng([seed, 2]).integers(0, len(cycle))
-        return cycle[(begin + np.arange(num_windows)) % len(cycle)]
+        rows = np.floor((self.window // 2) / self.level_step * np.arange(num_windows)).astype(int)  # as fast as in the telemetry
+        return cycle[(begin + rows) % len(cycle)]
 
     @functools.cached_property
     def _nominal_clean(self) -> list[np.ndarray]:
@@ -486,6 +490,7 @@ class EnhancedSimulator:
             "window": self.window,
             "channels": list(self.channels),
             "interval_s": self.interval_s,
+            "level_step": self.level_step,
             "quantisation": [None if each is None else dataclasses.asdict(each) for each in self.quantisation],
             "nominal": None if nominal is None else {"start": nominal.start, "offsets_s": [part.offset_s for part in nominal.parts]},
             "trained": self.trained,
@@ -543,4 +548,7 @@ class EnhancedSimulator:
         noise, shape = model_from(settings["noise"], arrays["noise"]), (1, window, len(channels))
         if noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
             raise ValueError("noise of another shape")
-        return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"])
+        step = float(settings["level_step"])
+        if not (np.isfinite(step) and step > 0):
+            raise ValueError("levels without a step")
+        return cls(alignment, enhancer, noise, channels, interval_s, levels, quantisation, nominal, settings["trained"], step)
