@@ -278,7 +278,7 @@ records = verdict(pipeline, "C6", "C8", "C9")
 assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 
 # %% [markdown]
-# This tour follows the paper's recipe. `EnhancedSimulator.fit` chooses among several noise models by held-out telemetry, as the page on
+# This tour follows the paper's recipe. `fit` chooses among several noise models by held-out telemetry, as the page on
 # [noise](../docs/noise.md) explains.
 #
 # ## Exercises
