@@ -236,12 +236,12 @@ with drawing(alt, 2, 2.6, title, sharey=True) as panels:
     panels[0].legend(frameon=False, loc="upper center", fontsize=6.5)
 
 # %% [markdown]
-# *What to see:* trained on the clean signal, every detector raises a false alarm on every window. With the GAN's noise the result depends
-# on the detector. Plain Gaussian noise of the right size gives few false alarms with all three, because the real noise of this example is
-# white; its price is that the autoencoder finds fewer faults. Trained on raw square waves, the PCA residual and the forest raise few alarms
-# for a bad reason: they cannot follow the edges, so their thresholds are high, and they find fewer faults than after training on real
-# telemetry. The dotted line
-# marks the 1 % that was asked for. Recall counts only beside few false alarms: who always alarms finds everything.
+# *What to see:* trained on the clean signal, every detector raises a false alarm on nearly every window. With the GAN's noise the result
+# depends on the detector. Plain Gaussian noise of the right size gives few false alarms with all three, because the real noise of this
+# example is white; its price is that the autoencoder finds fewer faults. Trained on raw square waves, the PCA residual and the forest
+# raise few alarms for a bad reason: they cannot follow the edges, so their thresholds are high, and they find fewer faults than after
+# training on real telemetry. The dotted line marks the 1 % that was asked for. Recall counts only beside few false alarms: who always
+# alarms finds everything.
 
 # %%
 print("false alarms / recall")
@@ -278,7 +278,7 @@ records = verdict(pipeline, "C6", "C8", "C9")
 assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 
 # %% [markdown]
-# This tour follows the paper's recipe. `EnhancedSimulator.fit` chooses among several noise models by held-out telemetry, as the page on
+# This tour follows the paper's recipe. `fit` chooses among several noise models by held-out telemetry, as the page on
 # [noise](../docs/noise.md) explains.
 #
 # ## Exercises

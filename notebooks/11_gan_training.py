@@ -9,9 +9,9 @@
 # - **Terms:** GAN: *generative adversarial network*; [adversarial loss](../docs/glossary.md#adversarial-loss). *Freezing* a network
 #   means that a step uses its weights without changing them.
 #
-# **What the paper says** (section 2.3): two phases an iteration. The discriminator learns from 200 real rows tagged 1.0 and 200
-# generated rows tagged 0.0. Then its weights are frozen, "the tags for this pass are reversed, and the discriminator is 'told' that the
-# generated values are real"; only the generator moves. About 1,000 iterations are needed.
+# **What the paper says** (section 2.3): two phases an iteration. The discriminator learns from a batch of 200 rows, half of them real ones
+# tagged 1.0 and half generated ones tagged 0.0. Then its weights are frozen, "the tags for this pass are reversed, and the discriminator
+# is 'told' that the generated values are real"; only the generator moves. About 1,000 iterations are needed.
 
 # %%
 import numpy as np

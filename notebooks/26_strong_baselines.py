@@ -305,12 +305,11 @@ def fit_ridge_and_network(inputs, targets, starts, epochs, seed=0):
 # rounding that the steps of Adam magnify:
 
 # %%
-from enhsim_tf.enhancer.ladder import RIDGE_AND_NETWORK, fit_rung
+from enhsim_tf.enhancer.candidates import RIDGE_AND_NETWORK, fit_enhancer
 
 mine = fit_ridge_and_network(inputs[:300], targets[:300], first[:300], 1)(new_inputs)
-ours = fit_rung(RIDGE_AND_NETWORK, inputs[:300], targets[:300], first[:300], seed=0, epochs=1).predict(
-    new_inputs
-)
+ours = fit_enhancer(RIDGE_AND_NETWORK, inputs[:300], targets[:300], first[:300], seed=0, epochs=1)
+ours = ours.predict(new_inputs[:, :, None])[:, :, 0]
 np.testing.assert_allclose(mine, ours, atol=0.01 * targets.std())
 
 # %% [markdown]

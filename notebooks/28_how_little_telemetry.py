@@ -44,7 +44,7 @@ if not is_full:
     small |= {"num_windows": 60, "num_judged": 60, "num_anomalous": 6}
 small = {f"few_windows__{name}": value for name, value in small.items()}
 # 100 is not one of the seeds of the published curve
-world = World(make_settings(budget, 100, telemetry__noise="autoregressive", **small))
+world = World(make_settings(budget, **small).of("autoregressive", 100))
 records = {k: world.record(k) for k in NUM_REAL}
 judged = world.judged
 for k, record in records.items():
