@@ -119,9 +119,7 @@ class Report:
         return [f"signals: error of the enhanced (and of the coarse) signal, NRMSE, with the noise: {said}"]
 
     def _of_noise(self) -> str:
-        judged = "; ".join(
-            f"{each['name']} {_auc(each)}, {each['alarms']:.1%} and {each['recall']:.0%}" for each in self.noise_candidates
-        )
+        judged = "; ".join(f"{each['name']} {_auc(each)}, {each['alarms']:.1%} and {each['recall']:.0%}" for each in self.noise_candidates)
         if not judged:
             return f"noise: {self.noise_model}"
         used = next(each for each in self.noise_candidates if each["is_chosen"])

@@ -75,25 +75,6 @@ def disjoint_starts(num_samples: int, window: int) -> np.ndarray:
     return np.arange(num_samples // window) * window
 
 
-def scattered_starts(num_samples: int, window: int, rng: np.random.Generator) -> np.ndarray:
-    """Starts of windows of one series that do not overlap, with gaps of random length between them.
-
-    Consecutive windows that are a whole number of periods long all begin at the same phase. What depends on the phase then looks
-    like a property of the noise. The gaps take up an eighth of the series, so that the phases differ.
-
-    Args:
-        num_samples: Length of the series.
-        window: Window length in samples.
-        rng: Random number generator.
-
-    Returns:
-        Integer array of shape `(windows,)`, in the order of time.
-    """
-    number = max(num_samples * 7 // (8 * window), min(1, num_samples // window))
-    gaps = np.sort(rng.integers(0, num_samples - number * window + 1, number))
-    return np.arange(number) * window + gaps
-
-
 def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
     """Cuts windows out of a series.
 

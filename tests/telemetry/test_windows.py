@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import (
     cut_windows,
     disjoint_rows,
     disjoint_starts,
     evenly_spaced_starts,
     random_window_starts,
-    scattered_starts,
-    split_by_time,
     time_blocks,
 )
 
@@ -44,29 +41,6 @@ def test_disjoint_windows_by_hand():
     assert disjoint_rows(starts[:0], 10).tolist() == []
 
 
-@pytest.mark.parametrize("number", [1_003, 5_000, 9_999])
-@pytest.mark.parametrize("fractions", [(0.7, 0.3), (0.6, 0.2, 0.2), (0.5, 0.3, 0.1, 0.1)])
-def test_split_leaves_gaps_and_uses_nearly_all_samples(number, fractions):
-    gap = 100
-    whole = Telemetry(np.arange(number, dtype=np.float32), interval_s=2.0, offset_s=11.0)
-    parts = split_by_time(whole, fractions, gap)
-    for before, after in zip(parts[:-1], parts[1:], strict=True):
-        assert after.values[0] - before.values[-1] - 1 == gap  # values are sample numbers
-    for part, fraction in zip(parts, fractions, strict=True):
-        assert (part.time_s == 11 + 2 * part.values).all()
-        assert len(part) == pytest.approx(fraction * (number - gap * (len(fractions) - 1)), abs=1)
-    assert parts[0].values[0] == 0 and number - len(parts) <= parts[-1].values[-1] + 1 <= number
-
-
-def test_split_refusals(refused):
-    series = Telemetry(np.arange(100, dtype=np.float32))
-    for fractions in [(0.5, 0.4), (1.2, -0.2), (0.0, 1.0)]:
-        with refused(str(fractions)):
-            split_by_time(series, fractions, 10)
-    with refused("gaps of 100"):
-        split_by_time(series, (0.5, 0.5), 100)
-
-
 def test_random_starts_reach_every_window_and_no_more(refused):
     starts = random_window_starts([range(30)], 20, 5_000, np.random.default_rng(0))
     counts = np.bincount(starts, minlength=11)
@@ -77,16 +51,6 @@ def test_random_starts_reach_every_window_and_no_more(refused):
     assert (starts != random_window_starts([range(30)], 20, 5_000, np.random.default_rng(1))).any()
     with refused("at least 20 samples", "Received: 19"):
         random_window_starts([range(19)], 20, 3, np.random.default_rng(0))
-
-
-def test_scattered_starts_share_no_sample_and_begin_at_all_phases():
-    rng = np.random.default_rng(0)
-    found = [scattered_starts(80_000, 400, rng) for _ in range(20)]
-    for starts in found:
-        assert len(starts) == 175 and np.all(np.diff(starts) >= 400) and starts[0] >= 0 and starts[-1] <= 79_600
-    phases = np.bincount(np.concatenate(found) % 400 // 100)  # quarters of the window; 3,500 starts, and 26 is one standard deviation
-    assert np.all(np.abs(phases - 875) < 4 * 26)
-    assert [scattered_starts(length, 400, rng).shape[0] for length in (399, 400, 799, 1_000)] == [0, 1, 1, 2]
 
 
 def test_disjoint_starts_share_no_sample():

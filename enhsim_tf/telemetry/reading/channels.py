@@ -40,7 +40,14 @@ def read_table_channels(
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
     what = _name_of(source)
     table = _without_repeats(read_table(source, options), columns, time, options, what)
-    lists = next((name for name, cells in table.frame.items() if isinstance(next(iter(cells), None), list | np.ndarray)), None)
+    lists = next(
+        (
+            name
+            for name, cells in table.frame.items()
+            if cells.dtype == object and len(cells) and isinstance(cells.iloc[0], list | np.ndarray)
+        ),
+        None,
+    )
     if lists is not None:
         raise InputError(
             f"Expected one value in each cell. Received: lists in {lists!r} of {what}, as in files of windows. Give a series (generate --continuous)."
