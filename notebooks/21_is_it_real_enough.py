@@ -19,7 +19,7 @@ from lesson_tools import check_answer, claim, drawing, open_pipeline, say, show,
 
 from enhsim_tf.common import measures
 from enhsim_tf.common.plot_style import DASHED, GENERATED, QUIET, REAL
-from enhsim_tf.noise import distances
+from studies.robustness import distances
 
 pipeline, budget = open_pipeline()
 claim("C6", "C8")

@@ -6,13 +6,12 @@ store keeps values, times, unit and name unchanged.
 
 import os
 import urllib.parse
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from enhsim_tf.common.atomic_files import encode_name, make_folder, replace_file, replace_folder
+from enhsim_tf.common.atomic_files import encode_name, make_folder, replace_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import check_parquet, short_reason
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
@@ -31,30 +30,6 @@ class TelemetryStore(Protocol):
 
     def names(self) -> list[str]:
         """The sorted names of the stored series."""
-
-
-def write_windows(path: str | os.PathLike, chunks: Iterable[np.ndarray], window: int) -> None:
-    """Writes windows chunk by chunk to one Parquet file, with one column `window` of fixed-size float32 lists.
-
-    The file appears under its name when it is complete. Read it, for example, with
-    `np.stack(pandas.read_parquet(path)["window"])`.
-
-    Args:
-        path: The file.
-        chunks: Chunks of windows, float32 arrays of shape `(windows, window)`. Each chunk becomes a row group.
-        window: Window length in samples.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    schema = pa.schema([("window", pa.list_(pa.float32(), window))])
-    # stores bytes of equal significance together: signs and exponents compress well, noisy mantissas do not
-    options = {"compression": "zstd", "use_dictionary": False, "column_encoding": "BYTE_STREAM_SPLIT", "write_statistics": False}
-    make_folder(Path(path).parent)
-    with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, **options) as writer:
-        for chunk in chunks:
-            values = pa.FixedSizeListArray.from_arrays(pa.array(np.ravel(chunk)), window)
-            writer.write_table(pa.table([values], schema), row_group_size=max(1, len(chunk)))
 
 
 class ParquetStore:

@@ -12,10 +12,11 @@ import numpy as np
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import evaluation
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.noise import real_floor
-from enhsim_tf.noise.surrogates import BlockBootstrap, GaussianAutoregression, GaussianNoise
+from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from studies.common.block_bootstrap import BlockBootstrap
 from studies.common.example import Example
 from studies.common.settings import Settings
+from studies.robustness import real_floor
 from studies.robustness.second_pipeline import SecondPipeline
 
 if TYPE_CHECKING:

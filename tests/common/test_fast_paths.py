@@ -204,17 +204,3 @@ def test_windows_do_not_depend_on_the_batch_size():
     for batch_size in (1, 5, 23, 1_000):
         np.testing.assert_allclose(enhance(network, coarse, batch_size), expected, atol=1e-6)
     assert enhance(network, coarse[:0]).shape == (0, 24)
-
-
-def test_a_failed_generation_leaves_the_old_file(tmp_path):
-    from enhsim_tf.telemetry.parquet_store import write_windows
-
-    def broken():
-        yield np.zeros((2, 3), np.float32)
-        raise RuntimeError("stopped")
-
-    path = tmp_path / "windows.parquet"
-    path.write_bytes(b"old")
-    with pytest.raises(RuntimeError, match="stopped"):
-        write_windows(path, broken(), 3)
-    assert path.read_bytes() == b"old" and len(list(tmp_path.iterdir())) == 1

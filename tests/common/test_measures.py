@@ -6,7 +6,7 @@ import scipy.linalg
 import scipy.stats
 
 from enhsim_tf.common import measures
-from enhsim_tf.noise import distances
+from studies.robustness import distances
 
 
 def normal(*shape, seed=0):

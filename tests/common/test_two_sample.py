@@ -6,7 +6,7 @@ import scipy.signal
 from sklearn.metrics import roc_auc_score
 
 from enhsim_tf.common import two_sample
-from enhsim_tf.noise import distances
+from studies.robustness import distances
 
 
 def normal(*shape, seed=0):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common import measures as fidelity
-from enhsim_tf.noise.real_floor import MEASURES, RealFloor, evaluate
+from studies.robustness.real_floor import MEASURES, RealFloor, evaluate
 from tests.noise import negative_controls
 
 NUM_WINDOWS, SAMPLES = 200, 500

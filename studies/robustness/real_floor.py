@@ -17,7 +17,7 @@ from enhsim_tf.common import measures as fidelity
 from enhsim_tf.common import two_sample
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.window_features import DECIMALS
-from enhsim_tf.noise import distances
+from studies.robustness import distances
 
 Comparison = Callable[[np.ndarray, np.ndarray], float]
 
