@@ -155,10 +155,10 @@ def choose_noise(
         if judgements[-1].passes:
             break
     if not judgements[-1].passes:  # all measures are needed to compare them
-        numbers = [CANDIDATES.index(each.name) for each in judgements]
-        judgements = [
-            judge.judge(CANDIDATES[each], models[CANDIDATES[each]], np.random.default_rng([seed, _DRAW, each])) for each in numbers
-        ]
+        for place, each in enumerate(judgements):
+            if each.auc is None:
+                auc = judge.classify(models[each.name], np.random.default_rng([seed, _DRAW, CANDIDATES.index(each.name), 1]))
+                judgements[place] = dataclasses.replace(each, auc=auc)
     chosen = choose(judgements)
     rows = [dataclasses.asdict(each) | {"passes": bool(each.passes), "is_chosen": each.name == chosen} for each in judgements]
     return everything.fit(chosen), rows, notes
@@ -261,11 +261,18 @@ class HeldOutJudge:
         noise = self._noise_on(self._clean, model, rng)
         alarms, recall = self._detected(self._seen(noise))
         is_close = alarms - self.real_alarms <= MAX_ALARM_EXCESS and self.real_recall - recall <= MAX_RECALL_LOSS
-        auc = None
-        if in_full or is_close:
-            pieces = pieces_of(self._noise_on(self._few, model, rng), self._learnt, self._held_out)[0]
-            auc = boosted_trees(self._features(pieces), self._held_out_features, self.seed).auc
+        auc = self.classify(model, rng) if in_full or is_close else None
         return CandidateJudgement(name, auc, self.real_auc, alarms, self.real_alarms, recall, self.real_recall)
+
+    def classify(self, model: NoiseModel, rng: np.random.Generator) -> float:
+        """Returns the AUC of a classifier that separates windows with the model's noise from held-out real ones.
+
+        Args:
+            model: The noise model.
+            rng: Random generator of its noise.
+        """
+        pieces = pieces_of(self._noise_on(self._few, model, rng), self._learnt, self._held_out)[0]
+        return boosted_trees(self._features(pieces), self._held_out_features, self.seed).auc
 
 
 def _channels(windows: np.ndarray) -> list[np.ndarray]:
