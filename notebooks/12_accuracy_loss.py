@@ -167,7 +167,7 @@ check_answer(
 # %%
 import dataclasses
 
-from enhsim_tf.paper.noise import build_generator
+from enhsim_tf.paper.noise import build_generator, generate_noise, train_gan  # noqa: F401  the exercise uses all three
 
 small = dataclasses.replace(settings, window=100, filters=32, rows=100, iterations=400, record_every=400)
 short = noise[:500, :100]

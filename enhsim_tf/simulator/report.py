@@ -10,7 +10,7 @@ from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import printable
 from enhsim_tf.enhancer.candidates import Choice
 from enhsim_tf.enhancer.names import COARSE
-from enhsim_tf.simulator.detector_choice import RATE, JudgedDetector
+from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
 from enhsim_tf.simulator.joint import cut
 from enhsim_tf.simulator.noise_choice import TOLD_APART
 from enhsim_tf.simulator.simulator import EnhancedSimulator
@@ -74,7 +74,7 @@ class Report:
         name = ", ".join(self.channels)
         where = "held-out time" if self.is_held_out else "the telemetry of the fit (none was held out)"
         chosen = next(each for each in self.detectors if each["name"] == self.detector)
-        rates = "; ".join(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}" for each in self.detectors)
+        rates = "; ".join(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}{_relation(each)}" for each in self.detectors)
         found = [
             *self._warnings(chosen),
             self.coarse,
@@ -218,6 +218,12 @@ def make_report(
         outside,
         examples,
     )
+
+
+def _relation(row: Mapping[str, Any]) -> str:
+    """Least recall of the anomalies of relations, of several channels."""
+    found = [row["by_kind"][kind] for kind in RELATIONS if kind in row["by_kind"]]
+    return f" ({min(found):.0%} of relations)" if found else ""
 
 
 def _auc(row: Mapping[str, Any]) -> str:

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.simulator.detector_choice import JudgedDetector, choose_detector, relation_anomalies
+from enhsim_tf.simulator.detector_choice import RELATIONS, JudgedDetector, choose_detector, relation_anomalies
 
 
-def detector(name, false_alarms=0.01, recall=0.5):
-    return JudgedDetector(name, false_alarms, 0.03, recall, {})
+def detector(name, false_alarms=0.01, recall=0.5, relation=None):
+    return JudgedDetector(name, false_alarms, 0.03, recall, {} if relation is None else {RELATIONS[0]: relation})
 
 
 @pytest.mark.parametrize(
@@ -15,6 +15,11 @@ def detector(name, false_alarms=0.01, recall=0.5):
         ([detector("a", recall=0.5), detector("b", recall=0.71)], "b"),
         ([detector("a", 0.04, 0.9), detector("b", 0.03, 0.1)], "b"),  # the first breaks its promise
         ([detector("a", 0.2), detector("b", 0.1)], "b"),  # both do
+        (
+            [detector("a", recall=0.5, relation=0.1), detector("b", recall=0.4, relation=0.9)],
+            "b",
+        ),  # only the second is near the best in both
+        ([detector("a", recall=0.9, relation=0.1), detector("b", recall=0.5, relation=0.8)], "b"),  # neither is: 1.0 and 1.3
     ],
 )
 def test_the_rule_by_hand(judged, expected):
@@ -23,7 +28,7 @@ def test_the_rule_by_hand(judged, expected):
 
 def test_relation_anomalies_keep_the_values_of_every_channel():
     windows = np.random.default_rng(0).standard_normal((10, 40, 3))
-    for found in relation_anomalies(windows, np.random.default_rng(1)).values():
+    for found in relation_anomalies(windows, np.zeros_like(windows), np.random.default_rng(1)).values():
         changed = (found != windows).any(axis=1)
         assert (changed.sum(axis=1) == 1).all()
         pool = {tuple(np.sort(windows[row, :, channel])) for row in range(10) for channel in range(3)}
