@@ -141,9 +141,9 @@ class Waves:
         return Waves(simulators, self.channels, self.interval_s, self.window)
 
     def is_flat(self, gain: np.ndarray) -> np.ndarray:
-        """Whether a window shows no shape in some channel with a wave; `gain` is that of `align`, the result has shape `(windows,)`."""
+        """Whether windows are too flat for the wave of a channel; `gain` is that of `align`, of shape `(windows, channels)` as the result."""
         waves = np.array([0.0 if each.is_constant else level_offset_and_scale(each)[1] for each in self.simulators])
-        return (gain < MIN_GAIN * waves).any(axis=1)
+        return gain < MIN_GAIN * waves
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Degraded | None], rng: np.random.Generator) -> Drawn:
         """Simulates coarse windows.

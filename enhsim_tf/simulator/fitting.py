@@ -124,7 +124,7 @@ def _fit_waves(
 
 
 class _FlatError(Exception):
-    """No window of a channel follows its square wave."""
+    """Too few windows follow the square waves; the channel is that whose wave is followed least."""
 
     def __init__(self, channel: int):
         super().__init__(channel)
@@ -169,9 +169,10 @@ def _fit_aligned(
     places = evenly_spaced_starts(series, window, _NUM_LEVELS)
     shift, gain = waves.align(cut(series, places, window))[1:]
     simulator.level_step = max(1.0, (places[-1] - places[0]) / max(1, len(places) - 1))
-    followed = ~waves.is_flat(gain)
+    is_flat = waves.is_flat(gain)
+    followed = ~is_flat.any(axis=1)
     if not followed.any():
-        raise _FlatError(0)
+        raise _FlatError(int(np.argmax(is_flat.mean(axis=0))))
     simulator.levels = np.stack([shift, gain], axis=2)[followed]
     values = np.concatenate(series)
     simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(len(channels)))
@@ -201,10 +202,10 @@ def _learn_waveforms(waves: Waves, targets: np.ndarray, times: np.ndarray) -> tu
     """
     for number in range(_ALIGNMENTS + 1):
         coarse, shift, gain = waves.align(targets)
-        kept = ~waves.is_flat(gain)
-        for channel in range(targets.shape[2]):
-            if kept.mean() < _LEAST_FOLLOWED and not waves.simulators[channel].is_constant:
-                raise _FlatError(channel)
+        is_flat = waves.is_flat(gain)
+        kept = ~is_flat.any(axis=1)
+        if kept.mean() < _LEAST_FOLLOWED:
+            raise _FlatError(int(np.argmax(is_flat.mean(axis=0))))
         safe = np.where(gain != 0, gain, 1.0)
         wanted = ((targets - shift[:, None]) / safe[:, None]).astype(np.float32)
         if number == _ALIGNMENTS or all(each.is_constant for each in waves.simulators):

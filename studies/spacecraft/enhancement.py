@@ -67,7 +67,7 @@ def _nearest(ridge: "EnhancedSimulator", train: np.ndarray, num_windows: int, co
     starts = evenly_spaced_starts([train], ridge.window, num_windows)
     windows, waves = cut_windows(train, starts, ridge.window)[:, :, None], _waves(ridge, True)
     learnt, shift, gain = waves.align(windows)
-    kept = ~waves.is_flat(gain)
+    kept = ~waves.is_flat(gain).any(axis=1)
     inputs, targets = learnt[kept], ((windows - shift[:, None])[kept] / gain[kept][:, None])[:, :, 0].astype(np.float32)
     number = choose_num_neighbours(inputs, targets, starts[kept])
     return nearest_windows(inputs, targets, coarse, number)[:, :, None]

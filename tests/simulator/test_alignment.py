@@ -25,7 +25,7 @@ def test_phase_offset_and_gain_of_windows_are_recovered(waves):
 
 
 def test_windows_that_do_not_follow_the_wave_are_flat(waves):
-    assert waves.is_flat(np.array([[0.05, 2.0], [0.2, 2.0]])).tolist() == [True, False]  # the wave's amplitude is 1
+    assert waves.is_flat(np.array([[0.05, 2.0], [0.2, 2.0]])).tolist() == [[True, False], [False, False]]  # the wave's amplitude is 1
 
 
 def test_waves_are_drawn_in_their_unit_and_a_scenario_may_concern_one_channel(waves):

@@ -10,7 +10,7 @@ from tests.simulator.conftest import joint
 def test_it_runs_in_a_pipeline_and_finds_a_fault():
     nominal, new = joint().parts[0].values, joint(seed=1).parts[0].values.copy()
     new[1_000:1_200, 1] -= 12.0
-    pipeline = make_pipeline(StandardScaler(), clone(TelemetryDetector(window=80))).fit(nominal)
+    pipeline = make_pipeline(StandardScaler(), clone(TelemetryDetector(window=80, detector="PCA residual"))).fit(nominal)
     flagged = pipeline.predict(new) == -1
     assert flagged[1_020:1_180].mean() > 0.9 and flagged[:900].mean() < 0.05
     decision, samples = pipeline.decision_function(new), pipeline.score_samples(new)

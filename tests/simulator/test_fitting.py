@@ -61,6 +61,14 @@ def test_a_wave_and_a_level_are_one_simulator():
     assert np.std(simulator.generate(200), axis=(0, 1))[1] == pytest.approx(1.0, rel=0.05)
 
 
+def test_only_the_channel_that_does_not_follow_its_wave_becomes_a_level():
+    values = series().values.copy()
+    values[2_000] += 1e5  # its best square wave is as high as the spike, and all other windows are flat beside it
+    spiky = Telemetry(values, 10.0, 0.0, series().start, "spiky")
+    simulator, _ = fit({"volts": series(seed=1), "spiky": spiky}, options=FEW)
+    assert [each.is_constant for each in simulator.alignment.simulators] == [False, True]
+
+
 def test_quantised_channels_stay_on_their_levels():
     telemetry = series(noise_sd=0.3)
     rounded = Telemetry(np.round(telemetry.values / 0.5).astype(np.float32) * 0.5, 10.0, 0.0, telemetry.start, "volts")
