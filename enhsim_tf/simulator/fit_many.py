@@ -208,10 +208,10 @@ def fit_or_say(job: Job) -> Outcome:
         failed |= {name: reason} if reason else {}
     lines = [line for each in cleaned.values() for line in each.report.lines()]
     reports: dict[str, dict] = {}
-    for group in _groups(cleaned):
-        names = name_of_channels(group)
-        reason = _reason_of(names, lambda group=group: _fit_group({name: cleaned[name] for name in group}, job, lines, reports))
-        failed |= dict.fromkeys(group, reason) if reason else {}
+    for telemetry in _on_one_clock(cleaned):
+        names = name_of_channels(list(telemetry.columns))
+        reason = _reason_of(names, lambda telemetry=telemetry: _fit_group(telemetry, cleaned, job, lines, reports))
+        failed |= dict.fromkeys(telemetry.columns, reason) if reason else {}
     return Outcome(job.name, lines, reports, failed)
 
 
@@ -225,11 +225,11 @@ def _cleaned(name: str, series: "pd.Series", cleaning: Cleaning) -> "Cleaned":
     return dataclasses.replace(cleaned, parts=tuple(dataclasses.replace(part, name=name) for part in cleaned.parts))
 
 
-def _groups(cleaned: "Mapping[str, Cleaned]") -> "list[list[str]]":
-    """Names of the channels that can be brought onto one clock."""
+def _on_one_clock(cleaned: "Mapping[str, Cleaned]") -> "list[Recording]":
+    """Joins the channels that can be brought onto one clock."""
     from enhsim_tf.simulator.joint import join_channels
 
-    return [list(each.columns) for each in join_channels({name: each.parts for name, each in cleaned.items()})] if cleaned else []
+    return join_channels({name: each.parts for name, each in cleaned.items()}) if cleaned else []
 
 
 def _reason_of(name: str, work: Callable[[], None]) -> str | None:
@@ -251,20 +251,18 @@ def _reason_of(name: str, work: Callable[[], None]) -> str | None:
     return None
 
 
-def _fit_group(cleaned: "Mapping[str, Cleaned]", job: Job, lines: list[str], reports: dict[str, dict]) -> None:
+def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Job, lines: list[str], reports: dict[str, dict]) -> None:
     """Fits and saves one simulator. Nothing is written if a step fails."""
     from enhsim_tf.simulator.fitting import fit
-    from enhsim_tf.simulator.joint import join_channels
     from enhsim_tf.simulator.report_figure import report_figure
 
-    name = name_of_channels(list(cleaned))
+    name = name_of_channels(list(telemetry.columns))
     progress = Progress(_tell_if_heard, f"{printable(name)}: ") if job.speaks else SILENT
-    (telemetry,) = join_channels({channel: each.parts for channel, each in cleaned.items()})
     commands = job.commands if len(job.series) == 1 else None
     simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
     folder = folder_of(job.out, name)
     refuse_foreign(folder)  # checked again, because the fit took time
-    found = {"report": report.to_dict(), "cleaning": {channel: each.report.to_dict() for channel, each in cleaned.items()}}
+    found = {"report": report.to_dict(), "cleaning": {channel: cleaned[channel].report.to_dict() for channel in telemetry.columns}}
     with replace_folder(folder) as temporary:
         simulator.save(temporary)
         write_json(temporary / "report.json", found)

@@ -64,32 +64,30 @@ def find_departure(
     """
     every = np.concatenate(list(scores))
     before = np.cumsum([0, *map(len, scores)])
-    nominal = _nominal_of(scorer)
+    learnt = _nominal_of(scorer)
+    nominal = _windows_of(learnt, scorer.window) if learnt else None
     has_left = every > 1
-    if nominal:
-        limits = _limits_of(_windows_of(nominal, scorer.window))
+    if nominal is not None:
+        limits = _limits_of(nominal)
         for number, first, series in judged:
             place = int(before[number]) + first
             has_left[place : place + len(series)] |= beyond(series, limits, scorer.window)
     begin = lasting(has_left, np.isfinite(every), scorer.window)
     if begin is None:
         return None
-    late = []
+    late = []  # of each stretch the samples of the departure, and the place of the first of them
     for number, first, series in judged:
         skip = max(0, begin - int(before[number]) - first)
         if len(series) - skip >= scorer.window:
-            late.append(series[skip:])
-    what = changed_properties(_windows_of(nominal, scorer.window), _windows_of(late, scorer.window)) if nominal and late else ("shape",)
-    after = every.copy()
-    if nominal and late:
-        (old_level, old_size), (new_level, new_size) = (_level_and_size(_windows_of(each, scorer.window)) for each in (nominal, late))
+            late.append((int(before[number]) + first + skip, series[skip:]))
+    what, after = ("shape",), every.copy()
+    if nominal is not None and late:
+        windows = _windows_of([series for _, series in late], scorer.window)
+        what = changed_properties(nominal, windows)
+        (old_level, old_size), (new_level, new_size) = _level_and_size(nominal), _level_and_size(windows)
         ratio = np.where(new_size > 0, old_size / np.where(new_size > 0, new_size, 1.0), 1.0)
-        for number, first, series in judged:
-            skip = max(0, begin - int(before[number]) - first)
-            if len(series) - skip >= scorer.window:
-                moved = old_level + (series[skip:] - new_level) * ratio
-                place = int(before[number]) + first + skip
-                after[place : place + len(moved)] = scorer.score_series(moved)
+        for place, series in late:
+            after[place : place + len(series)] = scorer.score_series(old_level + (series - new_level) * ratio)
     part = int(np.searchsorted(before, begin, "right") - 1)
     since = to_series(telemetry_of(telemetry)[part]).index[begin - int(before[part])]
     return Departure(

@@ -65,7 +65,7 @@ class Scorer:
         self.on_residual = simulator.is_run_model or self.name in (RESIDUAL, "innovation")
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
-        self.threshold, seed = 1.0, self.options.seed
+        seed = self.options.seed
         training = self._generated_windows(self.options.num_windows, seed)
         self.detector = ResidualSize() if self.name == RESIDUAL else all_detectors()[self.name](seed)
         means = training.mean(axis=1, dtype=np.float64)
@@ -131,15 +131,10 @@ class Scorer:
         """Scores each sample of a series of shape `(samples, channels)` by the mean score of the windows that contain it."""
         begins = np.unique(np.append(np.arange(0, len(series) - self.window + 1, self.stride), len(series) - self.window))
         step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
+        chunks = (begins[first : first + step] for first in range(0, len(begins), step))
+        scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
         if self.name == RESIDUAL:  # its scale follows the windows before, so it sees all sizes at once
-            sizes = [self._sizes(cut([series], begins[first : first + step], self.window)) for first in range(0, len(begins), step)]
-            scores = self.detector.score_sizes(np.concatenate(sizes))
-        else:
-            found = [
-                self.detector.score(self._judged(cut([series], begins[first : first + step], self.window)))
-                for first in range(0, len(begins), step)
-            ]
-            scores = np.concatenate(found)
+            scores = self.detector.score_sizes(scores)
         return mean_over_windows(scores, begins, self.window, len(series))
 
     def _sizes(self, windows: np.ndarray) -> np.ndarray:
@@ -205,7 +200,7 @@ def score(
     Raises:
         InputError: If channels, interval or run do not fit to the simulator, or if every part is shorter than a window.
     """
-    _check(simulator, telemetry, run)
+    check_fits(simulator, telemetry, run)
     with threadpool_limits(1):  # several threads take longer for arrays of this size
         return _scored(simulator, telemetry, run, scorer or Scorer(simulator, options))
 
@@ -250,7 +245,17 @@ def _scored(simulator: EnhancedSimulator, telemetry: Recording, run: Recording |
     return frame
 
 
-def _check(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
+def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
+    """Refuses telemetry or a run that do not fit to a simulator.
+
+    Args:
+        simulator: The fitted simulator.
+        telemetry: Telemetry of its channels.
+        run: The coarse run of the same time, or None.
+
+    Raises:
+        InputError: If channels or interval differ, if a run is missing, or if one is given that the simulator cannot use.
+    """
     if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
-from enhsim_tf.common.errors import InputError, printable
-from enhsim_tf.simulator.alignment import Runs
+from enhsim_tf.common.errors import printable
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.joint import cut, long_enough, split_end
 from enhsim_tf.simulator.options import FitOptions, ScoreOptions
-from enhsim_tf.simulator.scoring import Scorer
+from enhsim_tf.simulator.scoring import Scorer, check_fits
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
@@ -78,17 +77,7 @@ def update(
     Raises:
         InputError: If the telemetry has other channels or another interval, or is too short.
     """
-    if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
-        raise InputError(
-            f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
-        )
-    if abs(telemetry.interval_s / simulator.interval_s - 1) > 1e-3:
-        raise InputError(
-            f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {telemetry.interval_s:g} s. "
-            "Give telemetry with the same sampling interval, or --interval."
-        )
-    if simulator.is_run_model and run is None:
-        raise InputError("Expected the coarse run of the new telemetry. Received: none. Give it with --coarse.")
+    check_fits(simulator, telemetry, run)
     known = {field.name for field in dataclasses.fields(FitOptions)}
     kept = {name: value for name, value in dict(simulator.trained.get("options", {})).items() if name in known}
     options = FitOptions(**kept | {"held_out": held_out, "seed": seed})
@@ -96,17 +85,10 @@ def update(
     new, _ = fit(telemetry, run, options)
     new.trained["updates"] = [*simulator.trained.get("updates", ()), {"num_samples": len(telemetry), "held_out": held_out, "seed": seed}]
     window = max(simulator.window, new.window)
-    judged = telemetry if run is None else _paired(simulator, telemetry, run)[0]
+    judged = telemetry if run is None else simulator._runs().pair(telemetry, run)[0]
     end = long_enough(split_end(judged, held_out)[1], window) or long_enough(judged, window)
     before, after = (_state(each, end, run, seed) for each in (simulator, new))
     return new, UpdateReport(simulator.channels, len(telemetry), len(end), before, after)
-
-
-def _paired(simulator: EnhancedSimulator, telemetry: Recording, run: Recording) -> tuple[Recording, Recording]:
-    alignment = simulator.alignment
-    if not isinstance(alignment, Runs):
-        raise InputError("Expected no coarse run for a simulator of square waves. Received: one. Leave --coarse out.")
-    return alignment.pair(telemetry, run)
 
 
 def _state(simulator: EnhancedSimulator, end: Recording, run: Recording | None, seed: int) -> dict[str, Any]:
@@ -124,7 +106,7 @@ def _state(simulator: EnhancedSimulator, end: Recording, run: Recording | None, 
             if not wave.is_constant:
                 found["period_s"][name] = float(wave.waves[0].period_s)
     else:
-        paired, coarse = _paired(simulator, end, run)
+        paired, coarse = simulator._runs().pair(end, run)
         series = [part.values for part in paired.parts]
         enhanced = [simulator.enhance_run(part.values) for part in coarse.parts]
         starts = evenly_spaced_starts(series, window, _NUM_WINDOWS)
