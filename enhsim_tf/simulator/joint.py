@@ -140,7 +140,7 @@ def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.nda
     which = np.searchsorted(firsts, starts, "right") - 1
     windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)
     for number in np.unique(which):
-        rows = which == number
+        rows = which == number if len(usable) > 1 else slice(None)
         view = np.lib.stride_tricks.sliding_window_view(usable[number], window, axis=0)
         windows[rows] = view[np.asarray(starts)[rows] - firsts[number]].transpose(0, 2, 1)
     return windows

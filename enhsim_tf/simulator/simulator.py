@@ -287,7 +287,8 @@ class EnhancedSimulator:
 
     def _with_noise(self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if not mask.any():
-            return self._rounded(windows + noise), mask
+            windows += noise
+            return self._rounded(windows), mask
         values = np.empty_like(windows)
         for channel, levels in enumerate(self.quantisation):
             of = (..., channel)
