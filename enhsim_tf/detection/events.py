@@ -225,13 +225,13 @@ def false_alarms_per_day(num_events: int, duration_s: float, level: float = 0.95
     Raises:
         InputError: If the duration is not above 0 or the number is negative.
     """
-    from scipy.stats import chi2
+    from scipy.special import gammaincinv  # half of the quantiles of chi-squared; scipy.stats takes a second to import
 
     if not duration_s > 0 or num_events < 0:
         raise InputError(f"Expected a number of events and a duration above 0 s. Received: {num_events} events in {duration_s} s.")
     tail, days = (1 - level) / 2, duration_s / DAY_S
-    low = chi2.ppf(tail, 2 * num_events) / 2 if num_events else 0.0
-    high = chi2.ppf(1 - tail, 2 * num_events + 2) / 2
+    low = gammaincinv(num_events, tail) if num_events else 0.0
+    high = gammaincinv(num_events + 1, 1 - tail)
     return num_events / days, float(low / days), float(high / days)
 
 
