@@ -99,7 +99,7 @@ def first_samples(parts: Sequence[Sized], starts: np.ndarray, window: int) -> np
         starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
         window: Number of samples in a window.
     """
-    return np.asarray(starts) + (window - 1) * _which_part(_first_starts(parts, window), starts)
+    return np.asarray(starts) + (window - 1) * places_in_parts(parts, starts, window)[0]
 
 
 def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
@@ -107,8 +107,17 @@ def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
     return np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
 
 
-def _which_part(firsts: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    return np.searchsorted(firsts, starts, "right") - 1
+def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns where each window lies: the number of its part, among those that are long enough, and its first sample there.
+
+    Args:
+        parts: Contiguous parts of one series.
+        starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
+        window: Number of samples in a window.
+    """
+    firsts = _first_starts(parts, window)
+    which = np.searchsorted(firsts, starts, "right") - 1
+    return which, np.asarray(starts) - firsts[which]
 
 
 def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
@@ -126,16 +135,15 @@ def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, windo
         InputError: If an index is out of range.
     """
     starts, usable = np.asarray(starts), [part for part in parts if len(part) >= window]
-    firsts = _first_starts(parts, window)
-    if len(starts) and not 0 <= starts.min() <= starts.max() < firsts[-1]:
-        raise InputError(f"Expected window starts from 0 to before {firsts[-1]}. Received: from {starts.min()} to {starts.max()}.")
-    which = _which_part(firsts, starts)
+    number = num_window_starts(parts, window)
+    if len(starts) and not 0 <= starts.min() <= starts.max() < number:
+        raise InputError(f"Expected window starts from 0 to before {number}. Received: from {starts.min()} to {starts.max()}.")
+    which, places = places_in_parts(parts, starts, window)
     windows, time_s = np.empty((len(starts), window), np.float32), np.empty(len(starts))
     for number, part in enumerate(usable):
         here = which == number
-        own = starts[here] - firsts[number]
-        windows[here] = cut_windows(part.values, own, window)
-        time_s[here] = part.offset_s + part.interval_s * own
+        windows[here] = cut_windows(part.values, places[here], window)
+        time_s[here] = part.offset_s + part.interval_s * places[here]
     return windows, time_s
 
 
