@@ -271,7 +271,7 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
             "Give it with --coarse."
         )
     if run is not None:
-        simulator._runs()
+        simulator.recorded_runs()
 
 
 def _coarse_of(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> list[list[tuple[int, np.ndarray]]]:
