@@ -10,7 +10,7 @@ from enhsim_tf.coarse_simulator.constant_level import waves_or_level
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_with_recording
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, held_samples, simulate_schedule
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.errors import InputError
@@ -18,7 +18,6 @@ from enhsim_tf.simulator.joint import cut, telemetry_of
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
-_SAME_RATE = 1e-3
 _SAME_PERIOD = 0.02  # largest relative difference of periods that are one clock
 
 
@@ -283,7 +282,7 @@ class Runs:
             InputError: If a column is missing, the interval differs, or every part is shorter than a window.
         """
         run, interval_s = run.select(self.columns), self.nominal.interval_s
-        if abs(run.interval_s / interval_s - 1) > _SAME_RATE:
+        if abs(run.interval_s / interval_s - 1) > SAME_RATE:
             raise InputError(
                 f"Expected a coarse run with a sample every {interval_s:g} s, as in the fit. Received: every {run.interval_s:g} s in {run.name}. "
                 "Read it with read_recording(..., interval_s=model.interval_s)."

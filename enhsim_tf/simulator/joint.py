@@ -5,12 +5,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 from enhsim_tf.telemetry.windows import places_in_parts
 
-_SAME_RATE = 1e-3  # largest relative difference of two intervals that count as one
 _LEAST_SHARED = 0.5  # channels that share a smaller part of their time do not become one model
 
 
@@ -62,7 +61,7 @@ def telemetry_of(recording: Recording, channel: int = 0) -> list[Telemetry]:
 
 
 def _is_alike(first: Telemetry, second: Telemetry) -> bool:
-    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= _SAME_RATE
+    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= SAME_RATE
 
 
 def _joined(channels: Mapping[str, Sequence[Telemetry]]) -> Recording | None:

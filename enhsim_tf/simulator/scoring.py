@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
@@ -260,7 +260,7 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
         )
-    if abs(telemetry.interval_s - simulator.interval_s) > 1e-3 * simulator.interval_s:
+    if abs(telemetry.interval_s - simulator.interval_s) > SAME_RATE * simulator.interval_s:
         raise InputError(
             f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {telemetry.interval_s:g} s. "
             "Give telemetry with the same sampling interval, or --interval."
