@@ -144,8 +144,8 @@ class MatchedWindowBootstrap:
 class _Neighbours:
     """Which stored signals are nearest to a given one.
 
-    Signals are compared on the principal components that hold all but a share of `_EQUAL**2` of their variance, each channel in its own unit.
-    One of each group of stored signals that count as equal is a landmark; of very many, some are.
+    One of each group of stored signals that count as equal is a landmark; of very many, some are. A given signal is compared with the landmarks
+    on the principal components that hold all but a share of `_EQUAL**2` of the variance, each channel in its own unit.
 
     Args:
         signals: Means of the stored signals over segments, shape `(windows, segments * channels)`.
@@ -169,7 +169,7 @@ class _Neighbours:
         places, equal = known @ axes, _EQUAL**2 * len(axes)
         _, first = np.unique(np.round(places / math.sqrt(equal / axes.shape[1])), axis=0, return_index=True)
         first = first[np.linspace(0, len(first) - 1, min(len(first), _MOST_LANDMARKS)).astype(int)]
-        self.of, landmarks = _nearest_of(places[first], places, equal), places[first].astype(np.float32)
+        self.of, landmarks = _nearest_of(known[first], known, equal), places[first].astype(np.float32)
         # the square of a distance is that of the landmark minus twice a product, beside what is the same for all landmarks
         self._landmarks, self._halves = landmarks.T, 0.5 * np.sum(landmarks**2, axis=1)
         lengths = np.diff(_edges(window))
