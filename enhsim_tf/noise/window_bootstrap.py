@@ -158,12 +158,12 @@ class _Neighbours:
 
     def __init__(self, signals: np.ndarray, window: int, channels: int):
         signals = signals.reshape(len(signals), -1, channels)
-        self._centre = signals.mean(axis=(0, 1), dtype=np.float64).astype(np.float32)  # smaller numbers, smaller rounding errors
-        known = signals - self._centre.astype(np.float64)
-        spread = np.std(known - known.mean(axis=0), axis=(0, 1))
+        lengths, centre = np.diff(_edges(window)), signals.mean(axis=0, dtype=np.float64).astype(np.float32)
+        known = signals - centre.astype(np.float64)
+        spread = np.std(known, axis=(0, 1))
         unit = np.where(spread > 0, spread, 1.0)
         known = (known / unit).reshape(len(signals), -1)
-        _, sizes, axes = np.linalg.svd(known - known.mean(axis=0), full_matrices=False)
+        _, sizes, axes = np.linalg.svd(known, full_matrices=False)
         held = np.cumsum(sizes[::-1] ** 2)[::-1]
         axes = axes[: max(1, np.count_nonzero(held > _EQUAL**2 * held[0]))].T
         places, equal = known @ axes, _EQUAL**2 * len(axes)
@@ -172,7 +172,7 @@ class _Neighbours:
         self.of, landmarks = _nearest_of(known[first], known, equal), places[first].astype(np.float32)
         # the square of a distance is that of the landmark minus twice a product, beside what is the same for all landmarks
         self._landmarks, self._halves = landmarks.T, 0.5 * np.sum(landmarks**2, axis=1)
-        lengths = np.diff(_edges(window))
+        self._centre = np.repeat(centre, lengths, axis=0)  # subtracted first: smaller numbers, smaller rounding errors
         axes = axes.reshape(-1, channels, axes.shape[1]) / (lengths[:, None, None] * unit[:, None])  # from means of segments to samples
         self._axes = np.repeat(axes, lengths, axis=0).reshape(window * channels, -1).astype(np.float32)
 
