@@ -4,6 +4,7 @@ Times are processor time, so that the load of the machine matters little: `pytho
 In memory, all work is done by one thread, because threads that wait for each other use processor time, too.
 """
 
+import contextlib
 import os
 import sys
 import time
@@ -47,10 +48,11 @@ def table(path: str, samples: int) -> None:
 
 
 def command(*arguments: object) -> None:
-    """Runs a command of the tool."""
+    """Runs a command of the tool, without what it prints."""
     from enhsim_tf.cli.main import main
 
-    sys.exit(main([str(each) for each in arguments]))
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        sys.exit(main([str(each) for each in arguments]))
 
 
 def windows(folder: str, number: int, out: str) -> None:
