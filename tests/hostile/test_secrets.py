@@ -1,6 +1,6 @@
 """The database token and passwords in URLs never appear in anything that is printed or written.
 
-Tests that need a server are in `test_influx_store.py::test_the_token_appears_nowhere`.
+Tests that need a server are in `test_influx_server.py::test_the_token_appears_nowhere`.
 """
 
 import logging

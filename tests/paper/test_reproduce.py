@@ -122,25 +122,3 @@ def test_killed_in_training_it_ends_with_the_same_numbers(ran, tmp_path):
     assert found["from_cache"] == ["telemetry", "enhancer", "enhancement"]
     claims, expected = ([claim for claim in each["claims"] if claim["id"] != "C2"] for each in (found, ran[2]))
     assert claims == expected, "to the last digit, in another cache"
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["--set", "dropout"],
-        ["--set", "no_such=1"],
-        ["--only", "fig99"],
-        ["--seed", "-1"],
-        ["--column", "volts"],
-        ["--telemetry", "no_such.csv"],
-        ["--store", "postgres"],
-        ["--budget", "smoke", "--out", "figures"],
-        ["--budget", "huge"],
-    ],
-)
-def test_an_option_that_cannot_be_used_gives_one_line_and_code_2(arguments, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert reproduce.main(arguments) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 1 and re.match(r"error: Expected .*Received: ", lines[0])
-    assert not list(tmp_path.rglob("*.png"))
