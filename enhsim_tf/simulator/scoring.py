@@ -17,7 +17,6 @@ from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.evaluation import mean_over_windows
 from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
 from enhsim_tf.detection.residual_size import ResidualSize
@@ -26,6 +25,7 @@ from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.windows import mean_over_windows
 
 if TYPE_CHECKING:
     import pandas as pd

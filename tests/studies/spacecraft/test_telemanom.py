@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.telemanom import LABELS, load_channel, load_labelled, read_labels
+from studies.spacecraft.telemanom import LABELS, load_channel, load_labelled, read_labels
 
 SMAP = Path(__file__).parents[2] / ".." / "shared" / "data" / "smap"
 HEADER = "chan_id,spacecraft,anomaly_sequences,class,num_values"
