@@ -171,14 +171,12 @@ def test_fit_prints_the_cleaning_and_the_report(fitted):
         assert words in said
 
 
-def test_fit_makes_one_simulator_of_all_channels_and_one_for_each_if_asked(told, tmp_path):
+def test_fit_makes_one_simulator_of_all_channels(told, tmp_path):
     code, out, errors = told("fit", "WORLD/two.csv", "--out", "models", "--json", *TINY)
     assert (code, errors) == (0, []) and set(json.loads(out)) == {"volts~amps"}
     ((name, folder),) = models_of(tmp_path / "models").items()
     assert name == "volts~amps" and channels_of(folder) == ("volts", "amps")
     assert json.loads(out)[name]["report"]["channels"] == ["volts", "amps"]
-    code, _, errors = told("fit", "WORLD/two.csv", "--out", "apart", "--separately", "--workers", "1", *TINY)
-    assert (code, errors) == (0, []) and set(models_of(tmp_path / "apart")) == {"volts", "amps"}
 
 
 def test_generate_writes_training_data_with_a_fitted_simulator(fitted, told, tmp_path):
