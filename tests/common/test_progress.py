@@ -79,10 +79,7 @@ def test_the_interval_between_lines_spans_several_loops(clock):
     clock.now += 12  # before the first loop begins
     walk(clock, progress.loop("enhancer, epoch", 2), [1, 1.5], 4)
     walk(clock, progress.loop("noise GAN, iteration", 10), range(1, 10), 2)
-    assert told == [
-        "second       enhancer, epoch 1 of 2, 50 %",
-        "second       noise GAN, iteration 6 of 10, 60 %, about 8 s left",
-    ]
+    assert told == ["second       enhancer, epoch 1 of 2, 50 %", "second       noise GAN, iteration 6 of 10, 60 %, about 8 s left"]
 
 
 def test_a_unit_of_several_steps(clock):

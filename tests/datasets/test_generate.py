@@ -179,17 +179,7 @@ def test_a_removed_manifest_is_written_again(undisturbed, tmp_path, here):
     assert len(here) == 20 and content_of(folder) == content_of(undisturbed)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"{",
-        b"[]",
-        b"null",
-        b"\xff",
-        b'{"format": "enhsim_tf.datasets.generate/3", "settings": {}}',
-    ],
-)
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"null", b"\xff", b'{"format": "enhsim_tf.datasets.generate/3", "settings": {}}'])
 def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)

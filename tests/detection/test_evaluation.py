@@ -6,13 +6,7 @@ import pytest
 from enhsim_tf.detection import evaluation, metrics
 from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
 from enhsim_tf.detection.detectors import LargestStep, PCAResidual
-from enhsim_tf.detection.evaluation import (
-    evaluate_arm,
-    false_alarm_rates,
-    make_trial,
-    mean_over_windows,
-    score_trace,
-)
+from enhsim_tf.detection.evaluation import evaluate_arm, false_alarm_rates, make_trial, mean_over_windows, score_trace
 
 WINDOW = 300
 

@@ -54,11 +54,7 @@ BAD_FILES = {  # the content of files is tried in tests/fuzzing
     "pickled objects": ("x.npy", _array(np.array([{}, None] * 1_000, object)), []),
     "irregular times": ("x.csv", lambda path: _table(path, a=_wave(), t=np.arange(4_000) ** 1.1), ["--column", "a", "--time", "t"]),
     "falling times": ("x.csv", lambda path: _table(path, a=_wave(), t=-np.arange(4_000)), ["--column", "a", "--time", "t"]),
-    "a word among the times": (
-        "x.csv",
-        lambda path: _table(path, a=_wave(), t=[*range(3_999), "soon"]),
-        ["--column", "a", "--time", "t"],
-    ),
+    "a word among the times": ("x.csv", lambda path: _table(path, a=_wave(), t=[*range(3_999), "soon"]), ["--column", "a", "--time", "t"]),
 }
 
 

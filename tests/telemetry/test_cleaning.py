@@ -141,12 +141,7 @@ REPAIRED = {
     "NaN": (set_rows([7, 8, 50], np.nan, float), {}, {"missing values": 3, "gaps filled": 2}, linear([7, 8, 50])),
     "pandas' NA": (set_rows([7], pd.NA, "Float64"), {}, {"missing values": 1, "gaps filled": 1}, linear([7])),
     "empty text": (set_rows([7, 50], ["", " "]), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
-    "words for nothing": (
-        set_rows([7, 50, 90], ["nan", "N/A", "NULL"]),
-        {},
-        {"missing values": 3, "gaps filled": 3},
-        linear([7, 50, 90]),
-    ),
+    "words for nothing": (set_rows([7, 50, 90], ["nan", "N/A", "NULL"]), {}, {"missing values": 3, "gaps filled": 3}, linear([7, 50, 90])),
     "rows missing": (CLEAN.drop(TIMES[[7, 8, 50]]), {}, {"gaps filled": 2}, linear([7, 8, 50])),
     "numbers as text with spaces": (with_values(lambda values: pd.Series([f" {word}\t" for word in WORDS], index=TIMES)), {}, {}),
     "decimal commas": (
@@ -161,12 +156,7 @@ REPAIRED = {
         {"bad values": 1, "gaps filled": 1},
         linear([7]),
     ),
-    "beyond float32, dropped": (
-        set_rows([7], 1e39, float),
-        {"on_bad_values": "drop"},
-        {"bad values": 1, "gaps filled": 1},
-        linear([7]),
-    ),
+    "beyond float32, dropped": (set_rows([7], 1e39, float), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
     "beyond float64, dropped": (set_rows([7], 10**400), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
 }
 

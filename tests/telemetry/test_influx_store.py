@@ -213,5 +213,3 @@ print(code, sorted({{'tensorflow', 'keras', 'matplotlib', 'pandas', 'sklearn'}} 
     assert done.stdout == "2 []\n", done.stderr
     assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("error: Expected ") and word in done.stderr
     assert not list(tmp_path.iterdir())
-
-
