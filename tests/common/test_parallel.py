@@ -85,6 +85,7 @@ def test_a_missing_ray_package_raises_one_line(monkeypatch, refused):
         list(engines.run("ray", refuse, [1], 2))
 
 
+@pytest.mark.slow
 @with_ray
 def test_ray_gives_the_same_results_and_replaces_killed_actors(tmp_path, monkeypatch, refused):
     import ray
@@ -136,6 +137,7 @@ def test_a_cluster_that_does_not_start_raises_one_line(error, monkeypatch, refus
         pass
 
 
+@pytest.mark.slow
 @with_ray
 def test_a_local_cluster_starts_after_a_failed_connection(monkeypatch, refused):
     from enhsim_tf.common.parallel.ray import _cluster
@@ -148,6 +150,7 @@ def test_a_local_cluster_starts_after_a_failed_connection(monkeypatch, refused):
         assert ray.is_initialized()
 
 
+@pytest.mark.slow
 @with_ray
 def test_a_missing_cluster_raises_one_line(monkeypatch, refused):
     monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:1")

@@ -188,6 +188,7 @@ def spoken_in(text):
     return found
 
 
+@pytest.mark.slow
 def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", *TINY_OPTIONS, "--only", "fig13"]
     command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
@@ -206,6 +207,7 @@ def table(folder):
 FIT = ("--num-windows", "60", "--noise", "gaussian", "--enhancer", "ridge")
 
 
+@pytest.mark.slow
 def test_fitting_processes_name_their_channel(tmp_path, environment):
     command = [
         sys.executable,
@@ -225,6 +227,7 @@ def test_fitting_processes_name_their_channel(tmp_path, environment):
     assert {f"{name}: enhancer ridge ..." for name in ("volts", "amperes")} <= set(done.stdout.splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="exit code 141 is POSIX")
 def test_a_closed_output_pipe_does_not_stop_the_fits(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--column", "volts", "--out", tmp_path / "models", *FIT]

@@ -69,6 +69,7 @@ def test_rates_count_what_lies_above():
     assert (false_alarm_rate(scores, 0.5), recall(scores, 0.5), recall(scores, 0.05), recall(scores, 0.9)) == (0.25, 0.25, 1, 0)
     assert recall_at_real_rate(np.arange(99), [97.5, 98, 98.5, 200], rate=0.01) == 0.5  # the threshold is 98
     assert recall_at_real_rate(np.arange(99), [97, 98.5], rate=0.02) == 0.5  # the threshold is 97
+    assert recall_at_real_rate(np.arange(199), [197.5, 196.5]) == 0.5  # by default 1 %: the threshold is 197
 
 
 @pytest.mark.parametrize(("rate", "number"), [(0, 10), (1, 10), (-0.1, 10), (np.nan, 10), (0.1, 0)])

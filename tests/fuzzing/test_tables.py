@@ -107,6 +107,7 @@ def test_what_once_failed_is_refused(name, data):
     assert not judge(read_file, name, data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_changed_files(name):
     @tried(100)
