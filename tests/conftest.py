@@ -26,6 +26,7 @@ apply_settings()  # tests that import Keras directly use the package's settings
 
 ROOT = Path(__file__).parents[1]
 SLOW = "--slow"
+TOGETHER = ("paper", "simulator")  # folders whose files share fixtures that take seconds: a process runs all of a folder
 LEFT = pytest.StashKey[int]()
 
 
@@ -33,8 +34,12 @@ def pytest_addoption(parser):
     parser.addoption(SLOW, action="store_true", help="also run the tests that are marked as slow")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Leaves the slow tests out, unless they are asked for."""
+    """Keeps the tests of a file in one process, and leaves the slow ones out, unless they are asked for."""
+    for item in items:
+        place = item.path.relative_to(ROOT / "tests").with_suffix("")
+        item.add_marker(pytest.mark.xdist_group(place.parts[0] if place.parts[0] in TOGETHER else "/".join(place.parts)))
     if config.getoption(SLOW):
         return
     left = {item for item in items if item.get_closest_marker("slow")}

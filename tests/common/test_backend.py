@@ -56,6 +56,7 @@ def test_another_backend_of_keras_is_refused_in_one_line():
     assert ended.stderr.startswith("error: Expected KERAS_BACKEND") and "Received: jax" in ended.stderr and ended.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_keras_that_was_imported_with_another_backend_is_refused(tmp_path):
     """Other backends need packages that are not installed, so a stub of Keras reports another backend."""
     (tmp_path / "keras.py").write_text("class backend:\n    def backend():\n        return 'torch'\n")

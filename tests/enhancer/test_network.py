@@ -140,6 +140,7 @@ def test_all_random_numbers_depend_on_the_seeds_only():
         assert (values != other_weights[key]).any() and (values != other_order[key]).any()
 
 
+@pytest.mark.slow
 def test_compiled_and_plain_training_are_the_same():
     compiled, plain = small(), small()
     histories = [fit_small(model, 0, jit_compile=jit) for model, jit in ((compiled, True), (plain, False))]

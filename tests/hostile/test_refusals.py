@@ -144,10 +144,6 @@ def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch,
     "arguments",
     [
         ["--telemetry", "no/such/file.npy"],
-        ["--seed", "-1"],
-        ["--seed", "abc"],
-        ["--budget", "tiny"],
-        ["--only", "fig99"],
         ["--out", "README.md/below"],
     ],
 )

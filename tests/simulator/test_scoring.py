@@ -56,7 +56,7 @@ def test_samples_without_a_run_get_no_score(of_run, telemetry):
 def test_several_channels_are_scored_together(both):
     frame = score(both[0], changed(joint(seed=7), 1_000, 1_200, -9.0, channel=1), options=ScoreOptions("PCA residual"))
     assert list(frame.columns[:2]) == ["volts", "watts"] and frame["flag"].iloc[1_020:1_180].mean() > 0.9
-    assert frame["flag"].iloc[:900].mean() < 0.05
+    assert frame["flag"].iloc[:900].mean() < 0.1  # at most one of the eleven windows
 
 
 def test_the_same_seed_gives_the_same_scores(single, telemetry):

@@ -311,6 +311,9 @@ def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
             assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
             found = cleaned.report.find("gaps")
             assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
+    slow = pd.Series(VALUES, START + pd.to_timedelta(10 * np.arange(N), unit="s")).drop(START + pd.to_timedelta(10 * missing, unit="s"))
+    gaps = cleaned_of(slow, max_fill=4).report.find("gaps")
+    assert gaps.details["longest"] == 10 * (length + 1) and gaps.places[0].startswith("row 99,")
     assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=6).parts) == 1
     assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
 
