@@ -1,7 +1,7 @@
 """What the files of this folder share: changed inputs, and the judgement of what a reader does with one.
 
-Every input is accepted, or refused with an `InputError` of one printable line, within 5 s of processor time and 1 GiB of memory. A run of the slow tests tries
-a few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest tests/fuzzing` tries as many others.
+Every input is accepted, or refused with an `InputError` of one printable line, within 5 s of processor time and 1 GiB of memory. The slow
+tests try a few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest --slow tests/fuzzing` tries as many others.
 """
 
 import contextlib
