@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.coarse_simulator.recording import Run
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection.registry import register, unregister
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer, event_rows, events_table, score, write_scores
+from tests.known_simulators import of_waves
 from tests.simulator.conftest import coarse_run, joint, series
 
 
@@ -102,3 +105,67 @@ def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry)
         score(of_run[0], telemetry)
     with pytest.raises(InputError, match="one of: residual"):
         ScoreOptions("crystal ball")
+
+
+class Largest:
+    """A detector whose scores are easily computed: the largest sample of a window, plus a constant."""
+
+    def __init__(self, added=0.0):
+        self.added = added
+
+    def fit(self, windows):
+        return self
+
+    def score(self, windows):
+        return windows.max(axis=1) + self.added
+
+
+@pytest.fixture
+def largest():
+    """The name of a registered detector that takes the largest sample, and of one that subtracts a hundred from it."""
+    names = {"largest sample": 0.0, "largest sample minus 100": -100.0}
+    for name, added in names.items():
+        register(name, lambda seed, added=added: Largest(added))
+    yield list(names)
+    for name in names:
+        unregister(name)
+
+
+def by_hand(series, window=24):
+    """The mean of the largest samples of all windows that contain a sample; one begins every eighth of a window, and one ends the series."""
+    begins = [*range(0, len(series) - window, window // 8), len(series) - window]
+    sums, counts = np.zeros(len(series)), np.zeros(len(series))
+    for begin in begins:
+        sums[begin : begin + window] += series[begin : begin + window].max()
+        counts[begin : begin + window] += 1
+    return sums / counts
+
+
+def test_the_threshold_is_the_conformal_rank_of_a_thousand_generated_windows(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    scorer = Scorer(simulator, ScoreOptions(largest[0], num_windows=20, false_alarm_rate=0.05, seed=3))
+    scores = np.sort(by_hand(simulator.generate_series(24_000, seed=4)[:, 0]))
+    assert scorer.threshold == pytest.approx(scores[int(np.ceil(24_001 * 0.95)) - 1], rel=1e-6)
+    assert (scorer.rate, scorer.nominal_threshold) == (0.05, -np.inf)
+    new = simulator.generate_series(100, seed=9)
+    np.testing.assert_allclose(scorer.score_series(new), by_hand(new[:, 0]) / scorer.threshold, rtol=1e-6)
+    further = by_hand(simulator.generate_series(24_000, seed=5)[:, 0])
+    np.testing.assert_allclose(scorer.nominal_scores, further / scorer.threshold, rtol=1e-6)
+
+
+def test_nominal_telemetry_of_few_windows_bounds_the_threshold_by_its_largest_score(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    loud, short = (2 * simulator.generate_series(number, seed=7) for number in (480, 23))
+    nominal = Recording((Run(loud), Run(short + 50, 1_000.0)), ("volts",), 1.0, None)  # the second part is shorter than a window
+    scorer = Scorer(simulator, ScoreOptions(largest[0], num_windows=20, false_alarm_rate=0.01), nominal)
+    assert scorer.threshold == scorer.nominal_threshold == pytest.approx(by_hand(loud[:, 0]).max(), rel=1e-6)  # 20 windows, not 99
+    tenth = Scorer(simulator, ScoreOptions(largest[0], num_windows=20, false_alarm_rate=0.1), nominal)
+    assert tenth.nominal_threshold == pytest.approx(np.sort(by_hand(loud[:, 0]))[int(np.ceil(481 * 0.9)) - 1], rel=1e-6)
+
+
+def test_scores_with_a_threshold_below_zero_are_shifted(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    scorer = Scorer(simulator, ScoreOptions(largest[1], num_windows=20))
+    new = simulator.generate_series(100, seed=9)
+    assert scorer.threshold < 0
+    np.testing.assert_allclose(scorer.score_series(new), 1 + (by_hand(new[:, 0]) - 100) - scorer.threshold, atol=1e-4)
