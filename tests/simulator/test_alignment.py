@@ -30,13 +30,22 @@ def test_phase_offset_and_gain_of_windows_are_recovered(waves):
     np.testing.assert_allclose(found.gain, np.stack([gain, np.full(3, 2.0)], axis=1), atol=1e-5)
 
 
+def test_the_phase_of_short_pulses_is_found_although_some_windows_have_none():
+    pulses = Waves([SquareWaveSimulator([SquareWave(100.0, duty=0.2)])], ("a",), 1.0, 80)
+    phases = pulses.phases(0)
+    assert (np.ptp(phases, axis=1) == 0).any()
+    targets = phases[[10, 200, 330]]
+    np.testing.assert_array_equal(phases[pulses.best_phases(3 * targets[:, :, None], 0)], targets)
+
+
 def test_windows_that_do_not_follow_the_wave_are_flat(waves):
-    assert waves.is_flat(np.array([[0.05, 2.0], [0.2, 2.0]])).tolist() == [[True, False], [False, False]]  # the wave's amplitude is 1
+    assert waves.is_flat(np.array([[0.09, 2.0], [0.11, 2.0]])).tolist() == [[True, False], [False, False]]  # the wave's amplitude is 1
 
 
 def test_waves_are_drawn_in_their_unit_and_a_scenario_may_concern_one_channel(waves):
     rng = np.random.default_rng(0)
-    nominal = waves.draw(np.array([0, 20]), [None, None], rng)
+    nominal = waves.draw(np.array([0, 7]), [None, None], rng)
+    np.testing.assert_array_equal(nominal.coarse[:, :, 0], np.where((np.array([[0], [7]]) + np.arange(80)) % 40 < 20, 1.0, -1.0))
     assert (
         nominal.coarse is nominal.nominal and np.unique(nominal.coarse[:, :, 0]).tolist() == [-1, 1] and not nominal.coarse[:, :, 1].any()
     )
@@ -80,6 +89,12 @@ def test_nearly_equal_periods_become_one_clock_at_the_distance_of_the_telemetry(
     assert [each.period_s for each in found] == [40.0, 40.0] and np.mod(found[1].phase - found[0].phase, 1.0) == pytest.approx(
         0.25, abs=0.0125
     )  # half a sample
+
+
+def test_periods_that_differ_by_more_than_two_per_cent_keep_their_clocks():
+    waves = Waves([SquareWaveSimulator([SquareWave(period)]) for period in (40.0, 41.0)], ("a", "b"), 1.0, 80)
+    found = waves.on_one_clock(np.random.default_rng(0).standard_normal((5, 80, 2)).astype(np.float32))
+    assert [each.waves[0].period_s for each in found.simulators] == [40.0, 41.0]
 
 
 def test_a_series_is_drawn_with_what_stands_still(waves):

@@ -10,6 +10,7 @@ import pytest
 from enhsim_tf.datasets.inject import InjectOptions, inject_channel
 from enhsim_tf.datasets.label_columns import write_table, write_timeeval
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.reading.columns import anomalous
 from enhsim_tf.telemetry.sources import read_source
 
 N = 60
@@ -330,6 +331,26 @@ def test_labels_are_no_channel_and_mark_rows(tmp_path, name, form):
     assert kept.find("labels").count == 3 and f"'{name}'" in kept.find("labels").text
     missing = clean(only(read_source(tmp_path / "a.csv", options=Cleaning(labelled="missing")))).report
     assert (missing.find("missing values").rows_left_out, missing.samples) == (3, N)
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        ([0, 1, 2], [False, True, True]),
+        ([0, np.nan, 1], [False, False, True]),
+        ([1, 1], [True, True]),
+        ([-1, 1, np.nan], [True, False, False]),
+        ([np.nan, np.nan], [False, False]),
+        ([2, 3], None),
+        (["normal", "attack", None], [False, True, False]),
+        (["attack", None], [True, False]),
+        (["normal", "drift", None], [False, True, False]),
+        (["high", "low", None], None),
+    ],
+)
+def test_what_a_label_says_by_hand(cells, expected):
+    found = anomalous(pd.Series(cells))
+    assert (found if found is None else found.tolist()) == expected
 
 
 def test_a_label_may_be_named_or_refused_and_may_concern_one_channel(tmp_path):

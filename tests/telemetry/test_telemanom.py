@@ -46,6 +46,11 @@ def test_labels_by_hand(make):
     assert list(read_labels(make(), spacecraft="msl")) == ["C-3", "D-4"]
 
 
+def test_sequences_that_share_a_sample_are_joined_and_neighbours_are_not(make):
+    (labels,) = read_labels(make(['E-5,SMAP,"[[20, 29], [10, 19], [12, 13]]","[b, a, c]",100'])).values()
+    assert labels.sequences == ((10, 20), (20, 30)) and labels.classes == ("a", "b")
+
+
 def test_channels_by_hand(make):
     folder = make()
     channel = load_channel(folder, "B-2")
