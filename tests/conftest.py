@@ -34,12 +34,8 @@ def pytest_addoption(parser):
     parser.addoption(SLOW, action="store_true", help="also run the tests that are marked as slow")
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Keeps the tests of a file in one process, and leaves the slow ones out, unless they are asked for."""
-    for item in items:
-        place = item.path.relative_to(ROOT / "tests").with_suffix("")
-        item.add_marker(pytest.mark.xdist_group(place.parts[0] if place.parts[0] in TOGETHER else "/".join(place.parts)))
+    """Leaves the slow tests out, unless they are asked for."""
     if config.getoption(SLOW):
         return
     left = {item for item in items if item.get_closest_marker("slow")}
@@ -49,6 +45,22 @@ def pytest_collection_modifyitems(config, items):
     config.stash[LEFT] = len(left)
     if hasattr(config, "workeroutput"):  # a process of xdist, which tells the first one
         config.workeroutput["left"] = len(left)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Gives the files of a folder whose fixtures take seconds to one process, and all other files one by one."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class ByFolder(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            folder = file.split("/")[-2] if "/" in file else ""
+            return folder if folder in TOGETHER else file
+
+    return ByFolder(config, log)
 
 
 @pytest.hookimpl(optionalhook=True)
