@@ -97,20 +97,14 @@ def test_a_table_that_expands_in_memory_is_refused(tmp_path):
     assert path.stat().st_size < 100_000
     with pytest.raises(ValueError, match="15,000,000 values"):
         check_parquet(path)
-    path.write_bytes(repeated(200_000, "long " * 20_000))  # 20 GB of text
-    assert path.stat().st_size < 100_000
-    with pytest.raises(ValueError, match="text that becomes"):
-        check_parquet(path)
     lists = pa.array([[0.0] * 100_000] * 60, pa.list_(pa.float64()))  # 48 MB in few rows
     pq.write_table(pa.table({"x": lists}), path, compression="zstd")
     assert path.stat().st_size < 60_000
     with pytest.raises(ValueError, match="6,000,000 values"):
         check_parquet(path)
     wide = pa.array([b"w" * 1_000_000] * 2, pa.binary(1_000_000)).dictionary_encode()
-    wide = pa.DictionaryArray.from_arrays(pa.array(np.zeros(1_000, np.int32)), wide.dictionary)
-    pq.write_table(
-        pa.table({"x": wide}), path, row_group_size=50, compression="zstd"
-    )  # 1 GB, of which the writer holds one row group at a time
+    wide = pa.DictionaryArray.from_arrays(pa.array(np.zeros(300, np.int32)), wide.dictionary)
+    pq.write_table(pa.table({"x": wide}), path, row_group_size=50, compression="zstd")  # 0.3 GB
     assert path.stat().st_size < 150_000
     with pytest.raises(ValueError, match="fixed width|text that becomes"):
         check_parquet(path)
@@ -150,8 +144,8 @@ def test_a_pipe_is_refused_without_blocking(tmp_path):
 
 BOMBS = {
     "npy": lambda path: npy(path, "<f8", (10**12,), bytes(80)),
-    "rows.parquet": lambda path: path.write_bytes(repeated(30_000_000)),
-    "text.parquet": lambda path: path.write_bytes(repeated(1_000_000, "long " * 20_000)),
+    "rows.parquet": lambda path: path.write_bytes(repeated(15_000_000)),
+    "text.parquet": lambda path: path.write_bytes(repeated(1_000_000, "long " * 20_000)),  # 100 GB of text
     "yaml": lambda path: path.write_text(
         "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(f"{b}: &{b} [{', '.join(9 * [f'*{a}'])}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
     ),
