@@ -61,15 +61,6 @@ def test_gradients_with_dropped_products(rate):
     )
 
 
-def test_dropped_products_are_drawn_independently_at_the_rate():
-    kept = fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 2])).numpy()
-    error = np.sqrt(0.3 * 0.7 / len(kept))
-    assert abs(kept.mean() - 0.7) < 5 * error
-    for lag in (1, 2, 8):  # neighbours come out of one word
-        assert abs(np.mean(kept[lag:] & kept[:-lag]) - 0.49) < 5 * np.sqrt(0.49 * 0.51 / len(kept)) * 2
-    assert not np.array_equal(kept, fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 3])).numpy())
-
-
 def test_mean_under_dropout_is_that_of_the_keras_layers():
     row = arrays(1)["rows"]
     model = small_discriminator(dropout=0.3)

@@ -78,6 +78,8 @@ def test_a_run_of_another_rate_or_without_a_window_is_refused():
 def test_least_squares_of_a_constant_waveform_has_no_gain():
     shift, gain = least_squares(np.ones((1, 5)), np.arange(5.0)[None])
     assert shift.tolist() == [2.0] and gain.tolist() == [0.0]
+    shift, gain = least_squares(0.01 * np.arange(5.0)[None], 3 + np.arange(5.0)[None])
+    assert (shift[0], gain[0]) == pytest.approx((3.0, 100.0))
 
 
 def test_nearly_equal_periods_become_one_clock_at_the_distance_of_the_telemetry():
@@ -158,6 +160,7 @@ def test_windows_of_a_run_begin_again_after_the_last():
 
 
 def test_a_saved_run_is_the_same_and_one_that_is_not_finite_is_none():
+    assert Runs(coarse_run(100), 80).name == "the run"
     runs = Runs(coarse_run(100), 80, 20.0, name="the box")
     again = Runs.from_arrays(runs.settings, runs.arrays, ("a",), 10.0, 80)
     assert (again.columns, again.window, again.delay_s, again.name) == (("square", "ramp"), 80, 20.0, "the box")
