@@ -94,6 +94,26 @@ def test_a_lasting_change_is_one_event_that_names_update(single, telemetry):
     assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05  # against the new level
 
 
+def test_a_departure_in_the_second_part_has_its_place_and_its_time(single, telemetry):
+    values = changed(telemetry, 1_500, 3_000, 6.0).parts[0].values
+    parts = Run(values[:1_200]), Run(values[1_200:], 13_000.0)  # after a gap of a hundred samples
+    frame = score(single[0], dataclasses.replace(telemetry, parts=parts))
+    (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
+    begin = frame.index[event["begin"]]
+    assert 1_400 <= event["begin"] <= 1_500 and f"since {begin}" in frame.attrs["departure"]
+    assert begin == pd.Timestamp("2024-01-01T00:00:00Z") + pd.Timedelta(seconds=13_000 + 10 * (event["begin"] - 1_200))
+    np.testing.assert_array_equal(frame["score_after"].iloc[:1_200], frame["score"].iloc[:1_200])
+    assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+
+
+def test_after_a_change_of_the_amplitude_the_new_amplitude_is_nominal(single, telemetry):
+    values = telemetry.parts[0].values.copy()
+    values[1_500:] = 5 + 0.3 * (values[1_500:] - 5)
+    frame = score(single[0], dataclasses.replace(telemetry, parts=(Run(values),)))
+    assert "amplitude" in frame.attrs["departure"] and "level" not in frame.attrs["departure"].split("(")[1]
+    assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+
+
 def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
     with pytest.raises(InputError, match="sample every 10 s"):
         score(single[0], dataclasses.replace(telemetry, interval_s=1.0))
