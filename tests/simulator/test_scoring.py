@@ -106,6 +106,12 @@ def test_a_departure_in_the_second_part_has_its_place_and_its_time(single, telem
     assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
 
 
+def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
+    frame = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), coarse_run())
+    (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
+    assert "level" in frame.attrs["departure"] and 1_400 <= event["begin"] <= 1_500
+
+
 def test_after_a_change_of_the_amplitude_the_new_amplitude_is_nominal(single, telemetry):
     values = telemetry.parts[0].values.copy()
     values[1_500:] = 5 + 0.3 * (values[1_500:] - 5)
@@ -184,8 +190,18 @@ def test_nominal_telemetry_of_few_windows_bounds_the_threshold_by_its_largest_sc
 
 
 def test_scores_with_a_threshold_below_zero_are_shifted(largest):
-    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 8, noise_sd=0.2)  # a window begins at every sample
     scorer = Scorer(simulator, ScoreOptions(largest[1], num_windows=20))
     new = simulator.generate_series(100, seed=9)
     assert scorer.threshold < 0
-    np.testing.assert_allclose(scorer.score_series(new), 1 + (by_hand(new[:, 0]) - 100) - scorer.threshold, atol=1e-4)
+    np.testing.assert_allclose(scorer.score_series(new), 1 + (by_hand(new[:, 0], 8) - 100) - scorer.threshold, atol=1e-4)
+
+
+def test_a_residual_is_a_root_mean_square_and_grows_with_a_level_that_training_never_had():
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    scorer, windows = Scorer(simulator, ScoreOptions("residual", num_windows=50)), simulator.generate(5, seed=9)
+    size = np.sqrt(np.mean(simulator.residuals(windows) ** 2, axis=(1, 2)))
+    np.testing.assert_allclose(scorer.score_windows(windows), size, rtol=1e-5)
+    levels = simulator.generate(50, seed=0).mean(axis=1)
+    beyond = windows.mean(axis=1)[:, 0] + 10 - (levels.max() + max(np.ptp(levels), simulator.noise_sd[0]))
+    np.testing.assert_allclose(scorer.score_windows(windows + 10), np.hypot(size, beyond), rtol=1e-4)
