@@ -10,7 +10,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import register, unregister
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.options import ScoreOptions
-from enhsim_tf.simulator.scoring import Scorer, event_rows, events_table, score, write_scores
+from enhsim_tf.simulator.scoring import Scorer, check_fits, event_rows, events_table, score, write_scores
 from tests.known_simulators import of_waves
 from tests.simulator.conftest import coarse_run, joint, series
 
@@ -54,6 +54,9 @@ def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
 def test_samples_without_a_run_get_no_score(of_run, telemetry):
     frame = score(of_run[0], telemetry, coarse_run(2_000))
     assert frame["score"].isna().sum() == 1_000 and not frame["flag"].iloc[2_000:].any()
+    late = dataclasses.replace(telemetry, parts=(Run(telemetry.parts[0].values[500:], 5_000.0),))
+    frame = score(of_run[0], late, coarse_run(2_000))
+    assert frame["score"].isna().tolist() == [False] * 1_500 + [True] * 1_000 and frame["flag"].mean() < 0.05
 
 
 def test_several_channels_are_scored_together(both):
@@ -69,7 +72,7 @@ def test_the_same_seed_gives_the_same_scores(single, telemetry):
 
 def test_events_join_flags_within_a_window_and_count_them_by_hand():
     scores = np.full(100, 0.5)
-    scores[10:13], scores[20], scores[60:62] = (2.0, 3.0, 2.0), 1.5, 4.0
+    scores[10:13], scores[20], scores[60:62], scores[90] = (2.0, 3.0, 2.0), 1.5, 4.0, 1.0  # the threshold itself is no alarm
     rows = event_rows(scores, 1_000, np.full(400, 0.9), 10, 2.0)
     assert [(row["begin"], row["end"], row["peak"], row["num_flagged"], row["duration_s"]) for row in rows] == [
         (1_010, 1_021, 1_011, 4, 22.0),
@@ -121,6 +124,7 @@ def test_after_a_change_of_the_amplitude_the_new_amplitude_is_nominal(single, te
 
 
 def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
+    check_fits(single[0], dataclasses.replace(telemetry, interval_s=10.005), None)  # within a thousandth
     with pytest.raises(InputError, match="sample every 10 s"):
         score(single[0], dataclasses.replace(telemetry, interval_s=1.0))
     with pytest.raises(InputError, match="at least one window of 80"):
