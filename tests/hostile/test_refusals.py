@@ -147,7 +147,7 @@ STRANGE = {
 }
 
 
-@pytest.mark.parametrize("case", STRANGE)
+@pytest.mark.parametrize("case", [pytest.param(name, marks=[pytest.mark.slow] * (name == "barely long enough")) for name in STRANGE])
 def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, case):
     np.save(tmp_path / "channel.npy", STRANGE[case])
     code, _, lines = told("--budget", "smoke", *TINY_OPTIONS, "--only", "fig13", "--telemetry", tmp_path / "channel.npy")
