@@ -110,9 +110,12 @@ def test_a_departure_in_the_second_part_has_its_place_and_its_time(single, telem
 
 
 def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
-    frame = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), coarse_run())
+    run = dataclasses.replace(coarse_run(), parts=(Run(coarse_run().parts[0].values[500:], 5_000.0),))  # begins 500 samples later
+    frame = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), run)
     (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
     assert "level" in frame.attrs["departure"] and 1_400 <= event["begin"] <= 1_500
+    assert frame["score_after"].iloc[:500].isna().all() and (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+    np.testing.assert_array_equal(frame["score_after"].iloc[:1_400], frame["score"].iloc[:1_400])
 
 
 def test_after_a_change_of_the_amplitude_the_new_amplitude_is_nominal(single, telemetry):
