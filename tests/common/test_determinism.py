@@ -54,6 +54,7 @@ def elsewhere(model, tmp_path_factory):
     return {other: generated(model, tmp_path_factory.mktemp("there") / "set", **OTHERS[other]) for other in OTHERS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", OTHERS)
 def test_to_rounding_on_another(other, elsewhere, here):
     _, table = elsewhere[other]
@@ -62,6 +63,7 @@ def test_to_rounding_on_another(other, elsewhere, here):
     np.testing.assert_allclose(second, first, rtol=0, atol=2e-5 * first.std())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings choose among instructions of x86")
 def test_something_else_was_tried(elsewhere, here):
     """Which setting computes other bits depends on the processor, but not all of them can be what runs here."""

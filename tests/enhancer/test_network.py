@@ -108,6 +108,7 @@ def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
     assert len({tuple(order) for order in orders}) == 3 and list(range(12)) not in orders.tolist()
 
 
+@pytest.mark.slow
 def test_all_random_numbers_depend_on_the_seeds_only():
     def run(global_seed, weights_seed, order_seed):
         keras.utils.set_random_seed(global_seed)  # must not matter

@@ -1,18 +1,22 @@
 """Physical oracles of both simulators. They need PyBaMM, and are skipped without it."""
 
+import importlib.util
 import os
 
 import numpy as np
 import pytest
 
-os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"  # before PyBaMM is imported
-pybamm = pytest.importorskip("pybamm", reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'")
+from enhsim_tf.common.errors import InputError
+from studies.battery import simulate as module
+from studies.battery.faults import Fault
+from studies.battery.orbits import REGIMES, draw_load
+from studies.battery.simulate import simulate, simulate_all
 
-from enhsim_tf.common.errors import InputError  # noqa: E402
-from studies.battery import simulate as module  # noqa: E402
-from studies.battery.faults import Fault  # noqa: E402
-from studies.battery.orbits import REGIMES, draw_load  # noqa: E402
-from studies.battery.simulate import simulate, simulate_all  # noqa: E402
+os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"  # before PyBaMM is imported
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(importlib.util.find_spec("pybamm") is None, reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'"),
+]
 
 pytestmark = pytest.mark.slow
 
@@ -30,6 +34,8 @@ def pulses():
 
 
 def test_nothing_is_reported_to_anyone():
+    import pybamm
+
     module.check_installed()
     assert pybamm.config.check_opt_out()
     assert pybamm.telemetry._posthog.disabled
