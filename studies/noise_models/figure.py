@@ -24,10 +24,8 @@ def false_alarms(found: Mapping[str, Any]) -> matplotlib.figure.Figure:
         DOUBLE,
         max(2.6, 1.5 + 0.22 * len(families)),
         "Matched residual windows stay near real windows on all families",
-        "Means over seven detectors, trained on waves with noise of each model and judged on real windows. Left: nominal windows that are "
-        "flagged; the line is the target of 1 %; the scale is linear below 1 % and logarithmic above. Right: by how much fewer injected "
-        "anomalies they find than detectors trained on real windows; the line is the tolerance of 3 points; models that flag far too much "
-        "find more, beyond the left edge. Above the dotted line: families that the design of the network looked at.",
+        "Detectors trained with noise of each model, judged on real windows; means of seven. Lines: the target of 1 % and the tolerance of 3 points. "
+        "Above the dots: families that the design of the network looked at.",
     )
     left, right = panels(figure, down + 0.3, 1, 2, gap=(0.05, 0.1))[0]
     place = left.get_position()
