@@ -149,6 +149,32 @@ class OneClassSVMOnFeatures:
             return -self._machine.decision_function(features(windows))
 
 
+class JointSize:
+    """Mahalanobis distance of the means of all channels in quarters of a window, with the covariance of Ledoit and Wolf (2004).
+
+    A small change of one channel against the others is large where the channels hardly move apart otherwise.
+    """
+
+    def fit(self, windows: np.ndarray) -> "JointSize":
+        """Estimates mean and covariance from nominal windows."""
+        from sklearn.covariance import LedoitWolf
+
+        with threadpool_limits(1):
+            self._law = LedoitWolf().fit(self._means(windows))
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the squared distance of each window, divided by the number of means: about 1 for nominal windows."""
+        means = self._means(windows)
+        with threadpool_limits(1):
+            return self._law.mahalanobis(means) / means.shape[1]
+
+    @staticmethod
+    def _means(windows: np.ndarray) -> np.ndarray:
+        values = np.asarray(windows if windows.ndim == 3 else windows[:, :, None], np.float64)
+        return np.concatenate([part.mean(axis=1) for part in np.array_split(values, min(4, values.shape[1]), axis=1)], axis=1)
+
+
 class RandomScore:
     """Control: random scores, independent of the windows. Each call continues the random sequence.
 

@@ -17,9 +17,10 @@ from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
+from enhsim_tf.detection.detectors import JointSize
 from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
-from enhsim_tf.detection.residual_size import ResidualSize
+from enhsim_tf.detection.residual_size import ResidualSize, root_mean_square
 from enhsim_tf.simulator.joint import cut, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
@@ -43,7 +44,8 @@ class Scorer:
     """A detector of one simulator, with its threshold. Scores are divided by the threshold, so scores above 1 are anomalous.
 
     For square waves, `residual` and `innovation` judge telemetry minus the aligned simulator, the other detectors the telemetry itself. For
-    recorded runs, all judge the telemetry minus the enhanced run of the same time.
+    recorded runs, all judge the telemetry minus the enhanced run of the same time. The size of a residual is its root mean square, of several
+    channels the distance of `JointSize`.
 
     Args:
         simulator: The simulator.
@@ -73,6 +75,7 @@ class Scorer:
         width = np.maximum(self._high - self._low, simulator.noise_sd)
         self._low, self._high = self._low - width, self._high + width  # levels beyond count as residual
         if self.name == RESIDUAL:
+            self._joint = None if len(simulator.channels) == 1 else JointSize().fit(self._judged(training))
             self.detector.fit_sizes(self._sizes(training))
         else:
             self.detector.fit(self._judged(training))
@@ -139,7 +142,7 @@ class Scorer:
 
     def _sizes(self, windows: np.ndarray) -> np.ndarray:
         judged = self._judged(windows)
-        sizes = np.sqrt(np.mean(judged.reshape(len(judged), -1) ** 2, axis=1, dtype=np.float64))
+        sizes = root_mean_square(judged) if self._joint is None else np.sqrt(self._joint.score(judged))
         if self.simulator.is_run_model:
             return sizes
         means = windows.mean(axis=1, dtype=np.float64)

@@ -8,6 +8,7 @@ from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAuto
 from enhsim_tf.detection.detectors import (
     Innovation,
     IsolationForestOnFeatures,
+    JointSize,
     LargestStep,
     LimitCheck,
     MovingDeviation,
@@ -260,3 +261,17 @@ def test_autoencoder_scores_in_units_of_the_training_variance():
     np.testing.assert_allclose(plain.score(windows), stretched.score(-900 + 64 * windows), rtol=0.02)
     # an untrained network answers next to nothing of the input: about its variance; a trained one less
     assert DenseAutoencoder(64, 16, 40).fit(training).score(windows).mean() < 0.2 < plain.score(windows).mean()
+
+
+def test_the_joint_size_of_nominal_windows_is_one():
+    windows = np.random.default_rng(0).standard_normal((4_000, 40, 3))
+    assert np.mean(JointSize().fit(windows[:2_000]).score(windows[2_000:])) == pytest.approx(1, rel=0.03)  # chi-square of 4 x 3 means
+
+
+def test_a_channel_that_leaves_the_others_is_far_although_its_values_are_usual():
+    rng = np.random.default_rng(1)
+    common = rng.standard_normal((2_000, 1, 1))
+    windows = common + 0.1 * rng.standard_normal((2_000, 20, 2))
+    apart = windows[:1].copy()
+    apart[:, :, 1] += 0.5  # half the deviation of the channel, twenty of the difference of two means
+    assert JointSize().fit(windows).score(apart)[0] > 10
