@@ -151,6 +151,24 @@ class BatterySettings:
 
 
 @dataclasses.dataclass(frozen=True)
+class ReferenceOrSourceSettings:
+    """The study of what a simulator is worth having for: `python -m studies.reference_or_source`."""
+
+    num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the other studies", smoke=1)
+    first_seed: int = setting(5_000, "seed", f"{OUR_CHOICE}: designs were chosen on seed 900")
+    known_units: tuple[int, ...] = setting(
+        (2, 6, 20, 60, 200), "flights or orbits", f"{OUR_CHOICE}: 10 to 1,000 windows that share no sample", smoke=(2, 4)
+    )
+    middle: int = setting(20, "flights or orbits", f"{OUR_CHOICE}: where the other axes are tried: 100 windows", smoke=4)
+    test_units: int = setting(60, "flights or orbits", f"{OUR_CHOICE}: nominal time on which false alarms are counted", smoke=4)
+    source_units: int = setting(60, "flights or orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=4)
+    parameter_units: int = setting(
+        4, "flights or orbits", f"{OUR_CHOICE}: telemetry to which parameters of the simulator are fitted", smoke=1
+    )
+    fault_units: int = setting(2, "flights or orbits", f"{OUR_CHOICE}: under each fault at each severity", smoke=1)
+
+
+@dataclasses.dataclass(frozen=True)
 class Settings:
     """The settings of the paper's pipeline, the kind of noise in its telemetry, and the settings of each study."""
 
@@ -165,6 +183,7 @@ class Settings:
     classifiers: ClassifierSettings = ClassifierSettings()
     labelled: LabelledSettings = LabelledSettings()
     battery: BatterySettings = BatterySettings()
+    reference_or_source: ReferenceOrSourceSettings = ReferenceOrSourceSettings()
     budget: str = "full"
 
     @property

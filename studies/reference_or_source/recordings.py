@@ -1,0 +1,94 @@
+"""The runs of a system that one seed works with: nominal and under faults, of the real system and of every coarse simulator."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from enhsim_tf.common.console import SILENT, Progress
+from enhsim_tf.common.stages import save_arrays
+
+FITTED = "fitted physics"
+"""The simulator with wrong physics after a few of its parameters were fitted to telemetry by least squares."""
+CRUDE = "wrong physics"
+COMMANDS = "commands only"
+"""No simulator: the commands alone are what an enhancer maps to telemetry."""
+_PARTS = ("fit", "test", "source")
+
+
+def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, progress: Progress = SILENT) -> None:
+    """Simulates all runs of a seed and writes them to `runs.npz`.
+
+    Args:
+        system: A system of `systems.SYSTEMS`.
+        counts: Number of units of `fit`, `test`, `source`, of the telemetry that parameters are fitted to (`parameters`), and of a run
+            under each fault (`fault`).
+        seed: Seed of the commands.
+        folder: An existing folder.
+        progress: Reports the progress.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    commands = {part: _commands(system, counts[part], seed, number) for number, part in enumerate(_PARTS)}
+    kinds = list(dict.fromkeys(fault.kind for fault in system.faults))
+    told = progress.loop("runs", 1 + len(system.simulators))
+    arrays["fit/real"], arrays["test/real"] = (system.run_real(commands[part])[0] for part in ("fit", "test"))
+    faulty = {kind: (_commands(system, counts["fault"], seed, 10 + number), _of_kind(system, kind)) for number, kind in enumerate(kinds)}
+    simulated = {kind: (_commands(system, counts["fault"], seed, 30 + number), _of_kind(system, kind)) for number, kind in enumerate(kinds)}
+    for given, faults in faulty.values():
+        for fault, run in zip(faults, system.run_real(given, faults), strict=True):
+            arrays[f"{key_of(fault)}/real"] = run
+    told(1)
+    few = _commands(system, counts["parameters"], seed, 0)
+    values = fit_parameters(system, few, system.measure(system.run_real(few)[0], np.random.default_rng([seed, 50])))
+    for number, simulator in enumerate((*system.simulators, FITTED), 1):
+        name, given_values = (CRUDE, values) if simulator == FITTED else (simulator, None)
+        for part in _PARTS:
+            arrays[f"{part}/{simulator}"] = system.run_coarse(name, commands[part], values=given_values)[0]
+        for kind in kinds:
+            planned = system.run_coarse(name, faulty[kind][0], values=given_values)[0]
+            given, faults = simulated[kind]
+            able = system.can_simulate(name, kind)
+            runs = system.run_coarse(name, given, [None, *faults] if able else [None], given_values)
+            for place, fault in enumerate(faults, 1):
+                arrays[f"{key_of(fault)}/{simulator}"] = planned
+                if able:
+                    arrays[f"{key_of(fault)}/{simulator}/simulated"] = runs[place]
+            arrays[f"{kind}/{simulator}/nominal"] = runs[0]
+        told(min(1 + number, 1 + len(system.simulators)))
+    save_arrays(folder, arrays, "runs")
+
+
+def key_of(fault: Any) -> str:
+    """The name of a fault at its severity."""
+    return f"{fault.kind} {fault.severity:g}"
+
+
+def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> np.ndarray:
+    """Fits the parameters of the simulator with wrong physics by least squares, as an engineer without networks would.
+
+    Args:
+        system: The system.
+        commands: Commands of the telemetry.
+        telemetry: Telemetry, shape `(samples, channels)`.
+
+    Returns:
+        The values of `system.parameters`.
+    """
+    scale, number = telemetry.std(axis=0), telemetry.shape[1]
+
+    def errors(steps: np.ndarray) -> np.ndarray:
+        run = system.run_coarse(CRUDE, commands, values=system.first_values + steps * system.steps)[0]
+        return ((run[:, :number] - telemetry) / scale).ravel()
+
+    found = least_squares(errors, np.zeros(len(system.parameters)), diff_step=0.1, x_scale=1.0, max_nfev=12, bounds=system.bounds)
+    return system.first_values + found.x * system.steps
+
+
+def _commands(system: Any, number: int, seed: int, stream: int) -> np.ndarray:
+    return system.draw_commands(number, np.random.default_rng([seed, stream]))
+
+
+def _of_kind(system: Any, kind: str) -> list[Any]:
+    return [fault for fault in system.faults if fault.kind == kind]
