@@ -136,12 +136,14 @@ class Aircraft:
 
 
 def _draw_target(limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator) -> np.ndarray:
-    """Draws one target over one flight: a random walk between limits, rounded to a grid, in steps of at most `step`."""
+    """Draws one target over one flight: a random walk that limits reflect, in steps of at most `step`, rounded to a grid."""
     target, value, begin = np.empty(UNIT_SAMPLES), rng.uniform(*limits), 0
     while begin < UNIT_SAMPLES:
         end = begin + int(rng.integers(_HOLDS_S[0], _HOLDS_S[1] + 1))
         target[begin:end] = np.rint(value / grid) * grid
-        value = np.clip(value + rng.uniform(-step, step), *limits)
+        value += rng.uniform(-step, step)
+        value = limits[0] + abs(value - limits[0])  # reflected at the lower limit, and then at the upper one
+        value = limits[1] - abs(limits[1] - value)
         begin = end
     return target
 

@@ -4,7 +4,7 @@ The files need no JSBSim to be read. Times count seconds; nominal flights of 20 
 
     telemetry.csv        the fine simulator through noisy sensors: what the aircraft's recorder would keep
     simulator.csv        the point mass over the same flights: its channels, and the commands that drive it
-    telemetry_fault.csv  another flight, whose airspeed reads too high from the end of the fifth minute on
+    telemetry_fault.csv  another flight, whose left engine answers its throttle 5 % too little after five minutes
     simulator_fault.csv  the point mass over that flight as planned: an operator does not know of the fault
 """
 
@@ -21,7 +21,7 @@ from studies.reference_or_source.aircraft_faults import Fault
 SEED = 7
 NUM_FLIGHTS = 6
 SIMULATOR = "wrong physics"
-FAULT = Fault("pitot", 0.6)
+FAULT = Fault("left engine", 0.6)
 _PERIOD_S = 3_600  # from the start of a flight to that of the next
 _TELEMETRY_DIGITS = (2, 0, 2, 1, 1, 0)
 _SIMULATOR_DIGITS = (2, 0, 2, 1, 1, 0, 0, 0)
@@ -53,7 +53,9 @@ def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS
             ("simulator", aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
         ):
             cells = zip(columns, digits, values.T, strict=True)
-            table = pd.DataFrame({column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells})
+            table = pd.DataFrame(
+                {column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells}
+            )
             table.insert(0, "time", times)
             with replace_file(folder / f"{name}{suffix}.csv") as temporary:
                 table.to_csv(temporary, index=False, lineterminator="\n")
