@@ -156,16 +156,14 @@ class ReferenceOrSourceSettings:
 
     num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the other studies", smoke=1)
     first_seed: int = setting(5_000, "seed", f"{OUR_CHOICE}: designs were chosen on seed 900")
-    known_units: tuple[int, ...] = setting(
-        (2, 6, 20, 60, 200), "flights or orbits", f"{OUR_CHOICE}: 10 to 1,000 windows that share no sample", smoke=(2, 4)
+    known_windows: tuple[int, ...] = setting(
+        (10, 30, 100, 300, 1_000), "windows", f"{OUR_CHOICE}: that share no sample, of whole flights or orbits", smoke=(10, 20)
     )
-    middle: int = setting(20, "flights or orbits", f"{OUR_CHOICE}: where the other axes are tried: 100 windows", smoke=4)
-    test_units: int = setting(60, "flights or orbits", f"{OUR_CHOICE}: nominal time on which false alarms are counted", smoke=4)
-    source_units: int = setting(60, "flights or orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=4)
-    parameter_units: int = setting(
-        4, "flights or orbits", f"{OUR_CHOICE}: telemetry to which parameters of the simulator are fitted", smoke=1
-    )
-    fault_units: int = setting(2, "flights or orbits", f"{OUR_CHOICE}: under each fault at each severity", smoke=1)
+    middle: int = setting(100, "windows", f"{OUR_CHOICE}: known windows where the other axes are tried", smoke=20)
+    test_windows: int = setting(300, "windows", f"{OUR_CHOICE}: nominal time on which false alarms are counted", smoke=20)
+    source_windows: int = setting(300, "windows", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=20)
+    parameter_windows: int = setting(20, "windows", f"{OUR_CHOICE}: telemetry to which parameters of the simulator are fitted", smoke=5)
+    fault_windows: int = setting(20, "windows", f"{OUR_CHOICE}: under each fault at each severity", smoke=5)
 
 
 @dataclasses.dataclass(frozen=True)

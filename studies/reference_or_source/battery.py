@@ -33,10 +33,10 @@ class Battery:
     is continuous; an orbit before it, in which the battery reaches its usual temperature, is left out.
     """
 
-    name = "battery"
+    name, unit = "battery", "orbit"
     channels = ("voltage", "current", "temperature")
     interval_s = INTERVAL_S
-    unit, unit_samples, window = "orbit", ORBIT_SAMPLES, 100
+    unit_samples, window = ORBIT_SAMPLES, 100
     onset = 0
     """First sample of each unit of a run under a fault from which the fault acts."""
     simulators = {
@@ -60,12 +60,15 @@ class Battery:
         """Draws the load of so many orbits and one before them, shape `(samples, 1)`."""
         return draw_load(num_units + 1, REGIMES["gentle"], rng)[:, None]
 
-    def run_real(self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,)) -> list[np.ndarray]:
+    def run_real(
+        self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), rng: np.random.Generator | None = None
+    ) -> list[np.ndarray]:
         """Runs the fine simulator, without noise of the sensors.
 
         Args:
             commands: As `draw_commands` returns them.
             faults: Faults, which act from the beginning of the run; None for nominal.
+            rng: Not used: the load is all that moves a battery.
 
         Returns:
             For each fault, float32 array of shape `(samples, 3)`, without the first orbit.

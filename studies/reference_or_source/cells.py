@@ -1,7 +1,7 @@
 """The cells of the study: a main grid over simulators and known telemetry, and the other axes one at a time."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ class Point:
     by_severity: bool = False
 
 
-def points(system: Any, units: tuple[int, ...], middle: int) -> list[Point]:
+def points(system: Any, units: Sequence[int], middle: int) -> list[Point]:
     """The points of the map.
 
     Args:

@@ -33,15 +33,17 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
     commands = {part: _commands(system, counts[part], seed, number) for number, part in enumerate(_PARTS)}
     kinds = list(dict.fromkeys(fault.kind for fault in system.faults))
     told = progress.loop("runs", 1 + len(system.simulators))
-    arrays["fit/real"], arrays["test/real"] = (system.run_real(commands[part])[0] for part in ("fit", "test"))
+    for number, part in enumerate(("fit", "test")):
+        (arrays[f"{part}/real"],) = system.run_real(commands[part], rng=np.random.default_rng([seed, 60, number]))
     faulty = {kind: (_commands(system, counts["fault"], seed, 10 + number), _of_kind(system, kind)) for number, kind in enumerate(kinds)}
     simulated = {kind: (_commands(system, counts["fault"], seed, 30 + number), _of_kind(system, kind)) for number, kind in enumerate(kinds)}
-    for given, faults in faulty.values():
-        for fault, run in zip(faults, system.run_real(given, faults), strict=True):
+    for number, (given, faults) in enumerate(faulty.values()):
+        for fault, run in zip(faults, system.run_real(given, faults, np.random.default_rng([seed, 61, number])), strict=True):
             arrays[f"{key_of(fault)}/real"] = run
     told(1)
-    few = _commands(system, counts["parameters"], seed, 0)
-    values = fit_parameters(system, few, system.measure(system.run_real(few)[0], np.random.default_rng([seed, 50])))
+    few = counts["parameters"] * system.unit_samples
+    measured = system.measure(arrays["fit/real"][:few], np.random.default_rng([seed, 50]))
+    values = fit_parameters(system, _commands(system, counts["parameters"], seed, 0), measured)
     for number, simulator in enumerate((*system.simulators, FITTED), 1):
         name, given_values = (CRUDE, values) if simulator == FITTED else (simulator, None)
         for part in _PARTS:

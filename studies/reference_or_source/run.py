@@ -76,8 +76,11 @@ def table_of(settings: Settings, stages: Stages, name: str, seed: int) -> "pd.Da
     from studies.reference_or_source.cells import points, rows_of
 
     chosen, system = settings.reference_or_source, make_system(name)
-    counts = {part: getattr(chosen, f"{part}_units") for part in ("test", "source", "fault")}
-    counts |= {"parameters": chosen.parameter_units, "fit": max(chosen.known_units)}
+    inside = system.unit_samples // system.window
+    known = [max(1, number // inside) for number in chosen.known_windows]
+    numbers = {"fit": max(chosen.known_windows), "test": chosen.test_windows, "source": chosen.source_windows}
+    numbers |= {"parameters": chosen.parameter_windows, "fault": chosen.fault_windows}
+    counts = {part: max(1, number // inside) for part, number in numbers.items()}
     version = importlib.metadata.version(_CLASSES[name][2])
 
     def simulate(folder: Path) -> None:
@@ -87,7 +90,7 @@ def table_of(settings: Settings, stages: Stages, name: str, seed: int) -> "pd.Da
     runs = stages.run(simulated, simulate, (name, counts, seed, version, _VERSION))
     arrays: dict[str, Any] = {}
     found = []
-    for point in points(system, chosen.known_units, chosen.middle):
+    for point in points(system, known, max(1, chosen.middle // inside)):
 
         def judge(folder: Path, point: Any = point) -> None:
             if not arrays:

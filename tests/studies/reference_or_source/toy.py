@@ -30,7 +30,7 @@ class Toy:
             values[inside, 0] += fault.severity
         return values.astype(np.float32)
 
-    def run_real(self, commands, faults=(None,)):
+    def run_real(self, commands, faults=(None,), rng=None):
         return [self._faulty(np.concatenate([2 * commands, -commands], axis=1), fault) for fault in faults]
 
     def run_coarse(self, simulator, commands, faults=(None,), values=None):
