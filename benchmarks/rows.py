@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -137,15 +138,20 @@ def generation(budget: Budget) -> Iterator[dict]:
 
 
 def tool(budget: Budget) -> Iterator[dict]:
-    """Benchmarks the tool without a network: processor time of whole commands against what they may take, and generation against NumPy."""
+    """Benchmarks the tool: processor time of whole commands against what they may take, and generation against NumPy."""
     short, long, joint = budget.rows
     with tempfile.TemporaryDirectory() as folder:
-        model = f"{folder}/model"
+        model, long_table = f"{folder}/model", f"{folder}/table.csv"
+        of_tool.table(long_table, long)
+        scored = ("score", model, long_table, "--out", f"{folder}/scores.parquet")
+        pair = Path(__file__).parents[1] / "examples" / "battery"
+        battery = (str(pair / "telemetry.csv"), "--coarse", str(pair / "simulator.csv"), "--window", "100")
         works = {
             f"default fit, {short:,} samples": (("fit", "1", str(short), model), 10),
             f"default fit, ten channels jointly, {joint:,} rows": (("fit", "10", str(joint)), 60),
-            f"score, {long:,} samples": (("score", model, str(long)), 5),
-            f"score by the residual, {long:,} samples": (("score", model, str(long), "residual"), 10),
+            "fit --coarse of the battery": (("command", "fit", *battery, "--out", f"{folder}/battery"), 10),
+            f"score, {long:,} samples in CSV": (("command", *scored), 5),
+            f"score by the residual, {long:,} samples in CSV": (("command", *scored, "--detector", "residual"), 10),
             f"{budget.labelled_windows:,} labelled windows to Parquet": (("windows", model, str(budget.labelled_windows), folder), 5),
         }
         for work, (arguments, bar) in works.items():

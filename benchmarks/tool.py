@@ -1,8 +1,10 @@
-"""The tool without a network, called as by its users: `fit` and `score` as processes of their own, and generation in memory.
+"""The tool called as by its users: `fit` and `score` as processes of their own, and generation in memory.
 
 Times are processor time, so that the load of the machine matters little: `python -m benchmarks.tool fit 1 2700` is one work, start included.
+In memory, all work is done by one thread, because threads that wait for each other use processor time, too.
 """
 
+import contextlib
 import os
 import sys
 import time
@@ -10,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from benchmarks.examples import Work
 
@@ -36,14 +39,20 @@ def fit(channels: int, samples: int, folder: str | None = None) -> None:
         simulator.save(folder)
 
 
-def score(folder: str, samples: int, detector: str | None = None) -> None:
-    """Scores further telemetry of one channel with a saved simulator."""
-    from enhsim_tf.simulator.options import ScoreOptions
-    from enhsim_tf.simulator.scoring import score as score_telemetry
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
+def table(path: str, samples: int) -> None:
+    """Writes further telemetry of one channel as CSV, one sample a second."""
+    import pandas as pd
 
-    simulator = EnhancedSimulator.load(folder)
-    score_telemetry(simulator, _recording(telemetry(1, samples)), options=ScoreOptions(detector))
+    times = pd.date_range("2024-01-01", periods=samples, freq="s", name="time")
+    pd.DataFrame({"channel 0": telemetry(1, samples)[:, 0]}, times).to_csv(path)
+
+
+def command(*arguments: object) -> None:
+    """Runs a command of the tool, without what it prints."""
+    from enhsim_tf.cli.main import main
+
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        sys.exit(main([str(each) for each in arguments]))
 
 
 def windows(folder: str, number: int, out: str) -> None:
@@ -99,9 +108,10 @@ def _residuals(rng: np.random.Generator, window: int) -> np.ndarray:
 
 def _processor_time(work: Callable[[], object]) -> Callable[[], float]:
     def run() -> float:
-        began = time.process_time()
-        work()
-        return time.process_time() - began
+        with threadpool_limits(1):
+            began = time.process_time()
+            work()
+            return time.process_time() - began
 
     return run
 
@@ -117,4 +127,4 @@ def seconds_of(*arguments: str) -> float:
 
 if __name__ == "__main__":
     name, *given = sys.argv[1:]
-    {"fit": fit, "score": score, "windows": windows}[name](*(int(each) if each.isdecimal() else each for each in given))
+    {"fit": fit, "command": command, "windows": windows}[name](*(int(each) if each.isdecimal() else each for each in given))

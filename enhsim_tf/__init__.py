@@ -34,7 +34,6 @@ _PLACES = {
     "from_series": "telemetry.pandas_series",
     "inject_channel": "datasets.inject",
     "join_channels": "simulator.joint",
-    "load_labelled": "telemetry.telemanom",
     "read_recording": "coarse_simulator.recording_files",
     "read_source": "telemetry.sources",
     "read_telemetry": "telemetry.sources",

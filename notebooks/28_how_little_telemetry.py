@@ -24,6 +24,7 @@ from enhsim_tf.common.plot_style import AVERAGE, DASHED, QUIET, REAL
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.detectors import PCAResidual
 from enhsim_tf.enhancer import ridge as packaged
+from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import make_settings
 from studies.few_windows.cells import World
 
@@ -174,9 +175,7 @@ alarms = {name: np.array([alarms_of(*each) for each in pairs]) for name, pairs i
 recall = {
     name: np.array(
         [
-            metrics.recall_at_real_rate(
-                detector.score(judged["reference"]), detector.score(judged["anomalous"])
-            )
+            recall_at_real_rate(detector.score(judged["reference"]), detector.score(judged["anomalous"]))
             for detector, _ in pairs
         ]
     )

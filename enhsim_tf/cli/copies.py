@@ -35,7 +35,7 @@ def generate_copies(options: argparse.Namespace) -> int:
 
     def write(name: str) -> None:
         model = load(models[name])
-        runs = model._runs()
+        runs = model.recorded_runs()
         run = read_recording(options.coarse, runs.columns, options.coarse_time, cleaning, model.interval_s, options.coarse_start)
         num_rows = write_copies(paths[name], model, run, copies, options.seed or 0)
         said = printable(name)

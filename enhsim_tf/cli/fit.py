@@ -20,7 +20,7 @@ def run_fit(options: argparse.Namespace) -> int:
         refuse_without_coarse(options, "coarse_time", "coarse_start", "coarse_column", "delay_s")
     from enhsim_tf.common.parallel.engines import parse_workers
 
-    workers = parse_workers(options.workers)
+    workers = parse_workers(options.workers, options.engine)
     cleaning = cleaning_options(options, options.window or 32, "missing")
     from enhsim_tf.simulator.fit_many import CoarseRun, fit_channels  # imported here, because pandas is slow to import
     from enhsim_tf.telemetry.commands import read_commands

@@ -21,7 +21,7 @@ def run_generate_many(options: argparse.Namespace, tell: Callable[[str], None]) 
         options: Parsed options of `generate`.
         tell: Function that is called with each line of output.
     """
-    workers = parse_workers(options.workers)
+    workers = parse_workers(options.workers, options.engine)
     plans = make_plans(options)  # all plans are checked before the first data set is generated
     for out, plan in plans.items():
         generate_data_set(out, plan, workers, options.engine or "local", tell)

@@ -63,7 +63,7 @@ def run_inject(options: argparse.Namespace) -> int:
         if options.timeeval:
             write_timeeval(paths[channel], {channel: frame})
         else:
-            write_table(paths[channel], _without_notes(frame))
+            write_table(paths[channel], frame)
         tell(frame.attrs["lines"])
 
     if not is_joint:
@@ -94,7 +94,7 @@ def _inject_joint(options: argparse.Namespace, kinds: tuple[str, ...], severity:
     if options.timeeval:
         write_timeeval(path, {name: frame[[name, "mask"]].rename(columns={name: "value"}) for name in telemetry.columns})
     else:
-        write_table(path, _without_notes(frame))
+        write_table(path, frame)
     lines = [line for each in cleaned.values() for line in each.report.lines()]
     lines += [
         f"{kind} of {printable(channel)} from sample {begin:,} to {end:,}" for kind, _, begin, end, channel in frame.attrs["anomalies"]
@@ -105,10 +105,3 @@ def _inject_joint(options: argparse.Namespace, kinds: tuple[str, ...], severity:
         )
     )
     return 0
-
-
-def _without_notes(frame: "pd.DataFrame") -> "pd.DataFrame":
-    """Returns the frame without attributes, which Parquet would store as JSON."""
-    plain = frame.copy(deep=False)
-    plain.attrs = {}
-    return plain

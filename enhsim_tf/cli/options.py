@@ -257,7 +257,7 @@ def run_for(
     """
     if not simulator.is_run_model:
         if options.coarse is not None:
-            simulator._runs()
+            simulator.recorded_runs()
         return None
     from enhsim_tf.coarse_simulator.recording_files import read_recording
 

@@ -17,6 +17,7 @@ from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 if TYPE_CHECKING:
     import pandas as pd
 
+SAME_RATE = 1e-3  # largest relative difference of two sampling intervals that count as one
 _TOLERANCE = 1e-3  # in intervals: a time this far outside a part still belongs to it
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.coarse_simulator.pairing import stretches
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
 from enhsim_tf.telemetry.cleaning.numbers import parse_numbers
@@ -25,7 +25,6 @@ from enhsim_tf.telemetry.registry import FILES
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 from enhsim_tf.telemetry.sources import Source, read_source
 
-_SAME_RATE = 1e-3  # relative difference of two intervals that count as the same
 _TABLES = tuple(ending for ending, reader in FILES.items() if reader.endswith(":read_table_channels"))
 _QUIET = ("constant", "stuck", "quantised", "changing level")
 _NO_INPUTS = ("labels", "quality flags", "row numbers", "further clocks", "own columns")  # findings of columns that are no inputs
@@ -81,10 +80,10 @@ def read_recording(
         raise InputError(
             f"Expected a coarse run with times, one sample every {grid_s:g} s. Received: {name} without times. Add a time column."
         )
-    if own_s < (1 - _SAME_RATE) * grid_s:
+    if own_s < (1 - SAME_RATE) * grid_s:
         cleaned = {each: clean(raw[each], dataclasses.replace(cleaning, interval_s=grid_s)) for each in names}
         notes.append(f"{name}: a sample every {own_s:g} s, averaged to one every {grid_s:g} s")
-    elif own_s > (1 + _SAME_RATE) * grid_s:
+    elif own_s > (1 + SAME_RATE) * grid_s:
         notes.append(f"{name}: a sample every {own_s:g} s, interpolated to one every {grid_s:g} s")
     base, values = _on_one_grid(cleaned, grid_s, name)
     kept = stretches(np.isfinite(values).all(axis=1))

@@ -51,11 +51,10 @@ class SquareWave:
         cycle -= np.floor(cycle)  # the same as a modulus, in a fraction of the time
         above = cycle < self.duty
         if self.num_levels == 2:
-            share = above.astype(np.float64)
-        else:
-            half_wave = np.where(above, np.sin(np.pi * cycle / self.duty), -np.sin(np.pi * (cycle - self.duty) / (1 - self.duty)))
-            step = np.floor(self.num_levels * (half_wave + 1) / 2)
-            share = np.minimum(step, self.num_levels - 1) / (self.num_levels - 1)
+            return np.where(above, float(self.low + (self.high - self.low)), float(self.low))
+        half_wave = np.where(above, np.sin(np.pi * cycle / self.duty), -np.sin(np.pi * (cycle - self.duty) / (1 - self.duty)))
+        step = np.floor(self.num_levels * (half_wave + 1) / 2)
+        share = np.minimum(step, self.num_levels - 1) / (self.num_levels - 1)
         return self.low + (self.high - self.low) * share
 
 

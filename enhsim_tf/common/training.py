@@ -81,14 +81,16 @@ def fit_windows(
         The history: `loss` and, with `validation`, `val_loss`, each of shape `(epochs,)`.
     """
     trained = BlockwiseTraining(model) if is_wide_dense_stack(model) and not jit_compile else model
-    trained.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile)
+    steps = -(-len(inputs) // batch_size)
+    at_once = 1 if callbacks else steps  # steps between which nobody looks are one call of the graph
+    trained.compile(fused_adam(learning_rate), loss=loss, jit_compile=jit_compile, steps_per_execution=at_once)
     rng = np.random.default_rng(seed)
     orders = np.stack([rng.permutation(len(inputs)) for _ in range(epochs)])
     held_out = None if validation is None else _without_autotuning(tf.data.Dataset.from_tensor_slices(validation).batch(256))
     history = trained.fit(
         batches(inputs, targets, orders, batch_size),
         epochs=epochs,
-        steps_per_epoch=-(-len(inputs) // batch_size),
+        steps_per_epoch=steps,
         validation_data=held_out,
         callbacks=list(callbacks),
         verbose=verbose,

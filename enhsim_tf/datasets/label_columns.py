@@ -90,11 +90,13 @@ def write_table(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
         frame: The table.
     """
     make_folder(Path(path).parent)
+    table = frame.reset_index()
+    table.attrs = {}  # Parquet would store them as JSON
     with replace_file(path) as temporary:
         if Path(path).suffix == ".csv":
-            frame.reset_index().to_csv(temporary, index=False)
+            table.to_csv(temporary, index=False)
         else:
-            frame.reset_index().to_parquet(temporary, compression="zstd", index=False)
+            table.to_parquet(temporary, compression="zstd", index=False)
 
 
 def write_timeeval(path: str | os.PathLike, channels: Mapping[str, "pd.DataFrame"]) -> None:

@@ -64,12 +64,13 @@ class ResidualSize:
 
     def factors(self, sizes: np.ndarray) -> np.ndarray:
         """Returns the factor of each window: the median of past sizes in units of the typical one, from 1 to `bound`."""
-        found = np.ones(len(sizes))
-        if self.bound == 1 or not self.typical > 0:
+        import pandas as pd
+
+        found, first = np.ones(len(sizes)), self.overlap + _LEAST_MEMORY
+        if self.bound == 1 or not self.typical > 0 or len(sizes) <= first:
             return found
-        for number in range(self.overlap + _LEAST_MEMORY, len(sizes)):
-            end = number - self.overlap
-            found[number] = np.median(sizes[max(0, end - self.memory) : end]) / self.typical
+        past = pd.Series(sizes[: -self.overlap - 1]).rolling(self.memory, min_periods=1).median()
+        found[first:] = past[_LEAST_MEMORY - 1 :] / self.typical
         return np.clip(found, 1.0, self.bound)
 
 

@@ -49,26 +49,30 @@ class Enhancer:
         """
         outputs = np.empty((len(inputs), self.window, self.channels), np.float32)
         for first in range(0, len(inputs), _CHUNK):
-            some = np.asarray(inputs[first : first + _CHUNK], np.float32) - self.centre
-            outputs[first : first + _CHUNK] = self._mapped(some).reshape(len(some), self.window, self.channels)
+            self._map(np.asarray(inputs[first : first + _CHUNK], np.float32) - self.centre, outputs[first : first + _CHUNK])
         return outputs
 
-    def _mapped(self, inputs: np.ndarray) -> np.ndarray:
+    def _map(self, inputs: np.ndarray, outputs: np.ndarray) -> None:
         if self.main is not None:
             column, gain = self.main
-            return inputs[:, :, column] * gain + self.bias.reshape(self.window, self.channels)
+            outputs[:] = inputs[:, :, column] * gain + self.bias.reshape(self.window, self.channels)
+            return
         rows = mapped = inputs.reshape(len(inputs), -1)
-        for factor in self.factors:
+        flat = outputs.reshape(len(inputs), -1)  # a view
+        for factor in self.factors[:-1]:
             mapped = mapped @ factor
-        mapped = mapped + self.bias if self.factors else np.tile(self.bias, (len(rows), 1))
+        if self.factors:
+            np.matmul(mapped, self.factors[-1], out=flat)
+            flat += self.bias
+        else:
+            flat[:] = self.bias
         if self.layers:
             for number, (kernel, bias) in enumerate(self.layers, 1):
                 rows = rows @ kernel
                 rows += bias
                 if number < len(self.layers):
                     np.maximum(rows, 0, out=rows)
-            mapped += rows
-        return mapped
+            flat += rows
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:

@@ -1,15 +1,18 @@
 """Resampled residuals: noise models that draw whole windows of real noise (baselines of section 2.3)."""
 
+import functools
 import math
 from collections.abc import Callable
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.errors import InputError
 
 _NUM_SEGMENTS = 64  # of a window; two signals are compared by their means over these segments
 _EQUAL = 0.01  # signals that differ by less than this share of their standard deviation count as equal
-_BATCH = 2**24  # distances that are computed at a time
+_BATCH = 2**19  # distances that are computed at a time, few enough for a processor's cache
+_MOST_LANDMARKS = 2_500  # stored signals whose neighbours are found, which bounds the time
 _LAST_START = 2**60  # the end of a window is still an integer of 64 bits
 
 
@@ -56,7 +59,8 @@ class MatchedWindowBootstrap:
 
     The noise of many sensors depends on what they measure, and residuals contain errors of the enhancer, which do, too. A window of
     noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
-    whose signal is the same. The distance of two signals is that of their means over 64 segments. The idea, and the number of
+    whose signal is the same. The distance of two signals is that of their means over 64 segments. The neighbours of a signal are those of
+    the stored signal that is nearest to it, so that they are found once for all draws. The idea, and the number of
     neighbours, are those of the nearest-neighbour bootstrap of Lall and Sharma (1996), which resamples the successors of similar
     pasts instead. Of these windows, one is drawn as by `WindowBootstrap`. If the signal never repeats, the nearest windows can be few
     stretches of the record.
@@ -98,8 +102,8 @@ class MatchedWindowBootstrap:
         Raises:
             InputError: If there is no finite signal of this shape.
         """
-        drawn, _ = self._draw(signal, number, rng, with_mean=False)
-        return drawn
+        near = self._nearest(signal, number)
+        return self.windows[_draw_near(near, self._neighbours.of, _Sparing(self.starts, *self.windows.shape[:2]), rng)]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws a series of any length without seams.
@@ -119,53 +123,95 @@ class MatchedWindowBootstrap:
             )
 
         def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            below = signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)]
-            return self._draw(below, len(starts), rng, with_mean=True)
+            near = self._nearest(signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)], len(starts))
+            chosen = _draw_near(near, self._neighbours.of, _Sparing(self.starts, *self.windows.shape[:2]), rng)
+            used, place = np.unique(near, return_inverse=True)
+            means = np.stack([self.windows[self._neighbours.of[each]].mean(axis=0) for each in used])
+            return self.windows[chosen], means[place]
 
         return _cross_faded(window, num_samples, rng, draw)
 
-    def _draw(
-        self, signal: np.ndarray | None, number: int, rng: np.random.Generator, with_mean: bool
-    ) -> tuple[np.ndarray, np.ndarray | float]:
-        """Draws windows, and computes the mean of the windows that each was drawn from."""
-        shape, sparing = self.windows.shape[1:], _Sparing(self.starts, *self.windows.shape[:2])
-        wanted = _segment_means(signal, (number, *shape)).astype(np.float64)
-        centre = self.signals.mean(axis=0, dtype=np.float64)
-        known, wanted = self.signals - centre, wanted - centre  # smaller numbers, smaller rounding errors
-        if len(shape) == 2:  # each channel in its own unit
-            spread = np.std(known.reshape(-1, shape[1]), axis=0)
-            unit = np.tile(np.where(spread > 0, spread, 1.0), known.shape[1] // shape[1])
-            known, wanted = known / unit, wanted / unit
-        nearest = math.ceil(math.sqrt(len(known)))
-        equal = _EQUAL**2 * known.shape[1] * np.var(self.signals, dtype=np.float64) if len(shape) == 1 else _EQUAL**2 * known.shape[1]
-        length, flat = np.einsum("ij,ij->i", known, known), self.windows.reshape(len(known), -1)
-        drawn, means = np.empty((number, *shape), np.float32), np.empty((number if with_mean else 0, *shape), np.float32)
-        for begin in range(0, number, max(1, _BATCH // len(known))):
-            rows = slice(begin, begin + max(1, _BATCH // len(known)))
-            apart = np.maximum(length - 2 * wanted[rows] @ known.T + np.einsum("ij,ij->i", wanted[rows], wanted[rows])[:, None], 0.0)
-            near = np.argpartition(apart, nearest - 1, axis=1)[:, :nearest]
-            reach = np.maximum(np.take_along_axis(apart, near, axis=1).max(axis=1), equal)
-            candidates = [near[row] if reach[row] > equal else np.flatnonzero(apart[row] <= equal) for row in range(len(apart))]
-            drawn[rows] = self.windows[_draw_near(candidates, sparing, rng)]
-            if with_mean:
-                is_near = np.zeros(apart.shape, np.float32)
-                for row, some in enumerate(candidates):
-                    is_near[row, some] = 1 / len(some)
-                means[rows] = (is_near @ flat).reshape(-1, *shape)
-        return drawn, means if with_mean else 0.0
+    def _nearest(self, signal: np.ndarray | None, number: int) -> np.ndarray:
+        signal = _checked_signal(signal, (number, *self.windows.shape[1:]))
+        with threadpool_limits(1):  # several threads take longer for products of this size
+            return self._neighbours.nearest(signal.reshape(*signal.shape[:2], -1))
+
+    @functools.cached_property
+    def _neighbours(self) -> "_Neighbours":
+        return _Neighbours(self.signals, self.windows.shape[1], math.prod(self.windows.shape[2:]))
 
 
-def _draw_near(candidates: list[np.ndarray], sparing: "_Sparing", rng: np.random.Generator) -> np.ndarray:
-    """Draws one of the candidates of each row, one that shares no sample with those drawn before if there is one."""
-    places = rng.random(len(candidates))
-    chosen = np.array([some[int(place * len(some))] for some, place in zip(candidates, places, strict=True)])
-    for row, some in enumerate(candidates):
-        if not sparing.num_free:
-            break
-        free = some[sparing.is_free[some]]
+class _Neighbours:
+    """Which stored signals are nearest to a given one.
+
+    One of each group of stored signals that count as equal is a landmark; of very many, some are. A given signal is compared with the landmarks
+    on the principal components that hold all but a share of `_EQUAL**2` of the variance, each channel in its own unit.
+
+    Args:
+        signals: Means of the stored signals over segments, shape `(windows, segments * channels)`.
+        window: Length of a window in samples.
+        channels: Number of channels.
+
+    Attributes:
+        of: For each landmark, the numbers of the stored signals that are nearest to it.
+    """
+
+    def __init__(self, signals: np.ndarray, window: int, channels: int):
+        signals = signals.reshape(len(signals), -1, channels)
+        lengths, centre = np.diff(_edges(window)), signals.mean(axis=0, dtype=np.float64).astype(np.float32)
+        known = signals - centre.astype(np.float64)
+        spread = np.std(known, axis=(0, 1))
+        unit = np.where(spread > 0, spread, 1.0)
+        known = (known / unit).reshape(len(signals), -1)
+        _, sizes, axes = np.linalg.svd(known, full_matrices=False)
+        held = np.cumsum(sizes[::-1] ** 2)[::-1]
+        axes = axes[: max(1, np.count_nonzero(held > _EQUAL**2 * held[0]))].T
+        places, equal = known @ axes, _EQUAL**2 * len(axes)
+        _, first = np.unique(np.round(places / math.sqrt(equal / axes.shape[1])), axis=0, return_index=True)
+        first = first[np.linspace(0, len(first) - 1, min(len(first), _MOST_LANDMARKS)).astype(int)]
+        self.of, landmarks = _nearest_of(known[first], known, equal), places[first].astype(np.float32)
+        # the square of a distance is that of the landmark minus twice a product, beside what is the same for all landmarks
+        self._landmarks, self._halves = landmarks.T, 0.5 * np.sum(landmarks**2, axis=1)
+        self._centre = np.repeat(centre, lengths, axis=0)  # subtracted first: smaller numbers, smaller rounding errors
+        axes = axes.reshape(-1, channels, axes.shape[1]) / (lengths[:, None, None] * unit[:, None])  # from means of segments to samples
+        self._axes = np.repeat(axes, lengths, axis=0).reshape(window * channels, -1).astype(np.float32)
+
+    def nearest(self, signal: np.ndarray) -> np.ndarray:
+        """Returns the nearest landmark of each signal of shape `(windows, samples, channels)`."""
+        wanted = (signal - self._centre).astype(np.float32).reshape(len(signal), -1) @ self._axes
+        found, step = np.empty(len(wanted), np.int64), max(1, _BATCH // len(self._halves))
+        for begin in range(0, len(wanted), step):
+            rows = slice(begin, begin + step)
+            found[rows] = np.argmax(wanted[rows] @ self._landmarks - self._halves, axis=1)
+        return found
+
+
+def _nearest_of(places: np.ndarray, known: np.ndarray, equal: float) -> list[np.ndarray]:
+    """For each place, the nearest known ones: as many as the square root of their number, and all within the squared distance `equal`."""
+    nearest, length, found = math.ceil(math.sqrt(len(known))), np.einsum("ij,ij->i", known, known), []
+    step = max(1, _BATCH // len(known))
+    for some in (places[begin : begin + step] for begin in range(0, len(places), step)):
+        apart = np.maximum(length - 2 * some @ known.T + np.einsum("ij,ij->i", some, some)[:, None], 0.0)
+        near = np.argpartition(apart, nearest - 1, axis=1)[:, :nearest]
+        reach = np.take_along_axis(apart, near, axis=1).max(axis=1)
+        found += [own if far > equal else np.flatnonzero(row <= equal) for own, far, row in zip(near, reach, apart, strict=True)]
+    return found
+
+
+def _draw_near(near: np.ndarray, neighbours: list[np.ndarray], sparing: "_Sparing", rng: np.random.Generator) -> np.ndarray:
+    """Draws one of the neighbours of each landmark, one that shares no sample with those drawn before if there is one."""
+    sizes = np.array([len(some) for some in neighbours])
+    begins, places = np.cumsum(sizes) - sizes, rng.random(len(near))
+    chosen, spent = np.concatenate(neighbours)[begins[near] + (places * sizes[near]).astype(int)], set()
+    for row, landmark in enumerate(near.tolist()):
+        if landmark in spent:
+            continue
+        free = neighbours[landmark][sparing.is_free[neighbours[landmark]]]
         if len(free):
             chosen[row] = free[int(places[row] * len(free))]
             sparing.take(chosen[row])
+        else:
+            spent.add(landmark)  # what was drawn is never free again
     return chosen
 
 
@@ -180,14 +226,13 @@ class _Sparing:
 
     def __init__(self, starts: np.ndarray | None, number: int, window: int):
         starts = window * np.arange(number) if starts is None else starts
-        self.is_free, self.num_free, self._order = np.ones(number, bool), number, np.argsort(starts, kind="stable")
+        self.is_free, self._order = np.ones(number, bool), np.argsort(starts, kind="stable")
         apart = ((starts - window, "right"), (starts + window, "left"))
         self._first, self._last = (np.searchsorted(starts[self._order], edge, side) for edge, side in apart)
 
     def take(self, chosen: int) -> None:
         """Notes that a window was drawn."""
         self.is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
-        self.num_free = int(np.count_nonzero(self.is_free))
 
 
 def _draw_sparingly(sparing: _Sparing, number: int, rng: np.random.Generator) -> np.ndarray:
@@ -219,13 +264,22 @@ def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray
     return windows, starts.astype(np.int64)
 
 
-def _segment_means(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
-    """Returns the means of signals over segments of nearly equal length, shape `(windows, segments)`."""
+def _checked_signal(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     if signal is None or np.shape(signal) != shape:
         raise InputError(f"Expected the enhanced signal of shape {shape}, which this noise follows. Received: {np.shape(signal)}.")
     if not np.isfinite(signal).all():
         raise InputError("Expected a finite enhanced signal, which this noise follows. Received: values that are not finite.")
-    edges = np.linspace(0, shape[1], min(_NUM_SEGMENTS, shape[1]) + 1).astype(int)
+    return np.asarray(signal)
+
+
+def _edges(window: int) -> np.ndarray:
+    """Edges of segments of nearly equal length."""
+    return np.linspace(0, window, min(_NUM_SEGMENTS, window) + 1).astype(int)
+
+
+def _segment_means(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
+    """Returns the means of signals over segments, shape `(windows, segments * channels)`."""
+    signal, edges = _checked_signal(signal, shape), _edges(shape[1])
     sums = np.add.reduceat(np.asarray(signal, np.float64).reshape(*shape[:2], -1), edges[:-1], axis=1)
     return (sums / np.diff(edges)[:, None]).reshape(shape[0], -1).astype(np.float32)
 

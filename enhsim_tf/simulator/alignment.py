@@ -10,7 +10,7 @@ from enhsim_tf.coarse_simulator.constant_level import waves_or_level
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_with_recording
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, held_samples, simulate_schedule
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.common.errors import InputError
@@ -18,7 +18,6 @@ from enhsim_tf.simulator.joint import cut, telemetry_of
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
-_SAME_RATE = 1e-3
 _SAME_PERIOD = 0.02  # largest relative difference of periods that are one clock
 
 
@@ -77,6 +76,7 @@ class Waves:
         self.simulators, self.channels = tuple(simulators), tuple(channels)
         self.interval_s, self.window = float(interval_s), int(window)
         self.waveforms = tuple(waveforms) if waveforms is not None else (None,) * len(self.simulators)
+        self._series = [np.zeros((0, 1), np.float32)] * len(self.simulators)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -153,8 +153,8 @@ class Waves:
             scenarios: Degraded mode of each window, or None.
             rng: Draws what is random in a degraded mode.
         """
-        times = self.interval_s * (np.asarray(starts)[:, None] + np.arange(self.window))
-        nominal = np.stack([self._in_unit(channel, each.simulate(times)) for channel, each in enumerate(self.simulators)], axis=2)
+        starts = np.asarray(starts)
+        nominal = np.concatenate([self._nominal(channel, starts) for channel in range(len(self.simulators))], axis=2)
         if not any(scenarios):
             return Drawn(nominal, nominal, [])
         coarse, held = nominal.copy(), []
@@ -162,9 +162,23 @@ class Waves:
             rows = np.array([number for number, each in enumerate(scenarios) if each == scenario])
             stuck = held_samples(scenario, self.window)
             for channel in self._concerned(scenario):
-                coarse[rows, :, channel] = self._in_unit(channel, self.simulators[channel].simulate(times[rows], scenario, rng))
+                times = self._times(starts[rows])
+                coarse[rows, :, channel] = self._in_unit(channel, self.simulators[channel].simulate(times, scenario, rng))
                 held += [(int(row), channel, *stuck) for row in rows] if stuck else []
         return Drawn(coarse, nominal, held)
+
+    def _nominal(self, channel: int, starts: np.ndarray) -> np.ndarray:
+        """Simulates nominal windows of a channel, shape `(windows, samples, 1)`; many are cut out of one series that is kept."""
+        simulator, length = self.simulators[channel], int(starts.max(initial=0)) + self.window
+        if length > len(self._series[channel]):
+            if 2 * len(starts) * self.window < length:
+                return self._in_unit(channel, simulator.simulate(self._times(starts)))[:, :, None]
+            times = self.interval_s * np.arange(1 << length.bit_length())  # the next windows are hardly ever beyond its end
+            self._series[channel] = self._in_unit(channel, simulator.simulate(times[None]))[0][:, None]
+        return cut(self._series[channel : channel + 1], starts, self.window)
+
+    def _times(self, starts: np.ndarray) -> np.ndarray:
+        return self.interval_s * (starts[:, None] + np.arange(self.window))
 
     def draw_series(
         self,
@@ -268,7 +282,7 @@ class Runs:
             InputError: If a column is missing, the interval differs, or every part is shorter than a window.
         """
         run, interval_s = run.select(self.columns), self.nominal.interval_s
-        if abs(run.interval_s / interval_s - 1) > _SAME_RATE:
+        if abs(run.interval_s / interval_s - 1) > SAME_RATE:
             raise InputError(
                 f"Expected a coarse run with a sample every {interval_s:g} s, as in the fit. Received: every {run.interval_s:g} s in {run.name}. "
                 "Read it with read_recording(..., interval_s=model.interval_s)."

@@ -89,11 +89,14 @@ def hold_values(windows: np.ndarray, mask: np.ndarray, held: Iterable[tuple[int,
         held: Row, first sample and end of each range of samples that keeps the value of its first sample.
         tolerance: Largest difference from the nominal run that does not count as a change.
     """
+    rows_of: dict[tuple[int, int], list[int]] = {}
     for row, begin, end in held:
-        piece, value = windows[row, begin:end], windows[row, begin]
-        changed = np.abs(piece.astype(np.float64) - value) > tolerance
-        piece[changed] = value
-        mask[row, begin:end] |= changed
+        rows_of.setdefault((begin, end), []).append(row)
+    for (begin, end), rows in rows_of.items():
+        pieces = windows[rows, begin:end]
+        changed = np.abs(pieces.astype(np.float64) - pieces[:, :1]) > tolerance
+        windows[rows, begin:end] = np.where(changed, pieces[:, :1], pieces)
+        mask[rows, begin:end] |= changed
 
 
 def add_changed(

@@ -1,7 +1,7 @@
 """Fits an enhanced simulator to nominal telemetry, and measures it on the held-out end (sections 2.2 and 2.3)."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -182,14 +182,8 @@ def _fit_aligned(
         clean = simulator.enhance(*waves.align(windows))
         return NoiseWindows(windows - clean, clean, times_of(some, places, window))
 
-    def evenly(some: Recording | None) -> NoiseWindows:
-        some = long_enough(some, window)
-        if some is None:
-            return NoiseWindows(*np.zeros((2, 0, window, len(channels)), np.float32), np.zeros(0, int))
-        return noise_windows(some, evenly_spaced_starts([part.values for part in some.parts], window, number))
-
     everything = noise_windows(usable, random_window_starts(series, window, number, np.random.default_rng([options.seed, 1])))
-    halves = tuple(evenly(each) for each in split_end(usable, JUDGED_SHARE))
+    halves = tuple(_evenly(each, window, number, len(channels), noise_windows) for each in split_end(usable, JUDGED_SHARE))
     said = _said_of(choices, channels, note)
     return _finish(simulator, choice, halves, everything, options, usable, long_enough(held_out, window), (None, None), said, [], progress)
 
@@ -273,12 +267,17 @@ def _fit_runs(
     values = np.concatenate(series)
     simulator.quantisation = tuple(Levels.find(values[:, channel]) for channel in range(values.shape[1]))
     residuals = _held_out_residuals(simulator, learnt, learnt_run, choice, inputs, targets, times, options)
-    everything = _cut_noise(residuals, window, number)
-    judged = tuple(_cut_noise(some, window, number) for some in _split_residuals(residuals))
+
+    def noise_windows(some: Recording, places: np.ndarray) -> NoiseWindows:
+        noise, clean = np.split(cut([part.values for part in some.parts], places, window), 2, axis=2)
+        return NoiseWindows(noise, clean, times_of(some, places, window))
+
+    halves = (None, None) if residuals is None else split_end(residuals, JUDGED_SHARE)
+    everything, *judged = (_evenly(some, window, number, len(recording.columns), noise_windows) for some in (residuals, *halves))
     return _finish(
         simulator,
         choice,
-        judged,
+        tuple(judged),
         everything,
         options,
         learnt,
@@ -342,8 +341,8 @@ def _held_out_residuals(
     targets: np.ndarray,
     times: np.ndarray,
     options: FitOptions,
-) -> list[tuple[int, np.ndarray, np.ndarray]]:
-    """Returns first sample, residual and enhanced run of all blocks of time, each from an enhancer that was not fitted to that block.
+) -> Recording | None:
+    """Returns residual and enhanced run of all blocks of time, side by side, each from an enhancer that was not fitted to that block.
 
     Residuals of the telemetry that an enhancer has learnt from are too small, because it has learnt part of their noise.
     """
@@ -362,33 +361,20 @@ def _held_out_residuals(
                 low, high = (int(np.clip(edge - first, 0, len(part))) for edge in choice.edges[block : block + 2])
                 if high - low >= window:
                     clean = other.enhance_run(coarse.values[low:high])
-                    found.append((first + low, part.values[low:high] - clean, clean))
-    return sorted(found, key=lambda each: each[0])
+                    both = np.concatenate([part.values[low:high] - clean, clean], axis=1)
+                    found.append(Run(both, (first + low) * learnt.interval_s))
+    columns = tuple(f"{what} of {name}" for what in ("residual", "enhanced run") for name in learnt.columns)
+    return dataclasses.replace(learnt, parts=tuple(sorted(found, key=lambda each: each.offset_s)), columns=columns) if found else None
 
 
-def _split_residuals(residuals: list[tuple[int, np.ndarray, np.ndarray]]) -> tuple[list, list]:
-    """Splits residuals into the first part of the time and the last, on which noise models are judged."""
-    total = sum(len(each) for _, each, _ in residuals)
-    left = total - round(JUDGED_SHARE * total)
-    first, rest = [], []
-    for place, residual, clean in residuals:
-        stop = int(np.clip(left, 0, len(residual)))
-        first += [(place, residual[:stop], clean[:stop])] if stop else []
-        rest += [(place + stop, residual[stop:], clean[stop:])] if stop < len(residual) else []
-        left -= len(residual)
-    return first, rest
-
-
-def _cut_noise(residuals: list[tuple[int, np.ndarray, np.ndarray]], window: int, number: int) -> NoiseWindows:
-    usable = [each for each in residuals if len(each[1]) >= window]
-    if not usable:
-        channels = residuals[0][1].shape[1] if residuals else 1
+def _evenly(
+    recording: Recording | None, window: int, number: int, channels: int, windows_at: Callable[[Recording, np.ndarray], NoiseWindows]
+) -> NoiseWindows:
+    """Windows of noise that are evenly spaced over a recording; none if it has no part that is long enough."""
+    usable = long_enough(recording, window)
+    if usable is None:
         return NoiseWindows(*np.zeros((2, 0, window, channels), np.float32), np.zeros(0, int))
-    places, noise, clean = zip(*usable, strict=True)
-    starts = evenly_spaced_starts(noise, window, number)
-    firsts = np.cumsum([0] + [len(each) - window + 1 for each in noise])
-    which = np.searchsorted(firsts, starts, "right") - 1
-    return NoiseWindows(cut(noise, starts, window), cut(clean, starts, window), np.array(places)[which] + starts - firsts[which])
+    return windows_at(usable, evenly_spaced_starts([part.values for part in usable.parts], window, number))
 
 
 # both

@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
+from enhsim_tf.telemetry.windows import places_in_parts
 
-_SAME_RATE = 1e-3  # largest relative difference of two intervals that count as one
 _LEAST_SHARED = 0.5  # channels that share a smaller part of their time do not become one model
 
 
@@ -61,7 +61,7 @@ def telemetry_of(recording: Recording, channel: int = 0) -> list[Telemetry]:
 
 
 def _is_alike(first: Telemetry, second: Telemetry) -> bool:
-    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= _SAME_RATE
+    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= SAME_RATE
 
 
 def _joined(channels: Mapping[str, Sequence[Telemetry]]) -> Recording | None:
@@ -136,20 +136,17 @@ def cut(series: Sequence[np.ndarray], starts: np.ndarray, window: int) -> np.nda
         float32 array of shape `(windows, samples, columns)`.
     """
     usable = [each for each in series if len(each) >= window]
-    firsts = np.cumsum([0] + [len(each) - window + 1 for each in usable])
-    which = np.searchsorted(firsts, starts, "right") - 1
+    which, places = places_in_parts(usable, starts, window)
     windows = np.empty((len(starts), window, series[0].shape[1]), np.float32)
     for number in np.unique(which):
-        rows = which == number
+        rows = which == number if len(usable) > 1 else slice(None)
         view = np.lib.stride_tricks.sliding_window_view(usable[number], window, axis=0)
-        windows[rows] = view[np.asarray(starts)[rows] - firsts[number]].transpose(0, 2, 1)
+        windows[rows] = view[places[rows]].transpose(0, 2, 1)
     return windows
 
 
 def times_of(recording: Recording, starts: np.ndarray, window: int) -> np.ndarray:
     """Returns the first sample of each window on the clock of the recording, integers of shape `(windows,)`."""
     usable = [part for part in recording.parts if len(part) >= window]
-    firsts = np.cumsum([0] + [len(part) - window + 1 for part in usable])
-    which = np.searchsorted(firsts, starts, "right") - 1
-    offsets = np.array([round(part.offset_s / recording.interval_s) for part in usable])
-    return offsets[which] + np.asarray(starts) - firsts[which]
+    which, places = places_in_parts(usable, starts, window)
+    return np.array([round(part.offset_s / recording.interval_s) for part in usable])[which] + places

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.coarse_simulator.recording import Recording
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
-from enhsim_tf.detection.evaluation import mean_over_windows
 from enhsim_tf.detection.events import confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
 from enhsim_tf.detection.residual_size import ResidualSize
@@ -26,6 +25,7 @@ from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.pandas_series import to_series
+from enhsim_tf.telemetry.windows import mean_over_windows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -260,7 +260,7 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
         )
-    if abs(telemetry.interval_s - simulator.interval_s) > 1e-3 * simulator.interval_s:
+    if abs(telemetry.interval_s - simulator.interval_s) > SAME_RATE * simulator.interval_s:
         raise InputError(
             f"Expected a sample every {simulator.interval_s:g} s, as in the telemetry of the fit. Received: every {telemetry.interval_s:g} s. "
             "Give telemetry with the same sampling interval, or --interval."
@@ -271,7 +271,7 @@ def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recordin
             "Give it with --coarse."
         )
     if run is not None:
-        simulator._runs()
+        simulator.recorded_runs()
 
 
 def _coarse_of(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> list[list[tuple[int, np.ndarray]]]:

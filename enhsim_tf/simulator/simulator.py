@@ -287,7 +287,8 @@ class EnhancedSimulator:
 
     def _with_noise(self, windows: np.ndarray, clean: np.ndarray, mask: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if not mask.any():
-            return self._rounded(windows + noise), mask
+            windows += noise
+            return self._rounded(windows), mask
         values = np.empty_like(windows)
         for channel, levels in enumerate(self.quantisation):
             of = (..., channel)
@@ -401,7 +402,7 @@ class EnhancedSimulator:
     @functools.cached_property
     def _nominal_clean(self) -> list[np.ndarray]:
         """The parts of the nominal run, enhanced."""
-        return [self.enhance_run(part.values) for part in self._runs().usable(self.alignment.nominal).parts]
+        return [self.enhance_run(part.values) for part in self.recorded_runs().usable(self.alignment.nominal).parts]
 
     def _nominal_series(self, num_samples: int, start_s: float) -> np.ndarray:
         """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions are cross-faded."""
@@ -435,7 +436,7 @@ class EnhancedSimulator:
             InputError: If the run cannot be enhanced.
         """
         check_counts(num_copies=(num_copies, 0))
-        clean = [self.enhance_run(part.values) for part in self._runs().usable(run).parts]
+        clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
         for number in range(num_copies):
             rng = np.random.default_rng([seed, 1, number])
             yield [self.add_noise(enhanced, rng) for enhanced in clean]
@@ -452,7 +453,7 @@ class EnhancedSimulator:
         Raises:
             InputError: If there is no simulator, because this one was loaded and code is not saved.
         """
-        runs = self._runs()
+        runs = self.recorded_runs()
         if runs.coarse is None:
             raise InputError(
                 f"Expected the coarse simulator {runs.name}, which is not saved with the model. Received: none. "
@@ -460,7 +461,12 @@ class EnhancedSimulator:
             )
         return record(runs.coarse, time_s, scenario, np.random.default_rng(seed), labels=labels)
 
-    def _runs(self) -> Runs:
+    def recorded_runs(self) -> Runs:
+        """Returns the alignment of a simulator of recorded runs.
+
+        Raises:
+            InputError: If it is one of square waves.
+        """
         if not isinstance(self.alignment, Runs):
             raise InputError(
                 "Expected a model of recorded runs. Received: one of square waves, which needs no run. Leave --coarse out, or fit with it."
@@ -510,7 +516,7 @@ class EnhancedSimulator:
         """
         simulator = read_saved(folder, cls._from_saved)
         if coarse is not None:
-            runs = simulator._runs()
+            runs = simulator.recorded_runs()
             if set(runs.columns) - set(coarse.columns):
                 raise InputError(
                     f"Expected a simulator with the columns {', '.join(runs.columns)[:120]}. Received: {name_of(coarse)} with "

@@ -85,7 +85,7 @@ def update(
     new, _ = fit(telemetry, run, options)
     new.trained["updates"] = [*simulator.trained.get("updates", ()), {"num_samples": len(telemetry), "held_out": held_out, "seed": seed}]
     window = max(simulator.window, new.window)
-    judged = telemetry if run is None else simulator._runs().pair(telemetry, run)[0]
+    judged = telemetry if run is None else simulator.recorded_runs().pair(telemetry, run)[0]
     end = long_enough(split_end(judged, held_out)[1], window) or long_enough(judged, window)
     before, after = (_state(each, end, run, seed) for each in (simulator, new))
     return new, UpdateReport(simulator.channels, len(telemetry), len(end), before, after)
@@ -106,7 +106,7 @@ def _state(simulator: EnhancedSimulator, end: Recording, run: Recording | None, 
             if not wave.is_constant:
                 found["period_s"][name] = float(wave.waves[0].period_s)
     else:
-        paired, coarse = simulator._runs().pair(end, run)
+        paired, coarse = simulator.recorded_runs().pair(end, run)
         series = [part.values for part in paired.parts]
         enhanced = [simulator.enhance_run(part.values) for part in coarse.parts]
         starts = evenly_spaced_starts(series, window, _NUM_WINDOWS)

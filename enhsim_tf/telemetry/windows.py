@@ -9,7 +9,6 @@ from collections.abc import Sequence, Sized
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.series import Telemetry
 
 _LEAST_SHARE = 0.25  # of the windows outside a block that must remain where those that overlap the block are left out
 
@@ -89,54 +88,22 @@ def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarr
     return np.lib.stride_tricks.sliding_window_view(values, window)[starts]
 
 
-def first_samples(parts: Sequence[Sized], starts: np.ndarray, window: int) -> np.ndarray:
-    """Returns the first sample of each window, counted over all samples of the parts that are long enough.
+def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
+    """The number of possible starts before each part that is long enough, and that of all."""
+    return np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
 
-    Unlike the starts, these tell which windows overlap: two windows of different parts are at least a window apart.
+
+def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns where each window lies: the number of its part, among those that are long enough, and its first sample there.
 
     Args:
         parts: Contiguous parts of one series.
         starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
         window: Number of samples in a window.
     """
-    return np.asarray(starts) + (window - 1) * _which_part(_first_starts(parts, window), starts)
-
-
-def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
-    """The number of possible starts before each part that is long enough, and that of all."""
-    return np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
-
-
-def _which_part(firsts: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    return np.searchsorted(firsts, starts, "right") - 1
-
-
-def cut_windows_from_parts(parts: Sequence[Telemetry], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cuts windows out of a series that consists of several contiguous parts.
-
-    Args:
-        parts: Contiguous parts of one series, on one clock.
-        starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
-        window: Number of samples in a window.
-
-    Returns:
-        The windows, float32 of shape `(windows, samples)`, and their start times in seconds, shape `(windows,)`.
-
-    Raises:
-        InputError: If an index is out of range.
-    """
-    starts, usable = np.asarray(starts), [part for part in parts if len(part) >= window]
     firsts = _first_starts(parts, window)
-    if len(starts) and not 0 <= starts.min() <= starts.max() < firsts[-1]:
-        raise InputError(f"Expected window starts from 0 to before {firsts[-1]}. Received: from {starts.min()} to {starts.max()}.")
-    which = _which_part(firsts, starts)
-    windows, time_s = np.empty((len(starts), window), np.float32), np.empty(len(starts))
-    for number, part in enumerate(usable):
-        here = which == number
-        own = starts[here] - firsts[number]
-        windows[here] = cut_windows(part.values, own, window)
-        time_s[here] = part.offset_s + part.interval_s * own
-    return windows, time_s
+    which = np.searchsorted(firsts, starts, "right") - 1
+    return which, np.asarray(starts) - firsts[which]
 
 
 def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -181,3 +148,26 @@ def disjoint_rows(starts: np.ndarray, window: int) -> np.ndarray:
             chosen.append(row)
             end = starts[row] + window
     return np.array(chosen, np.int64)
+
+
+def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
+    """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
+
+    Samples after the end of the last window receive the score of the last window.
+
+    Args:
+        scores: Score of each window, shape `(windows,)`.
+        begins: First sample of each window, in ascending order. It starts at 0, with steps of at most `window`.
+        window: Number of samples in a window.
+        num_samples: Length of the series.
+
+    Returns:
+        Scores of shape `(num_samples,)`.
+    """
+    steps = np.zeros((2, num_samples + 1))
+    for sign, places in ((1, begins), (-1, begins + window)):
+        np.add.at(steps[0], places, sign * scores)
+        np.add.at(steps[1], places, sign)
+    end = begins[-1] + window
+    total, number = np.cumsum(steps[:, :end], axis=1)
+    return np.append(total / number, np.full(num_samples - end, scores[-1]))

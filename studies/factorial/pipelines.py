@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.detection import evaluation
 from enhsim_tf.enhancer.ridge import fit_ridge
 from enhsim_tf.noise.surrogates import GaussianAutoregression
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from enhsim_tf.telemetry.windows import random_window_starts
+from studies.common import evaluation
 from studies.factorial.cells import (
     AUTOREGRESSION,
     CONVOLUTIONAL_GAN,

@@ -18,6 +18,7 @@ from enhsim_tf.paper.telemetry import true_signal
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, time_blocks
 from studies.common.example import coarse_simulator, draw_noise
+from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings
 from studies.few_windows.record import (
     ADVERSARIAL,
@@ -206,6 +207,6 @@ class Cell:
             "alarms": int(np.sum(scores["nominal"] > threshold)),
             "windows": len(scores["nominal"]),
             "recall": metrics.recall(scores["anomalous"], threshold),
-            "recall_at_real_rate": metrics.recall_at_real_rate(scores["reference"], scores["anomalous"], self.rate),
+            "recall_at_real_rate": recall_at_real_rate(scores["reference"], scores["anomalous"], self.rate),
             "set_for": set_for,
         }

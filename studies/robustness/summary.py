@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from studies.common.environments import NOISES
+from studies.common.metrics import gap_closed
 from studies.common.statistics import holm, mean_interval, wilcoxon_signed_rank
 from studies.common.tables import KeptTables
 from studies.robustness.degraded_modes import LARGEST_TRAINED, METHODS, SCORED
@@ -89,7 +89,7 @@ def arms(alarms: "pd.DataFrame", recall: "pd.DataFrame", environments: Sequence[
     return {
         arm: {
             "false_alarms": _share(mean_interval(blocks[arm])),
-            "gap_closed": float(np.mean([metrics.gap_closed(row[arm], row["coarse"], row["real"]) for _, row in mean_rate.iterrows()])),
+            "gap_closed": float(np.mean([gap_closed(row[arm], row["coarse"], row["real"]) for _, row in mean_rate.iterrows()])),
             **{name: float(recalls.loc[arm, name].mean()) for name in recalls},
             "recalls_at_real_rate": recalls.loc[arm, "recall_at_real_rate"].groupby("detector").mean().to_dict(),
             "criterion": {"met": int(kept[arm].sum()), "of": len(kept)},

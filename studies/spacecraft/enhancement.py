@@ -6,9 +6,9 @@ import numpy as np
 
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
 from enhsim_tf.simulator.alignment import Waves
-from enhsim_tf.telemetry.telemanom import LabelledChannel
 from enhsim_tf.telemetry.windows import cut_windows, disjoint_starts, evenly_spaced_starts
 from studies.spacecraft.judging import windows_that_meet
+from studies.spacecraft.telemanom import LabelledChannel
 
 if TYPE_CHECKING:
     from enhsim_tf.simulator.simulator import EnhancedSimulator

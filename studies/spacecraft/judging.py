@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection import evaluation, metrics
-from enhsim_tf.telemetry.telemanom import LabelledChannel
-from enhsim_tf.telemetry.windows import cut_windows, time_blocks
+from enhsim_tf.detection import metrics
+from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows, time_blocks
+from studies.common.metrics import vus_pr
+from studies.spacecraft.telemanom import LabelledChannel
 
 RATES = (0.01, 0.05, 0.1)
 """Shares of nominal test windows at which the sequences that detectors find are compared."""
@@ -62,14 +63,14 @@ class Judge:
 
         nominal = np.sort(scores[self.is_nominal])
         limits = {rate: nominal[-1 - int(rate * len(nominal) + 1e-9)] for rate in RATES}
-        by_sample = evaluation.mean_over_windows(scores, self.begins, self.window, len(self.labels))
+        by_sample = mean_over_windows(scores, self.begins, self.window, len(self.labels))
         return {
             "false_alarms": float(np.mean(nominal > metrics.finite_threshold(own, self.rate)[0])),
             "false_alarms_past": float(np.mean(nominal > metrics.finite_threshold(past, self.rate)[0])),
             **{f"found_at_{rate:g}": sum(bool((scores[each] > limit).any()) for each in self.meets) for rate, limit in limits.items()},
             "sequences": len(self.meets),
             "auc_pr": float(average_precision_score(self.labels, by_sample)),
-            "vus_pr": metrics.vus_pr(self.labels, by_sample, round(self.period)),
+            "vus_pr": vus_pr(self.labels, by_sample, round(self.period)),
         }
 
 

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.detection.discord import left_discord
 from enhsim_tf.detection.registry import RESIDUAL
 from enhsim_tf.detection.residual_size import ResidualSize
-from enhsim_tf.telemetry.telemanom import LabelledChannel
 from enhsim_tf.telemetry.windows import cut_windows
 from studies.common.settings import Settings
+from studies.spacecraft.discord import left_discord
 from studies.spacecraft.judging import STRIDES, Judge
+from studies.spacecraft.telemanom import LabelledChannel
 from studies.spacecraft.training_data import REAL
 
 if TYPE_CHECKING:

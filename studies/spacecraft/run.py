@@ -10,9 +10,9 @@ import numpy as np
 from enhsim_tf.common.atomic_files import make_folder
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.telemetry.telemanom import LabelledChannel, load_channel, read_labels
 from studies.common.replicates import collect, seed_by_seed, write_results
 from studies.common.settings import Settings
+from studies.spacecraft.telemanom import LabelledChannel, load_channel, read_labels
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -60,6 +60,7 @@ def test_help_needs_no_tensorflow():
     subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)
 
 
+@pytest.mark.slow
 def test_a_worker_times_each_repetition():
     worker = Worker("ours", "copy", num_bytes=80_000)
     assert worker.skipped is None and worker.repeat() > 0 and worker.repeat() > 0

@@ -8,7 +8,6 @@ import pytest
 
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli.options import load
-from enhsim_tf.coarse_simulator.recording_files import read_recording
 from enhsim_tf.simulator.fit_many import CoarseRun, fit_channels
 from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
@@ -243,9 +242,3 @@ def test_text_among_the_numbers_may_be_dropped(world, tmp_path, capsys):
     assert run_command(arguments, capsys)[0] == 2
     code, out, _ = run_command([*arguments, "--drop-bad"], capsys)
     assert code == 0 and any("words.csv, volts:" in line for line in out)
-
-
-def test_a_recording_of_the_fit_is_read_as_it_was_written(world):
-    found = read_recording(world / "simulator.csv")
-    expected = coarse()[["volts", "watts"]].to_numpy(np.float32)
-    np.testing.assert_allclose(dataclasses.replace(found).parts[0].values, expected, rtol=1e-6)

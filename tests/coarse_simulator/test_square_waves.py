@@ -306,15 +306,7 @@ def test_random_modes_use_the_given_generator(mode):
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        {"mode": "broken"},
-        {"severity": -0.1},
-        {"severity": 1.1},
-        {"severity": np.nan},
-        {"onset": -0.1},
-        {"onset": 1},
-        {"onset": np.nan},
-    ],
+    [{"mode": "broken"}, {"severity": -0.1}, {"severity": 1.1}, {"severity": np.nan}, {"onset": -0.1}, {"onset": 1}, {"onset": np.nan}],
     ids=str,
 )
 def test_bad_scenario_is_refused(refused, arguments):

@@ -25,6 +25,7 @@ def test_it_starts_without_a_message_and_gives_standard_error_back():
     assert (ended.stdout, ended.stderr, ended.returncode) == ("True,tensorflow\n", "heard\nagain", 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("value", "is_on"), [("0", "False"), ("1", "True"), ("", "True")])
 def test_the_users_choice_of_kernels_wins(value, is_on):
     assert run(START + STATE, TF_ENABLE_ONEDNN_OPTS=value).stdout == f"{is_on},tensorflow\n"
@@ -40,6 +41,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 def test_settings_that_mean_nothing_do_no_harm():
     ended = run(START + "print(float(tf.reduce_sum(tf.ones((3, 3)) @ tf.ones((3, 3)))))", **BAD)
     assert (ended.stdout, ended.stderr, ended.returncode) == ("27.0\n", "", 0)
@@ -54,6 +56,7 @@ def test_another_backend_of_keras_is_refused_in_one_line():
     assert ended.stderr.startswith("error: Expected KERAS_BACKEND") and "Received: jax" in ended.stderr and ended.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_keras_that_was_imported_with_another_backend_is_refused(tmp_path):
     """Other backends need packages that are not installed, so a stub of Keras reports another backend."""
     (tmp_path / "keras.py").write_text("class backend:\n    def backend():\n        return 'torch'\n")
@@ -62,11 +65,13 @@ def test_keras_that_was_imported_with_another_backend_is_refused(tmp_path):
     assert ended.stdout.startswith("Expected Keras with the backend tensorflow. Received: torch."), ended.stderr
 
 
+@pytest.mark.slow
 def test_the_file_of_keras_does_not_matter_where_keras_starts_here(tmp_path):
     (tmp_path / "keras.json").write_text('{"backend": "numpy"}')
     assert run(START + STATE, KERAS_HOME=str(tmp_path)).stdout == "True,tensorflow\n"
 
 
+@pytest.mark.slow
 def test_tensorflow_that_runs_already_keeps_its_settings():
     code = "import tensorflow\nimport os\nbefore = dict(os.environ)\n" + START + "print(dict(os.environ) == before)\n" + STATE
     assert run(code, TF_ENABLE_ONEDNN_OPTS="0").stdout == "True\nFalse,tensorflow\n"

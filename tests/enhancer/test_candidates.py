@@ -8,7 +8,7 @@ from enhsim_tf.enhancer import candidates
 from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer, judge
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.enhancer.names import CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
+from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
 
 WINDOW = 16
 
@@ -83,34 +83,6 @@ def test_level_and_gain_are_those_of_least_squares():
     for channel in range(2):
         gain, level = np.polyfit(inputs[:, :, channel].ravel(), targets[:, :, channel].ravel(), 1)
         np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
-
-
-def test_ridge_of_several_channels_is_the_ridge_of_each():
-    coarse = series()
-    mixed = np.stack([np.roll(coarse[:, 0], 2), 100 + 30 * coarse[:, 1]], axis=1) + noise((len(coarse), 2), [0.05, 30.0])
-    inputs, targets, starts = windows_of(coarse, mixed)
-    together, alone = (
-        fit_enhancer(RIDGE, inputs, targets, starts),
-        [fit_enhancer(RIDGE, inputs, targets[:, :, [channel]], starts) for channel in range(2)],
-    )
-    assert together.penalties == tuple(each.penalties[0] for each in alone) and together.penalties[0] < together.penalties[1]
-    for channel, each in enumerate(alone):
-        np.testing.assert_allclose(together.predict(inputs)[:, :, channel], each.predict(inputs)[:, :, 0], rtol=1e-4, atol=1e-4)
-
-
-def test_few_windows_of_many_columns_give_two_small_factors_and_the_same_map():
-    rng = np.random.default_rng(0)
-    inputs, starts = rng.standard_normal((20, WINDOW, 6)), WINDOW * np.arange(20)
-    targets = inputs[:, :, :4] * 5 + 2 + rng.standard_normal((20, WINDOW, 4))
-    found, single = fit_enhancer(RIDGE, inputs, targets, starts), fit_enhancer(RIDGE, inputs, targets[:, :, :1], starts)
-    assert [each.shape for each in found.factors] == [(WINDOW * 6, 20), (20, WINDOW * 4)]
-    np.testing.assert_allclose(found.predict(inputs)[:, :, 0], single.predict(inputs)[:, :, 0], rtol=1e-4, atol=1e-3)
-
-
-def test_penalties_that_were_chosen_are_used_again():
-    coarse = series()
-    windows = windows_of(coarse, coarse[:, [0]] + noise((len(coarse), 1), 0.5))
-    assert fit_enhancer(RIDGE, *windows, penalties=[123.0]).penalties == (123.0,)
 
 
 def test_one_column_and_channel_may_be_given_without_their_axes():
@@ -254,16 +226,7 @@ def test_what_cannot_be_judged_is_refused(refused, change, word):
         choose_enhancer(**{"inputs": inputs, "targets": targets, "starts": starts} | change)
 
 
-def test_an_unknown_candidate_is_not_fitted(refused):
-    with refused("'deep magic'"):
-        fit_enhancer("deep magic", *windows_of(series(), series()[:, 0]))
-
-
 def test_a_training_that_diverges_is_refused(refused, monkeypatch):
     monkeypatch.setattr(candidates, "_train", lambda name, rows, wanted, outputs, *rest: [(np.full((32, 16), np.nan), np.zeros(16))])
     with refused("diverged", "--enhancer ridge"):
         fit_enhancer(NETWORK, *windows_of(series(), series()[:, 0]))
-
-
-def test_the_candidates_are_in_the_order_of_their_cost():
-    assert CANDIDATES == ("coarse", "level and gain", "ridge", "ridge and network", "network")

@@ -91,24 +91,6 @@ def test_known_linear_map_is_learnt_to_a_known_error():
     assert history["val_loss"][-1] == pytest.approx(error, rel=1e-4)
 
 
-def test_loss_is_the_mean_squared_error():
-    model, inputs = small(), windows(60)
-    expected = np.mean((enhance(model, inputs) - np.cumsum(inputs, axis=1)) ** 2)
-    history = fit_small(model, 0, inputs, epochs=1, batch_size=60, learning_rate=1e-9)
-    assert history["loss"] == pytest.approx([expected], rel=1e-4)
-
-
-@pytest.mark.parametrize("arguments", [{}, {"learning_rate": 0.02}], ids=str)
-def test_first_step_is_adam_s(arguments):
-    # whose first step is the learning rate, against the sign of the gradient
-    model = small()
-    before = weights_of(model)
-    fit_small(model, 0, windows(40), epochs=1, batch_size=40, **arguments)
-    steps = np.abs(weights_of(model) - before)
-    assert np.median(steps) == pytest.approx(arguments.get("learning_rate", 0.001), rel=1e-3)
-    assert steps.max() <= 1.001 * arguments.get("learning_rate", 0.001)
-
-
 def test_every_window_is_seen_once_an_epoch_in_an_order_drawn_anew():
     # a network that answers the sum of its weight and moves not at all: the batch losses tell the order of the targets
     class Order(keras.callbacks.Callback):
@@ -140,6 +122,7 @@ def test_all_random_numbers_depend_on_the_seeds_only():
         assert (values != other_weights[key]).any() and (values != other_order[key]).any()
 
 
+@pytest.mark.slow
 def test_compiled_and_plain_training_are_the_same():
     compiled, plain = small(), small()
     histories = [fit_small(model, 0, jit_compile=jit) for model, jit in ((compiled, True), (plain, False))]

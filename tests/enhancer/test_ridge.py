@@ -96,13 +96,6 @@ def test_constant_samples_and_constant_columns_do_no_harm():
     np.testing.assert_allclose(constant.predict(np.full((1, 4), 7.0)), [[2.5]])
 
 
-def test_one_column_may_be_given_without_its_axis():
-    inputs, targets, _ = _linear(30, columns=1)
-    new, *_ = _linear(3, seed=1, columns=1)
-    found = fit_ridge(inputs[:, :, 0], targets)
-    np.testing.assert_array_equal(found.predict(new[:, :, 0]), fit_ridge(inputs, targets).predict(new))
-
-
 def test_one_window_predicts_itself():
     found = fit_ridge(np.ones((1, 4)), np.array([[3.0, 5.0]]))
     np.testing.assert_array_equal(found.predict(np.zeros((2, 4))), [[3, 5], [3, 5]])

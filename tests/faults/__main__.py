@@ -19,10 +19,7 @@ from enhsim_tf.common.atomic_files import write_json
 from tests.faults import of_data_sets, of_reproduce
 from tests.faults.in_common import MISSED
 
-BENCHES = {
-    "fleet": (of_data_sets.DataSetBench, of_data_sets.FAULTS),
-    "reproduce": (of_reproduce.ReproduceBench, of_reproduce.FAULTS),
-}
+BENCHES = {"fleet": (of_data_sets.DataSetBench, of_data_sets.FAULTS), "reproduce": (of_reproduce.ReproduceBench, of_reproduce.FAULTS)}
 TRIES = dict.fromkeys(("driver killed (SIGKILL)", "worker killed (SIGKILL)", "run killed (SIGKILL)"), 20)  # of the others 3
 
 

@@ -1,7 +1,7 @@
 """What the files of this folder share: changed inputs, and the judgement of what a reader does with one.
 
-Every input is accepted, or refused with an `InputError` of one printable line, within 5 s of processor time and 1 GiB of memory. An ordinary run tries a
-few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest tests/fuzzing` tries as many others.
+Every input is accepted, or refused with an `InputError` of one printable line, within 5 s of processor time and 1 GiB of memory. The slow
+tests try a few inputs of each reader, the same each time; `ENHSIM_TF_FUZZ=10000 python -m pytest --slow tests/fuzzing` tries as many others.
 """
 
 import contextlib
@@ -14,6 +14,7 @@ import tempfile
 import warnings
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
@@ -75,14 +76,15 @@ def changed_json(draw, seeds):
 
 
 def tried(examples):
-    """Settings of a test that tries inputs.
+    """Settings of a slow test that tries inputs.
 
     Args:
         examples: Number of inputs in an ordinary run.
     """
-    return settings(
+    chosen = settings(
         derandomize=not _LONG, max_examples=_LONG or examples, deadline=None, database=None, suppress_health_check=list(HealthCheck)
     )
+    return lambda test: pytest.mark.slow(chosen(test))
 
 
 def judge(read, *arguments):

@@ -56,12 +56,7 @@ def test_arrays_of_models(data):
 def read_data_set(files, folder):
     made = write_data_set(folder / "set", **files)
     lines = []
-    all_of(
-        lambda: read_manifest(made),
-        lambda: read_records(made),
-        lambda: check_folder(made, PLAN),
-        lambda: verify(made, lines.append),
-    )
+    all_of(lambda: read_manifest(made), lambda: read_records(made), lambda: check_folder(made, PLAN), lambda: verify(made, lines.append))
     assert all(line.isprintable() for line in lines)
     if "shard" in files:
         (made / MANIFEST).unlink()

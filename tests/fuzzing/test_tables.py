@@ -16,7 +16,7 @@ from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source, read_telemetry
-from enhsim_tf.telemetry.telemanom import load_labelled
+from studies.spacecraft.telemanom import load_labelled
 from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
 
 NUM = 60
@@ -107,6 +107,7 @@ def test_what_once_failed_is_refused(name, data):
     assert not judge(read_file, name, data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_changed_files(name):
     @tried(100)

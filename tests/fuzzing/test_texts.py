@@ -135,6 +135,7 @@ def test_what_once_failed_is_used_or_refused(read, text):
     judge(read, text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("read", READERS)
 def test_texts(read):
     seeds = READERS[read]

@@ -57,7 +57,7 @@ def test_a_name_that_cannot_be_a_file_name_is_refused(name, refused, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@settings(derandomize=True, max_examples=500, deadline=None, database=None)
+@settings(derandomize=True, max_examples=100, deadline=None, database=None)
 @given(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=14), st.text(min_size=1, max_size=14))
 def test_any_name_is_encoded_as_a_distinct_file_name(name, other):
     check_file_name(name)

@@ -1,6 +1,6 @@
 """The database token and passwords in URLs never appear in anything that is printed or written.
 
-Tests that need a server are in `test_influx_store.py::test_the_token_appears_nowhere`.
+Tests that need a server are in `test_influx_server.py::test_the_token_appears_nowhere`.
 """
 
 import logging
@@ -51,7 +51,7 @@ DONE = {"training data", "a large data set", "scores"}
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * ("cluster" in name)) for name in RUNS])
 def test_a_run_prints_and_writes_no_secret(world, capfd, caplog, name):
     caplog.set_level(logging.DEBUG, "enhsim_tf")
     if "cluster" in name:

@@ -5,7 +5,6 @@ import pytest
 from numpy.random import default_rng
 
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise, JointAutoregression
-from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 
 
 def test_gaussian_noise_recovers_the_standard_deviation():
@@ -133,12 +132,3 @@ def test_autoregressions_that_are_refused(refused):
         GaussianAutoregression([0.5, 0.5], 0.1, 50)  # a root on the unit circle
     with refused("max_order=40", "30 samples"):
         GaussianAutoregression.fit(np.ones((5, 30)))
-
-
-def test_whole_windows_are_drawn_unchanged_and_equally_often():
-    source = np.arange(40.0).reshape(8, 5)
-    noise = WindowBootstrap.fit(source).generate(8_000, default_rng(3))
-    assert noise.dtype == np.float32 and noise.shape == (8_000, 5)
-    numbers, counts = np.unique(noise[:, 0] / 5, return_counts=True)
-    assert np.array_equal(numbers, np.arange(8)) and np.abs(counts - 1_000).max() < 150  # five standard deviations
-    assert np.array_equal(noise, source[(noise[:, 0] / 5).astype(int)])

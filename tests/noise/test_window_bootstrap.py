@@ -16,12 +16,6 @@ def ar1(num_windows, window, coefficient=0.9, seed=0):
     return noise.astype(np.float32)
 
 
-def test_windows_are_real_ones():
-    windows = ar1(20, 40)
-    drawn = WindowBootstrap(windows).generate(100, default_rng(3))
-    assert drawn.shape == (100, 40) and {row.tobytes() for row in drawn} <= {row.tobytes() for row in windows}
-
-
 @pytest.mark.parametrize("follows_signal", [False, True])
 def test_all_channels_are_those_of_one_window(follows_signal):
     windows = np.stack([ar1(20, 40), ar1(20, 40, seed=1)], axis=2)

@@ -39,11 +39,11 @@ def training(settings, num_windows=300):
 
 
 def test_the_network_learns_a_map_from_noisy_targets():
-    settings = tiny_settings(window=8, filter_width=8, hidden_units=64, epochs=20, learning_rate=0.01)
-    source, target = training(settings, 900)
+    settings = tiny_settings(window=8, filter_width=8, hidden_units=64, epochs=15, learning_rate=0.01)
+    source, target = training(settings, 600)
     network = build_enhancer(settings)
     history = train_enhancer(network, source, target, settings, (source[:50], target[:50]))
-    assert len(history["loss"]) == len(history["val_loss"]) == 20
+    assert len(history["loss"]) == len(history["val_loss"]) == 15
     error = enhance(network, source) - 0.5 * source[:, ::-1]
     assert np.sqrt(np.mean(error**2)) < 0.1  # below the noise of the targets
 

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,8 @@ from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.series import Telemetry
 
 PERIOD, WINDOW = 40, 80
+QUICK = FitOptions(window=WINDOW, num_windows=300, enhancer="ridge", noise="gaussian")
+"""Options that choose neither the enhancer nor the noise, which takes most of the time of a fit."""
 
 
 def smooth_wave(number, phase=0.0):
@@ -31,14 +35,14 @@ def joint(number=3_000, seed=0):
 
 @pytest.fixture(scope="session")
 def single():
-    """A simulator of one channel with its report."""
+    """A simulator of one channel, whose enhancer and noise were chosen, with its report."""
     return fit(series(), options=FitOptions(window=WINDOW, num_windows=300))
 
 
 @pytest.fixture(scope="session")
 def both():
     """A simulator of two channels with its report."""
-    return fit(joint(), options=FitOptions(window=WINDOW, num_windows=300))
+    return fit(joint(), options=QUICK)
 
 
 def coarse_run(number=3_000, start="2024-01-01T00:00:00+00:00"):
@@ -51,4 +55,4 @@ def coarse_run(number=3_000, start="2024-01-01T00:00:00+00:00"):
 @pytest.fixture(scope="session")
 def of_run():
     """A simulator of a recorded run with its report."""
-    return fit(series(), coarse_run(), FitOptions(window=WINDOW, num_windows=300, delay_s=0.0))
+    return fit(series(), coarse_run(), dataclasses.replace(QUICK, delay_s=0.0))

@@ -8,7 +8,7 @@ from tests.simulator.conftest import joint
 
 
 def test_it_runs_in_a_pipeline_and_finds_a_fault():
-    nominal, new = joint().parts[0].values, joint(seed=1).parts[0].values.copy()
+    nominal, new = joint(1_500).parts[0].values, joint(seed=1).parts[0].values.copy()
     new[1_000:1_200, 1] -= 12.0
     pipeline = make_pipeline(StandardScaler(), clone(TelemetryDetector(window=80, detector="PCA residual"))).fit(nominal)
     flagged = pipeline.predict(new) == -1

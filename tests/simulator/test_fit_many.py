@@ -11,7 +11,7 @@ from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.simulator.conftest import joint, series
 
-OPTIONS = FitOptions(window=64, num_windows=100)
+OPTIONS = FitOptions(window=64, num_windows=100, enhancer="ridge", noise="gaussian")
 
 
 def table(**more):
@@ -35,9 +35,9 @@ def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_p
     assert any("cross-correlation" in line for line in lines)
 
 
-def test_separate_simulators_have_the_same_bytes_in_any_number_of_processes(tmp_path):
+def test_separate_simulators_have_the_same_bytes_in_this_process_and_in_another(tmp_path):
     sums = []
-    for workers in (0, 2):
+    for workers in (0, 1):
         reports, failed, _ = fitted(tmp_path / str(workers), table(), separately=True, workers=workers)
         assert sorted(reports) == ["volts", "watts"] and not failed
         folder = tmp_path / str(workers) / "models"

@@ -19,11 +19,11 @@ def windows(noise, window=50):
     return NoiseWindows(cut, np.zeros_like(cut), window * np.arange(len(cut)))
 
 
-def white(number=20_000, seed=0):
+def white(number=12_000, seed=0):
     return np.random.default_rng(seed).standard_normal((number, 2)) * (1.0, 30.0)
 
 
-def bursts(number=20_000, seed=0):
+def bursts(number=12_000, seed=0):
     rng = np.random.default_rng(seed)
     return white(number, seed) * (1 + 5 * (np.convolve(rng.random(number) < 0.01, np.ones(40), "same") > 0))[:, None]
 

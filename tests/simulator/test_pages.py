@@ -6,16 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.cli.arguments import parse
-
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "own_simulator.md").read_text(encoding="utf-8")
 BLOCKS = [part.partition("```")[0] for part in PAGE.split("```python")[1:]]
-
-
-def test_the_commands_can_be_parsed():
-    lines = [line.strip() for line in PAGE.splitlines() if line.startswith("    enhsim-tf ")]
-    assert [parse(line.split()[1:]).command for line in lines] == ["fit", "generate", "score"]
 
 
 @pytest.fixture

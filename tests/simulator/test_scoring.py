@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.coarse_simulator.recording import Run
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
+from enhsim_tf.detection.registry import register, unregister
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.options import ScoreOptions
-from enhsim_tf.simulator.scoring import Scorer, event_rows, events_table, score, write_scores
+from enhsim_tf.simulator.scoring import Scorer, check_fits, event_rows, events_table, score, write_scores
+from tests.known_simulators import of_waves
 from tests.simulator.conftest import coarse_run, joint, series
 
 
@@ -51,12 +54,15 @@ def test_scores_of_a_run_are_of_the_difference_from_it(of_run, telemetry):
 def test_samples_without_a_run_get_no_score(of_run, telemetry):
     frame = score(of_run[0], telemetry, coarse_run(2_000))
     assert frame["score"].isna().sum() == 1_000 and not frame["flag"].iloc[2_000:].any()
+    late = dataclasses.replace(telemetry, parts=(Run(telemetry.parts[0].values[500:], 5_000.0),))
+    frame = score(of_run[0], late, coarse_run(2_000))
+    assert frame["score"].isna().tolist() == [False] * 1_500 + [True] * 1_000 and frame["flag"].mean() < 0.05
 
 
 def test_several_channels_are_scored_together(both):
     frame = score(both[0], changed(joint(seed=7), 1_000, 1_200, -9.0, channel=1), options=ScoreOptions("PCA residual"))
     assert list(frame.columns[:2]) == ["volts", "watts"] and frame["flag"].iloc[1_020:1_180].mean() > 0.9
-    assert frame["flag"].iloc[:900].mean() < 0.05
+    assert frame["flag"].iloc[:900].mean() < 0.1  # at most one of the eleven windows
 
 
 def test_the_same_seed_gives_the_same_scores(single, telemetry):
@@ -66,7 +72,7 @@ def test_the_same_seed_gives_the_same_scores(single, telemetry):
 
 def test_events_join_flags_within_a_window_and_count_them_by_hand():
     scores = np.full(100, 0.5)
-    scores[10:13], scores[20], scores[60:62] = (2.0, 3.0, 2.0), 1.5, 4.0
+    scores[10:13], scores[20], scores[60:62], scores[90] = (2.0, 3.0, 2.0), 1.5, 4.0, 1.0  # the threshold itself is no alarm
     rows = event_rows(scores, 1_000, np.full(400, 0.9), 10, 2.0)
     assert [(row["begin"], row["end"], row["peak"], row["num_flagged"], row["duration_s"]) for row in rows] == [
         (1_010, 1_021, 1_011, 4, 22.0),
@@ -91,7 +97,37 @@ def test_a_lasting_change_is_one_event_that_names_update(single, telemetry):
     assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05  # against the new level
 
 
+def test_a_departure_in_the_second_part_has_its_place_and_its_time(single, telemetry):
+    values = changed(telemetry, 1_500, 3_000, 6.0).parts[0].values
+    parts = Run(values[:1_200]), Run(values[1_200:], 13_000.0)  # after a gap of a hundred samples
+    frame = score(single[0], dataclasses.replace(telemetry, parts=parts))
+    (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
+    begin = frame.index[event["begin"]]
+    assert 1_400 <= event["begin"] <= 1_500 and f"since {begin}" in frame.attrs["departure"]
+    assert begin == pd.Timestamp("2024-01-01T00:00:00Z") + pd.Timedelta(seconds=13_000 + 10 * (event["begin"] - 1_200))
+    np.testing.assert_array_equal(frame["score_after"].iloc[:1_200], frame["score"].iloc[:1_200])
+    assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+
+
+def test_a_departure_from_a_run_begins_where_the_telemetry_leaves_it(of_run, telemetry):
+    run = dataclasses.replace(coarse_run(), parts=(Run(coarse_run().parts[0].values[500:], 5_000.0),))  # begins 500 samples later
+    frame = score(of_run[0], changed(telemetry, 1_500, 3_000, 6.0), run)
+    (event,) = [row for row in frame.attrs["events"] if row["end"] == 3_000]
+    assert "level" in frame.attrs["departure"] and 1_400 <= event["begin"] <= 1_500
+    assert frame["score_after"].iloc[:500].isna().all() and (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+    np.testing.assert_array_equal(frame["score_after"].iloc[:1_400], frame["score"].iloc[:1_400])
+
+
+def test_after_a_change_of_the_amplitude_the_new_amplitude_is_nominal(single, telemetry):
+    values = telemetry.parts[0].values.copy()
+    values[1_500:] = 5 + 0.3 * (values[1_500:] - 5)
+    frame = score(single[0], dataclasses.replace(telemetry, parts=(Run(values),)))
+    assert "amplitude" in frame.attrs["departure"] and "level" not in frame.attrs["departure"].split("(")[1]
+    assert (frame["score_after"].iloc[1_700:] > 1).mean() < 0.05
+
+
 def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry):
+    check_fits(single[0], dataclasses.replace(telemetry, interval_s=10.005), None)  # within a thousandth
     with pytest.raises(InputError, match="sample every 10 s"):
         score(single[0], dataclasses.replace(telemetry, interval_s=1.0))
     with pytest.raises(InputError, match="at least one window of 80"):
@@ -102,3 +138,77 @@ def test_telemetry_that_does_not_fit_is_refused(single, both, of_run, telemetry)
         score(of_run[0], telemetry)
     with pytest.raises(InputError, match="one of: residual"):
         ScoreOptions("crystal ball")
+
+
+class Largest:
+    """A detector whose scores are easily computed: the largest sample of a window, plus a constant."""
+
+    def __init__(self, added=0.0):
+        self.added = added
+
+    def fit(self, windows):
+        return self
+
+    def score(self, windows):
+        return windows.max(axis=1) + self.added
+
+
+@pytest.fixture
+def largest():
+    """The name of a registered detector that takes the largest sample, and of one that subtracts a hundred from it."""
+    names = {"largest sample": 0.0, "largest sample minus 100": -100.0}
+    for name, added in names.items():
+        register(name, lambda seed, added=added: Largest(added))
+    yield list(names)
+    for name in names:
+        unregister(name)
+
+
+def by_hand(series, window=24):
+    """The mean of the largest samples of all windows that contain a sample; one begins every eighth of a window, and one ends the series."""
+    begins = [*range(0, len(series) - window, window // 8), len(series) - window]
+    sums, counts = np.zeros(len(series)), np.zeros(len(series))
+    for begin in begins:
+        sums[begin : begin + window] += series[begin : begin + window].max()
+        counts[begin : begin + window] += 1
+    return sums / counts
+
+
+def test_the_threshold_is_the_conformal_rank_of_a_thousand_generated_windows(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    scorer = Scorer(simulator, ScoreOptions(largest[0], num_windows=20, false_alarm_rate=0.05, seed=3))
+    scores = np.sort(by_hand(simulator.generate_series(24_000, seed=4)[:, 0]))
+    assert scorer.threshold == pytest.approx(scores[int(np.ceil(24_001 * 0.95)) - 1], rel=1e-6)
+    assert (scorer.rate, scorer.nominal_threshold) == (0.05, -np.inf)
+    new = simulator.generate_series(100, seed=9)
+    np.testing.assert_allclose(scorer.score_series(new), by_hand(new[:, 0]) / scorer.threshold, rtol=1e-6)
+    further = by_hand(simulator.generate_series(24_000, seed=5)[:, 0])
+    np.testing.assert_allclose(scorer.nominal_scores, further / scorer.threshold, rtol=1e-6)
+
+
+def test_nominal_telemetry_of_few_windows_bounds_the_threshold_by_its_largest_score(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    loud, short = (2 * simulator.generate_series(number, seed=7) for number in (480, 23))
+    nominal = Recording((Run(loud), Run(short + 50, 1_000.0)), ("volts",), 1.0, None)  # the second part is shorter than a window
+    scorer = Scorer(simulator, ScoreOptions(largest[0], num_windows=20, false_alarm_rate=0.01), nominal)
+    assert scorer.threshold == scorer.nominal_threshold == pytest.approx(by_hand(loud[:, 0]).max(), rel=1e-6)  # 20 windows, not 99
+    tenth = Scorer(simulator, ScoreOptions(largest[0], num_windows=20, false_alarm_rate=0.1), nominal)
+    assert tenth.nominal_threshold == pytest.approx(np.sort(by_hand(loud[:, 0]))[int(np.ceil(481 * 0.9)) - 1], rel=1e-6)
+
+
+def test_scores_with_a_threshold_below_zero_are_shifted(largest):
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 8, noise_sd=0.2)  # a window begins at every sample
+    scorer = Scorer(simulator, ScoreOptions(largest[1], num_windows=20))
+    new = simulator.generate_series(100, seed=9)
+    assert scorer.threshold < 0
+    np.testing.assert_allclose(scorer.score_series(new), 1 + (by_hand(new[:, 0], 8) - 100) - scorer.threshold, atol=1e-4)
+
+
+def test_a_residual_is_a_root_mean_square_and_grows_with_a_level_that_training_never_had():
+    simulator = of_waves([SquareWaveSimulator([SquareWave(20)])], 24, noise_sd=0.2)
+    scorer, windows = Scorer(simulator, ScoreOptions("residual", num_windows=50)), simulator.generate(5, seed=9)
+    size = np.sqrt(np.mean(simulator.residuals(windows) ** 2, axis=(1, 2)))
+    np.testing.assert_allclose(scorer.score_windows(windows), size, rtol=1e-5)
+    levels = simulator.generate(50, seed=0).mean(axis=1)
+    beyond = windows.mean(axis=1)[:, 0] + 10 - (levels.max() + max(np.ptp(levels), simulator.noise_sd[0]))
+    np.testing.assert_allclose(scorer.score_windows(windows + 10), np.hypot(size, beyond), rtol=1e-4)

@@ -33,12 +33,6 @@ def test_samples_that_are_not_marked_are_those_of_the_nominal_windows(both, mode
     assert mask.any() and (windows[mask] != nominal[mask]).all()
 
 
-def test_a_scenario_of_one_channel_leaves_the_other_coarse_column_alone(both):
-    simulator = both[0]
-    drawn = simulator.alignment.draw(np.arange(4), [Degraded("drift", 1.0, 0.0, "watts")] * 4, np.random.default_rng(0))
-    assert (drawn.coarse != drawn.nominal).any(axis=(0, 1)).tolist() == [False, True]
-
-
 def test_noise_keeps_the_correlation_of_the_channels(both):
     simulator = both[0]
     noise = simulator.draw_noise(simulator.generate_clean(500), np.random.default_rng(0))

@@ -24,7 +24,6 @@ START = pd.Timestamp("2020-03-01T00:00:00Z")
 TIMES = pd.date_range(START, periods=N, freq="s")
 VALUES = np.sin(np.arange(N) / 7.3) + 0.01 * np.random.default_rng(0).standard_normal(N)
 CLEAN = pd.Series(VALUES, index=TIMES, name="volts")
-IS_REGULAR = {"interval_s": 1.0, "start": "2020-03-01T00:00:00+00:00"}
 
 
 def check_balance(cleaned):
@@ -141,12 +140,7 @@ REPAIRED = {
     "NaN": (set_rows([7, 8, 50], np.nan, float), {}, {"missing values": 3, "gaps filled": 2}, linear([7, 8, 50])),
     "pandas' NA": (set_rows([7], pd.NA, "Float64"), {}, {"missing values": 1, "gaps filled": 1}, linear([7])),
     "empty text": (set_rows([7, 50], ["", " "]), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
-    "words for nothing": (
-        set_rows([7, 50, 90], ["nan", "N/A", "NULL"]),
-        {},
-        {"missing values": 3, "gaps filled": 3},
-        linear([7, 50, 90]),
-    ),
+    "words for nothing": (set_rows([7, 50, 90], ["nan", "N/A", "NULL"]), {}, {"missing values": 3, "gaps filled": 3}, linear([7, 50, 90])),
     "rows missing": (CLEAN.drop(TIMES[[7, 8, 50]]), {}, {"gaps filled": 2}, linear([7, 8, 50])),
     "numbers as text with spaces": (with_values(lambda values: pd.Series([f" {word}\t" for word in WORDS], index=TIMES)), {}, {}),
     "decimal commas": (
@@ -161,12 +155,7 @@ REPAIRED = {
         {"bad values": 1, "gaps filled": 1},
         linear([7]),
     ),
-    "beyond float32, dropped": (
-        set_rows([7], 1e39, float),
-        {"on_bad_values": "drop"},
-        {"bad values": 1, "gaps filled": 1},
-        linear([7]),
-    ),
+    "beyond float32, dropped": (set_rows([7], 1e39, float), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
     "beyond float64, dropped": (set_rows([7], 10**400), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
 }
 
@@ -240,6 +229,25 @@ def test_input_that_cannot_be_parsed_is_refused_with_its_place(refused, name):
         clean(series)
 
 
+def test_the_largest_float32_is_a_value_and_what_is_above_it_is_none(refused):
+    largest = float(np.finfo(np.float32).max)
+    assert cleaned_of(set_rows([7], largest, float)).parts[0].values[7] == np.float32(largest)
+    with refused("at row 7"):
+        clean(set_rows([7], np.nextafter(largest, np.inf), float))
+
+
+def test_two_rows_have_an_interval():
+    (part,) = cleaned_of(CLEAN.iloc[:2]).parts
+    assert (len(part), part.interval_s) == (2, 1.0)
+
+
+def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():
+    """A jump of 0.4 intervals hides in rounded steps; a line through all rows would have another slope."""
+    times = 1.1 * np.arange(N) + np.where(np.arange(N) < 300, 0, 0.45)
+    jittered = START + pd.to_timedelta(times + 0.01 * np.sin(np.arange(N)), unit="s")
+    assert cleaned_of(with_times(jittered)).report.interval_s == pytest.approx(1.1, abs=2e-5)
+
+
 BAD_OPTIONS = [
     {"same_time": "median"},
     {"on_bad_values": "ignore"},
@@ -303,6 +311,9 @@ def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
             assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
             found = cleaned.report.find("gaps")
             assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
+    slow = pd.Series(VALUES, START + pd.to_timedelta(10 * np.arange(N), unit="s")).drop(START + pd.to_timedelta(10 * missing, unit="s"))
+    gaps = cleaned_of(slow, max_fill=4).report.find("gaps")
+    assert gaps.details["longest"] == 10 * (length + 1) and gaps.places[0].startswith("row 99,")
     assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=6).parts) == 1
     assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
 
@@ -438,7 +449,8 @@ def test_samples_are_counted_without_times():
         assert (before.has_time, before.interval_s, before.time_unit) == (False, 1.0, "samples")
         assert (before.offset_s, after.offset_s, len(after)) == (0, 120, N - 120)
         np.testing.assert_array_equal(after.values, values[120:].astype(np.float32))
-        assert cleaned.report.find("gaps").places == ("row 99",)
+        gaps = cleaned.report.find("gaps")
+        assert gaps.places == ("row 99",) and gaps.details == {"longest": 21.0}
     piece = cleaned_of(pd.Series(VALUES)[50:90])
     assert piece.parts[0].offset_s == 50, "a piece of a series keeps its clock"
     values[:3] = np.nan

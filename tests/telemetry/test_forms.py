@@ -10,6 +10,7 @@ import pytest
 from enhsim_tf.datasets.inject import InjectOptions, inject_channel
 from enhsim_tf.datasets.label_columns import write_table, write_timeeval
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.reading.columns import anomalous
 from enhsim_tf.telemetry.sources import read_source
 
 N = 60
@@ -85,6 +86,7 @@ READ = {
     "a temperature beside the time": (table("time,T", SECONDS, VALUES), ZERO),
     "milliseconds since 1970": (table("timestamp,v", TIMES.as_unit("ms").asi8, VALUES), START),
     "modified Julian dates": (table("MJD,v", [f"{60370 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
+    "Julian dates": (table("JD,v", [f"{2460370.5 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
     "MATLAB's days": (table("datenum,v", [f"{739312 + second / 86400:.9f}" for second in SECONDS], VALUES), START),
     "the time once more": (table("date,epoch,v", stamps("%Y-%m-%d %H:%M:%S"), TIMES.as_unit("s").asi8, VALUES), START),
     "row numbers of pandas": (table("Unnamed: 0,time,v", range(N), stamps("%Y-%m-%dT%H:%M:%SZ"), VALUES), START),
@@ -163,7 +165,7 @@ ASKED = {
         0,
     ),
     "no names": (table("0.0,20.0", SECONDS[1:] + 0.5, VALUES[1:]), ["--no-header"], None, 0),
-    "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), ["digits"], None, 0),
+    "digits that a spreadsheet dropped": (table("time,v", ["1.70925E+12"] * N, VALUES), ["all their digits"], None, 0),
     "minutes where there are seconds": (
         table("time,v", ["2024-03-01 00:00"] * 30 + ["2024-03-01 00:01"] * 30, VALUES),
         ["2 different"],
@@ -222,7 +224,9 @@ def test_a_stated_offset_goes_before_the_option(tmp_path, offset):
     (tmp_path / "a.csv").write_text(table("time,v", stamps(f"%Y-%m-%d %H:%M:%S{offset}"), VALUES))
     hours = {"+05": 5, "Z": 0}.get(offset, 5.5)
     report = check(only(read_source(tmp_path / "a.csv")), start=START - pd.Timedelta(hours=hours), options=Cleaning(timezone="Asia/Tokyo"))
-    assert "stated" in report.find("clock").text and "Asia/Tokyo" in report.find("clock").text
+    assert "stated" in report.find("clock").text and "goes before Asia/Tokyo" in report.find("clock").text
+    report = check(only(read_source(tmp_path / "a.csv")), start=START - pd.Timedelta(hours=hours))
+    assert "stated" in report.find("clock").text and "goes before" not in report.find("clock").text
 
 
 def test_a_year_at_the_end_is_no_offset(tmp_path):
@@ -329,6 +333,26 @@ def test_labels_are_no_channel_and_mark_rows(tmp_path, name, form):
     assert (missing.find("missing values").rows_left_out, missing.samples) == (3, N)
 
 
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        ([0, 1, 2], [False, True, True]),
+        ([0, np.nan, 1], [False, False, True]),
+        ([1, 1], [True, True]),
+        ([-1, 1, np.nan], [True, False, False]),
+        ([np.nan, np.nan], [False, False]),
+        ([2, 3], None),
+        (["normal", "attack", None], [False, True, False]),
+        (["attack", None], [True, False]),
+        (["normal", "drift", None], [False, True, False]),
+        (["high", "low", None], None),
+    ],
+)
+def test_what_a_label_says_by_hand(cells, expected):
+    found = anomalous(pd.Series(cells))
+    assert (found if found is None else found.tolist()) == expected
+
+
 def test_a_label_may_be_named_or_refused_and_may_concern_one_channel(tmp_path):
     marks = LABELS["zeros and ones"]
     frame = pd.DataFrame({"time": TIMES, "ch1": VALUES, "ch2": -VALUES, "is_anomaly_ch1": marks, "state": marks})
@@ -355,6 +379,12 @@ def test_fill_values_are_reported_and_left_out_when_named(tmp_path, fill):
     assert found.details["values"] == [fill] and f"--missing-values={fill:g}" in found.text
     cleaned = clean(series, Cleaning(missing_values=[fill]))
     assert cleaned.report.rows_left_out == 3 and cleaned.parts[0].values.max() < 26
+
+
+@pytest.mark.parametrize(("others", "is_found"), [(10, True), (9, False)])
+def test_a_value_without_usual_digits_is_a_fill_value_beside_at_least_ten_others(others, is_found):
+    values = np.where(np.arange(N) % 20 == 5, 100.0, np.arange(N) % others)
+    assert (clean(pd.Series(values, index=TIMES)).report.find("fill values") is not None) == is_found
 
 
 @pytest.mark.parametrize("values", [VALUES, np.where(np.arange(N) % 20 == 5, 100.0, 0.0), np.where(np.arange(N) == 5, 9999.0, VALUES)])

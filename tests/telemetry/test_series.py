@@ -88,10 +88,7 @@ def test_a_column_that_is_not_there_or_not_named_is_refused(tmp_path, refused, n
 BAD_TIMES = {
     "a word": (["2020-03-01T00:00:00", "2020-03-01T00:00:01", "soon", "2020-03-01T00:00:03"], "'soon' at line 4 "),
     "a gap": ([0.0, 1.0, np.nan, 3.0], "without a time: 1 (first: line 4)"),
-    "one sample late": (
-        [0.0, 1.0, 2.0, 3.5],
-        "the longest 1.5 s, at which the series is split: 1 (first: line 4, 2 s)",
-    ),
+    "one sample late": ([0.0, 1.0, 2.0, 3.5], "the longest 1.5 s, at which the series is split: 1 (first: line 4, 2 s)"),
     "twice": ([0.0, 1.0, 1.0, 2.0], "the first at line 4, 1 s"),
     "falling": ([3.0, 2.0, 1.0, 0.0], "descending order of time, reversed: 4"),
     "out of order": ([0.0, 2.0, 1.0, 3.0], "out of chronological order, sorted: 1 (first: line 4"),

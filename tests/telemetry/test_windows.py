@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.windows import (
-    cut_windows,
-    disjoint_rows,
-    disjoint_starts,
-    evenly_spaced_starts,
-    random_window_starts,
-    time_blocks,
-)
+from enhsim_tf.telemetry.windows import cut_windows, disjoint_rows, disjoint_starts, evenly_spaced_starts, random_window_starts, time_blocks
 
 
 def test_blocks_of_time_by_hand():

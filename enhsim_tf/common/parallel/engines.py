@@ -35,26 +35,33 @@ def run(engine: str, work: Callable[[Any], Any], items: Iterable[Any], workers: 
     """
     if engine not in ENGINES:
         raise InputError(f"Expected an engine, one of: {', '.join(ENGINES)}. Received: {engine!r}.")
-    if workers is not None and not 1 <= workers <= ENGINES[engine]:
-        raise InputError(f"Expected from 1 to {ENGINES[engine]:,} workers, or auto. Received: {workers}.")
+    check_workers(engine, workers)
     first = functools.partial(start_worker, pickle.dumps(work), threads)
     return {"local": run_local, "ray": run_ray}[engine](first, iter(items), workers)
 
 
-def parse_workers(text: str | None) -> int | None:
+def check_workers(engine: str, workers: int | None) -> None:
+    """Raises an `InputError` if an engine does not take so many workers; None is one per CPU."""
+    if workers is not None and not 1 <= workers <= ENGINES[engine]:
+        raise InputError(f"Expected from 1 to {ENGINES[engine]:,} workers, or auto. Received: {workers}.")
+
+
+def parse_workers(text: str | None, engine: str | None = None) -> int | None:
     """Parses the option `--workers auto|N`.
 
     Args:
         text: The option's value.
+        engine: The engine that runs them; None is `local`.
 
     Returns:
         The number of workers, or None for one per CPU.
 
     Raises:
-        InputError: If the value is neither `auto` nor a positive integer.
+        InputError: If the value is neither `auto` nor a positive integer, or if they are too many for the engine.
     """
     if text in (None, "auto"):
         return None
     if not (text.isascii() and text.isdecimal() and 1 <= len(text) <= 9 and int(text)):
         raise InputError(f"Expected --workers auto, or a number of them. Received: {text!r}.")
+    check_workers(engine or "local", int(text))
     return int(text)

@@ -66,6 +66,7 @@ def test_the_command_names_its_folder(capsys):
     assert example.main([]) == 2 and "folder" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_same_seed_writes_the_same_pair(tmp_path, pair):
     pytest.importorskip("pybamm", reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'")
     for name in ("first", "second"):

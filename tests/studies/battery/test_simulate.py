@@ -14,6 +14,8 @@ from studies.battery.faults import Fault  # noqa: E402
 from studies.battery.orbits import REGIMES, draw_load  # noqa: E402
 from studies.battery.simulate import COARSE, MODELS, simulate, simulate_all  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 GENTLE = REGIMES["gentle"]
 SHORT = 240  # samples
 VOLTS, AMPERES, CELSIUS = range(3)

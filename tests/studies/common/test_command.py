@@ -9,9 +9,7 @@ STUDIES = ("robustness", "factorial", "noise_models", "few_windows", "spacecraft
 
 @pytest.mark.parametrize("study", STUDIES)
 @pytest.mark.parametrize(
-    "words",
-    [["--seeds", "0"], ["--seeds", "many"], ["--unknown"], ["--budget", "smoke", "--out", "studies/{}/results"]],
-    ids=" ".join,
+    "words", [["--seeds", "0"], ["--seeds", "many"], ["--unknown"], ["--budget", "smoke", "--out", "studies/{}/results"]], ids=" ".join
 )
 def test_what_cannot_be_done_is_refused_in_one_line(study, words, capsys, tmp_path, monkeypatch):
     command = importlib.import_module(f"studies.{study}.__main__").command

@@ -7,14 +7,7 @@ import pandas as pd
 import pytest
 import scipy.stats
 
-from studies.common.statistics import (
-    crossed_interval,
-    hierarchical_interval,
-    holm,
-    mean_interval,
-    t_interval,
-    wilcoxon_signed_rank,
-)
+from studies.common.statistics import crossed_interval, hierarchical_interval, holm, mean_interval, t_interval, wilcoxon_signed_rank
 
 LEVELS = ("environment", "seed", "block")
 

@@ -66,6 +66,7 @@ def test_training_and_threshold_windows_differ_and_are_repeatable(without_networ
     assert np.array_equal(again.arm(cell, TRAINING), first)
 
 
+@pytest.mark.slow
 def test_a_run_judges_every_cell_once_and_writes_table_findings_and_figure(tmp_path, monkeypatch):
     def judged(self, cell):
         alarms = {"coarse": 50, "real": 1}.get(cell, 9)
@@ -91,6 +92,7 @@ SAME = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("narrow_networks")
 def test_cells_that_both_studies_have_are_the_same(tmp_path):
     settings = make_settings("smoke", paper__hidden_units=64, **SMALL).of("shot", 0)

@@ -70,6 +70,7 @@ def test_the_gradient_of_the_domain_is_reversed():
     np.testing.assert_allclose(tape.gradient(loss, values), [-0.6, 1.2, -1.8], rtol=1e-6)  # -0.3 times twice the value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adaptation", [0.0, 0.1])
 def test_a_classifier_finds_what_it_was_taught(adaptation):
     from studies.few_windows.domain_adversarial import AnomalyClassifier
@@ -84,6 +85,7 @@ def test_a_classifier_finds_what_it_was_taught(adaptation):
     np.testing.assert_array_equal(first.score(fresh), second.score(fresh))
 
 
+@pytest.mark.slow
 def test_a_cell_has_all_training_data_and_is_read_from_the_cache(tmp_path):
     counts = {"num_real": (6,), "first_seed": 3, "num_windows": 30, "num_judged": 20, "num_anomalous": 6}
     changed = {f"few_windows__{name}": value for name, value in counts.items()}

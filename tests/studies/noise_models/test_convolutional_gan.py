@@ -1,10 +1,13 @@
 """The convolutional GAN learns a known process, and its windows have full rank."""
 
 import numpy as np
+import pytest
 
 from enhsim_tf.common import measures
 from studies.common.noise_processes import AutoregressiveNoise
 from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN, fit_convolutional_gan
+
+pytestmark = pytest.mark.slow
 
 
 def _noise(number: int, window: int) -> np.ndarray:

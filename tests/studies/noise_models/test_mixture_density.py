@@ -8,6 +8,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.measures import autocorrelation
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
+pytestmark = pytest.mark.slow
+
 WINDOW = 32
 
 

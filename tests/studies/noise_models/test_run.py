@@ -3,11 +3,14 @@
 import json
 
 import pandas as pd
+import pytest
 
 from enhsim_tf.detection.registry import DETECTORS
 from studies.common.settings import make_settings
 from studies.noise_models import cells, run
 from studies.noise_models.summary import KEPT
+
+pytestmark = pytest.mark.slow
 
 
 def test_every_model_is_tried_and_a_second_run_trains_nothing(tmp_path, monkeypatch):

@@ -8,6 +8,8 @@ from studies.common.settings import make_settings
 from studies.robustness.degraded_modes import DegradedModes
 from studies.robustness.replicate import Replicate
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def modes(tmp_path_factory):

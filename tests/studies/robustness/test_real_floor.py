@@ -14,6 +14,7 @@ from enhsim_tf.common import measures as fidelity
 from studies.robustness.real_floor import MEASURES, RealFloor, evaluate
 from tests.noise import negative_controls
 
+pytestmark = pytest.mark.slow
 NUM_WINDOWS, SAMPLES = 200, 500
 NAMES = [measure.name for measure in MEASURES]
 CLASSIFIERS = {"classifier AUC, boosted trees", "classifier AUC, convolutions"}

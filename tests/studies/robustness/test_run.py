@@ -12,6 +12,8 @@ from studies.robustness.degraded_modes import METHODS, SEVERITIES
 from studies.robustness.replicate import ARMS
 from studies.robustness.summary import KEPT
 
+pytestmark = pytest.mark.slow
+
 SMALL = {
     "paper__num_windows": 40,
     "second__num_windows": 90,

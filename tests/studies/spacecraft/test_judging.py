@@ -5,8 +5,8 @@ import pytest
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
-from enhsim_tf.telemetry.telemanom import LabelledChannel, Labels
 from studies.spacecraft.judging import Judge, cross_fitted_scores, windows_that_meet
+from studies.spacecraft.telemanom import LabelledChannel, Labels
 
 
 def channel(sequences, samples=400):

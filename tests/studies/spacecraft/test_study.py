@@ -61,6 +61,7 @@ def results(data, narrow_enhancer, tmp_path_factory):
     return KEPT.read(folder), json.loads((folder / "findings.json").read_text())
 
 
+@pytest.mark.slow
 def test_every_training_data_that_can_be_made_has_a_row_for_every_detector(results):
     tables, found = results
     assert list(found["channels"]) == list(SEQUENCES) and "constant" in found["skipped"]["flat"]
@@ -70,6 +71,7 @@ def test_every_training_data_that_can_be_made_has_a_row_for_every_detector(resul
     assert set(found["controls"]) == set(summary.CONTROLS) and set(tables["enhancement"]["method"]) == set(METHODS)
 
 
+@pytest.mark.slow
 def test_no_window_with_a_labelled_sample_counts_as_nominal(results):
     tables, found = results
     for name, sequences in SEQUENCES.items():
@@ -79,12 +81,14 @@ def test_no_window_with_a_labelled_sample_counts_as_nominal(results):
         assert found["channels"][name]["num_nominal"] == len(nominal) > 10
 
 
+@pytest.mark.slow
 def test_a_value_far_outside_is_found_by_the_limit_check_and_by_the_reference(results):
     _, found = results
     for each in (found["controls"]["limit check"], found["references"][RIDGE]):
         assert set(each["found"].values()) == {1.0} and each["auc_pr"]["mean"] > 0.8
 
 
+@pytest.mark.slow
 def test_regression_on_a_wave_that_follows_its_clock_is_as_near_as_the_noise_allows(results):
     _, found = results
     of_noise = 0.05 / np.sqrt(0.5 * (1 + 0.3**2))

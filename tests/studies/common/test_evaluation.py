@@ -3,16 +3,12 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.detection import evaluation, metrics
+from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
 from enhsim_tf.detection.detectors import LargestStep, PCAResidual
-from enhsim_tf.detection.evaluation import (
-    evaluate_arm,
-    false_alarm_rates,
-    make_trial,
-    mean_over_windows,
-    score_trace,
-)
+from enhsim_tf.telemetry.windows import mean_over_windows
+from studies.common import evaluation
+from studies.common.evaluation import evaluate_arm, false_alarm_rates, make_trial, score_trace
 
 WINDOW = 300
 

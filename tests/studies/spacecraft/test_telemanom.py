@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.telemanom import LABELS, load_channel, load_labelled, read_labels
+from studies.spacecraft.telemanom import LABELS, load_channel, load_labelled, read_labels
 
 SMAP = Path(__file__).parents[2] / ".." / "shared" / "data" / "smap"
 HEADER = "chan_id,spacecraft,anomaly_sequences,class,num_values"
@@ -44,6 +44,11 @@ def test_labels_by_hand(make):
     assert labels["D-4"].sequences == () == labels["D-4"].classes
     assert [label.spacecraft for label in labels.values()] == ["SMAP", "SMAP", "MSL", "MSL"]
     assert list(read_labels(make(), spacecraft="msl")) == ["C-3", "D-4"]
+
+
+def test_sequences_that_share_a_sample_are_joined_and_neighbours_are_not(make):
+    (labels,) = read_labels(make(['E-5,SMAP,"[[20, 29], [10, 19], [12, 13]]","[b, a, c]",100'])).values()
+    assert labels.sequences == ((10, 20), (20, 30)) and labels.classes == ("a", "b")
 
 
 def test_channels_by_hand(make):

@@ -12,10 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject, inject_into_trace
 from enhsim_tf.detection.interface import Detector
-from enhsim_tf.telemetry.windows import cut_windows
+from enhsim_tf.detection.metrics import recall, threshold
+from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows
+from studies.common.metrics import auc_pr_at_prevalence, auc_roc, recall_at_real_rate, vus_pr
 
 PREVALENCE = 0.02  # share of anomalous windows for which precision is stated
 
@@ -123,10 +124,10 @@ def evaluate_arm(
     tables: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
     for done, (name, make) in enumerate(detectors.items(), 1):
         detector = make(seed).fit(training)
-        threshold = metrics.threshold(detector.score(held_out), trial.rate)
+        limit = threshold(detector.score(held_out), trial.rate)
         nominal, reference = detector.score(trial.nominal), detector.score(trial.reference)
         for block, scores in enumerate(np.array_split(nominal, num_blocks)):
-            tables["alarms"].append({"detector": name, "block": block, "alarms": int(np.sum(scores > threshold)), "windows": len(scores)})
+            tables["alarms"].append({"detector": name, "block": block, "alarms": int(np.sum(scores > limit)), "windows": len(scores)})
         all_scores = detector.score(np.concatenate(list(trial.anomalous.values())))
         parts = np.split(all_scores, np.cumsum([len(windows) for windows in trial.anomalous.values()])[:-1])
         for (kind, severity), scores in zip(trial.anomalous, parts, strict=True):
@@ -135,15 +136,15 @@ def evaluate_arm(
                     "detector": name,
                     "kind": kind,
                     "severity": severity,
-                    "recall": metrics.recall(scores, threshold),
-                    "recall_at_real_rate": metrics.recall_at_real_rate(reference, scores, trial.rate),
-                    "auc_roc": metrics.auc_roc(nominal, scores),
-                    "auc_pr": metrics.auc_pr_at_prevalence(nominal, scores, PREVALENCE),
+                    "recall": recall(scores, limit),
+                    "recall_at_real_rate": recall_at_real_rate(reference, scores, trial.rate),
+                    "auc_roc": auc_roc(nominal, scores),
+                    "auc_pr": auc_pr_at_prevalence(nominal, scores, PREVALENCE),
                 }
             )
         if trial.trace is not None:
             scores = score_trace(detector, trial.trace, training.shape[1], trial.stride)
-            tables["traces"].append({"detector": name, "vus_pr": metrics.vus_pr(trial.labels, scores, trial.max_buffer)})
+            tables["traces"].append({"detector": name, "vus_pr": vus_pr(trial.labels, scores, trial.max_buffer)})
         if on_detector is not None:
             on_detector(done)
     return tables
@@ -168,29 +169,6 @@ def score_trace(detector: Detector, trace: np.ndarray, window: int, stride: int)
         raise InputError(f"Expected a trace of at least a window of {window} samples. Received: {len(trace)} samples.")
     begins = np.unique(np.append(np.arange(0, len(trace) - window + 1, stride), len(trace) - window))
     return mean_over_windows(detector.score(cut_windows(trace, begins, window)), begins, window, len(trace))
-
-
-def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
-    """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
-
-    Samples after the end of the last window receive the score of the last window.
-
-    Args:
-        scores: Score of each window, shape `(windows,)`.
-        begins: First sample of each window, in ascending order. It starts at 0, with steps of at most `window`.
-        window: Number of samples in a window.
-        num_samples: Length of the series.
-
-    Returns:
-        Scores of shape `(num_samples,)`.
-    """
-    steps = np.zeros((2, num_samples + 1))
-    for sign, places in ((1, begins), (-1, begins + window)):
-        np.add.at(steps[0], places, sign * scores)
-        np.add.at(steps[1], places, sign)
-    end = begins[-1] + window
-    total, number = np.cumsum(steps[:, :end], axis=1)
-    return np.append(total / number, np.full(num_samples - end, scores[-1]))
 
 
 def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:

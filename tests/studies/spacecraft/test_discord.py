@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.detection.discord import left_discord
+from studies.spacecraft.discord import left_discord
 
 
 def direct(series, begin, window):
