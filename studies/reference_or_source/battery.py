@@ -49,7 +49,7 @@ class Battery:
     faults = ALL
     parameters = ("resistance", "lost_material", "lost_heat_transfer")
     """Parameters of the simulator with wrong physics that can be fitted to telemetry, all 0 in the published model."""
-    first_values, steps, bounds = np.zeros(3), np.array([0.01, 0.05, 0.3]), ((0.0, 0.0, -3.0), (5.0, 4.0, 3.0))
+    first_values, steps, bounds = np.zeros(3), np.array([0.01, 0.05, 0.3]), ((-1e-9, -1e-9, -3.0), (5.0, 4.0, 3.0))
     """Published values of `parameters`, the unit of each in the fit, and the limits in these units."""
 
     def check_installed(self) -> None:

@@ -80,12 +80,16 @@ def fit_parameters(system: Any, commands: np.ndarray, telemetry: np.ndarray) -> 
     """
     scale, number = telemetry.std(axis=0), telemetry.shape[1]
 
-    def errors(steps: np.ndarray) -> np.ndarray:
-        run = system.run_coarse(CRUDE, commands, values=system.first_values + steps * system.steps)[0]
-        return ((run[:, :number] - telemetry) / scale).ravel()
+    def values(moved: np.ndarray) -> np.ndarray:
+        return system.first_values + (moved - 1) * system.steps  # from 1, since the steps of the derivative are relative
 
-    found = least_squares(errors, np.zeros(len(system.parameters)), diff_step=0.1, x_scale=1.0, max_nfev=12, bounds=system.bounds)
-    return system.first_values + found.x * system.steps
+    def errors(moved: np.ndarray) -> np.ndarray:
+        run = system.run_coarse(CRUDE, commands, values=values(moved))[0]
+        apart = (run[:, :number] - telemetry) / scale
+        return (apart - apart.mean(axis=0)).ravel()  # detectors do not mind an offset either
+
+    bounds = 1 + np.asarray(system.bounds[0]), 1 + np.asarray(system.bounds[1])
+    return values(least_squares(errors, np.ones(len(system.parameters)), diff_step=0.1, max_nfev=15, bounds=bounds).x)
 
 
 def _commands(system: Any, number: int, seed: int, stream: int) -> np.ndarray:
