@@ -14,7 +14,6 @@ from enhsim_tf.detection import detectors, metrics
 
 RATE = 0.01
 """Share of false alarms that thresholds are set for."""
-_BLOCKS = 4  # parts of a window whose means `JointSize` looks at
 _LEAST_TAIL = 10  # scores beyond the 90 % quantile to which a tail is fitted
 
 
@@ -30,27 +29,6 @@ class Size:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the size of each window."""
         return np.sqrt(np.mean(((windows - self._mean) / self._scale) ** 2, axis=1)).max(axis=1)
-
-
-class JointSize:
-    """Mahalanobis distance of the means of all channels in quarters of a window, with the covariance of Ledoit and Wolf (2004)."""
-
-    def fit(self, windows: np.ndarray) -> "JointSize":
-        """Estimates mean and covariance from nominal windows."""
-        from sklearn.covariance import LedoitWolf
-
-        with threadpool_limits(1):
-            self._law = LedoitWolf().fit(self._means(windows))
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the distance of each window."""
-        return self._law.mahalanobis(self._means(windows))
-
-    @staticmethod
-    def _means(windows: np.ndarray) -> np.ndarray:
-        parts = np.array_split(np.asarray(windows, np.float64), _BLOCKS, axis=1)
-        return np.concatenate([part.mean(axis=1) for part in parts], axis=1)
 
 
 class Discord:
@@ -73,7 +51,7 @@ class Discord:
 
 ONE_CLASS: Mapping[str, Callable[[int], Any]] = {
     "size": lambda seed: Size(),
-    "joint size": lambda seed: JointSize(),
+    "joint size": lambda seed: detectors.JointSize(),
     "PCA residual": lambda seed: detectors.PCAResidual(seed=seed),
     "nearest neighbours": lambda seed: detectors.NearestNeighbours(),
     "isolation forest": lambda seed: detectors.IsolationForestOnFeatures(100, seed),

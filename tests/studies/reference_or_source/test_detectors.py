@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from studies.reference_or_source.detectors import JointSize, Size, across_folds, classifier, tail_threshold
+from studies.reference_or_source.detectors import Size, across_folds, classifier, tail_threshold
 
 
 def test_the_size_is_that_of_the_channel_that_is_largest_in_units_of_its_nominal_one():
@@ -9,14 +9,6 @@ def test_the_size_is_that_of_the_channel_that_is_largest_in_units_of_its_nominal
     tested = np.stack([np.full(100, 2.0), np.full(100, 3.0)], axis=1)[None]
 
     assert Size().fit(nominal).score(tested) == pytest.approx([2.0])
-
-
-def test_the_joint_size_of_nominal_windows_is_the_number_of_their_means():
-    windows = np.random.default_rng(0).standard_normal((4_000, 40, 3))
-
-    scores = JointSize().fit(windows[:2_000]).score(windows[2_000:])
-
-    assert np.mean(scores) == pytest.approx(12, rel=0.03)  # chi-square of 4 quarters of 3 channels
 
 
 def test_known_windows_are_scored_by_detectors_that_have_not_learnt_from_their_fold():
