@@ -8,6 +8,7 @@ from enhsim_tf.common.window_features import window_features
 from studies.battery.detectors import COARSE, ENHANCED_RUN, NUM, WITH_RESIDUALS, Judge, Rows, alarm_rows, apart
 from studies.battery.faults import ALL
 from studies.battery.orbits import Regime, draw_load
+from studies.battery.simulate import COARSE as COARSE_MODEL
 from studies.battery.simulate import simulate_all
 from studies.battery.windows import coarse_windows, cut_columns, window_starts
 
@@ -37,7 +38,7 @@ def simulate_faults(num_orbits: int, regime: Regime, seed: int) -> tuple[np.ndar
     faulty, planned = [], []
     for number, fault in enumerate(ALL):
         load = draw_load(num_orbits + 1, regime, np.random.default_rng([seed, _STREAM, number]))
-        nominal, broken = (runs[0].values for runs in simulate_all(load, regime, [None, fault], ["coarse"]))
+        nominal, broken = (runs[0].values for runs in simulate_all(load, regime, [None, fault], [COARSE_MODEL]))
         starts = window_starts(len(broken), NUM // len(ALL))
         faulty.append(cut_columns(broken, starts))
         planned.append(cut_columns(nominal, starts))

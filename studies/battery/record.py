@@ -16,10 +16,10 @@ from studies.battery.orbits import Regime, draw_load
 from studies.battery.simulate import MODELS, simulate_all
 
 PARTS = {
-    "fit": ((None,), MODELS),
-    "more": ((None,), MODELS),
-    "test": ((None,), MODELS),
-    "fault": ((None, *ALL), MODELS),
+    "fit": ((None,), tuple(MODELS)),
+    "more": ((None,), tuple(MODELS)),
+    "test": ((None,), tuple(MODELS)),
+    "fault": ((None, *ALL), tuple(MODELS)),
     "coarse": ((None,), ("coarse",)),
 }
 """For each part its faults and its simulators. The enhanced simulator is fitted to `fit`. Detectors learn more real telemetry from
@@ -74,7 +74,7 @@ def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, p
     told = progress.loop("part", len(PARTS))
     for number, (part, (faults, models)) in enumerate(PARTS.items()):
         load = draw_load(counts[part] + 1, regime, np.random.default_rng([seed, number]))
-        for fault, runs in zip(faults, simulate_all(load, regime, faults, models), strict=True):
+        for fault, runs in zip(faults, simulate_all(load, regime, faults, [MODELS[name] for name in models]), strict=True):
             for model, run in zip(models, runs, strict=True):
                 arrays[f"{part}/{key_of(fault)}/{model}"] = run.values
             if runs[0].reductions:

@@ -17,14 +17,39 @@ from enhsim_tf.common.errors import InputError
 from studies.battery.faults import Fault, drift_under, load_under, simulator_inputs
 from studies.battery.orbits import FIRST_CHARGE, INTERVAL_S, ORBIT_SAMPLES, Regime, battery_current
 
-MODELS = ("coarse", "fine")
 COLUMNS = ("volts", "amperes", "celsius")
 """Columns of a recorded run."""
 ONSET = ORBIT_SAMPLES
 """First sample of a fault: runs begin with a nominal orbit, in which the battery also reaches its usual temperature."""
-VEHICLE = {"added resistance": 0.008, "lost material": 0.04, "lost heat transfer": 0.4}
-"""How the fine simulator's battery differs from the published one, in ohms and shares, beside its temperature and a slower diffusion."""
-_SLOWER_DIFFUSION = 0.7  # of lithium in the negative electrode's particles, as a share of the published value
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """A model of the battery. Without arguments, it is the published one at 25 degrees Celsius.
+
+    Args:
+        physics: Name of the model in PyBaMM.
+        resistance: Contact resistance in ohms.
+        lost_material: Lost share of the active material of both electrodes.
+        lost_heat_transfer: Lost share of the heat transfer.
+        diffusion: Diffusivity of lithium in the negative electrode's particles, as a share of the published value.
+        follows_ambient: Whether it knows the temperature of the regime.
+        is_isothermal: Whether the battery keeps its temperature.
+    """
+
+    physics: str = "SPM"
+    resistance: float = 0.0
+    lost_material: float = 0.0
+    lost_heat_transfer: float = 0.0
+    diffusion: float = 1.0
+    follows_ambient: bool = False
+    is_isothermal: bool = False
+
+
+COARSE = Model()
+VEHICLE = Model("DFN", 0.008, 0.04, 0.4, 0.7, follows_ambient=True)
+MODELS = {"coarse": COARSE, "fine": VEHICLE}
+"""The coarse simulator, and the fine one, whose battery differs from the published one."""
 _PUBLISHED_K, _ZERO_K = 298.15, 273.15
 _ONSET_S = 60.0  # a fault grows to its full size in this time
 _MESH = {"x_n": 10, "x_s": 8, "x_p": 10, "r_n": 12, "r_p": 12}
@@ -72,11 +97,11 @@ def check_installed() -> None:
     _pybamm()
 
 
-def simulate(model: str, current: np.ndarray, regime: Regime, faults: Sequence[Fault | None], onset: int = ONSET) -> list[Run | None]:
+def simulate(model: Model, current: np.ndarray, regime: Regime, faults: Sequence[Fault | None], onset: int = ONSET) -> list[Run | None]:
     """Runs one simulator over a current, once for each fault.
 
     Args:
-        model: One of `MODELS`.
+        model: The model.
         current: Current in amperes on the clock of `INTERVAL_S`, shape `(samples,)`; positive discharges the battery.
         regime: How hard the battery is used.
         faults: The faults, None for nominal. A payload that is stuck on must be in the current already.
@@ -112,32 +137,31 @@ def simulate(model: str, current: np.ndarray, regime: Regime, faults: Sequence[F
     return found
 
 
-def _build(model: str, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
+def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime, begun: float) -> Any:
     """Builds a simulation over a current, whose inputs are those of `simulator_inputs`, which act from `begun` seconds."""
     pybamm = _pybamm()
-    is_fine, published = model == "fine", pybamm.ParameterValues("Chen2020")
-    values, kelvins = published.copy(), regime.ambient_k if is_fine else _PUBLISHED_K
+    published = pybamm.ParameterValues("Chen2020")
+    values, kelvins = published.copy(), regime.ambient_k if model.follows_ambient else _PUBLISHED_K
     charged = published.copy()
     charged.set_initial_state(FIRST_CHARGE)
     grown = pybamm.Interpolant(np.array([-1.0, begun, begun + _ONSET_S, 1e12]), np.array([0.0, 0.0, 1.0, 1.0]), pybamm.t)
     added, material, transfer = (pybamm.InputParameter(name) * grown for name in simulator_inputs(None))
-    differs = VEHICLE if is_fine else dict.fromkeys(VEHICLE, 0.0)
-    values["Contact resistance [Ohm]"] = differs["added resistance"] + added
+    values["Contact resistance [Ohm]"] = model.resistance + added
     for electrode in ("Negative", "Positive"):
         share = f"{electrode} electrode active material volume fraction"
-        values[share] = published[share] * (1 - differs["lost material"]) * (1 - material)
+        values[share] = published[share] * (1 - model.lost_material) * (1 - material)
         concentration = f"Initial concentration in {electrode.lower()} electrode [mol.m-3]"
         values[concentration] = charged[concentration]
     name = "Total heat transfer coefficient [W.m-2.K-1]"
-    values[name] = published[name] * (1 - differs["lost heat transfer"]) * (1 - transfer)
+    values[name] = published[name] * (1 - model.lost_heat_transfer) * (1 - transfer)
     name = "Negative particle diffusivity [m2.s-1]"
-    values[name] = published[name] * (_SLOWER_DIFFUSION if is_fine else 1.0)
+    values[name] = published[name] * model.diffusion
     values["Ambient temperature [K]"] = values["Initial temperature [K]"] = kelvins
     values["Lower voltage cut-off [V]"], values["Upper voltage cut-off [V]"] = _LIMITS_V
     values["Current function [A]"] = pybamm.Interpolant(clock, current, pybamm.t)
-    build = pybamm.lithium_ion.DFN if is_fine else pybamm.lithium_ion.SPM
+    build = getattr(pybamm.lithium_ion, model.physics)
     return pybamm.Simulation(
-        build({"thermal": "lumped", "contact resistance": "true"}),
+        build({"thermal": "isothermal" if model.is_isothermal else "lumped", "contact resistance": "true"}),
         parameter_values=values,
         solver=pybamm.IDAKLUSolver(**_TOLERANCES, output_variables=[_VOLTAGE, _TEMPERATURE]),
         var_pts=_MESH,
@@ -145,7 +169,7 @@ def _build(model: str, current: np.ndarray, clock: np.ndarray, regime: Regime, b
 
 
 def simulate_all(
-    load: np.ndarray, regime: Regime, faults: Sequence[Fault | None], models: Sequence[str] = MODELS, onset: int = ONSET
+    load: np.ndarray, regime: Regime, faults: Sequence[Fault | None], models: Sequence[Model] = (COARSE, VEHICLE), onset: int = ONSET
 ) -> list[tuple[Run, ...]]:
     """Runs simulators over a load, once for each fault, driven by the same current.
 

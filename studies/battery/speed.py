@@ -8,7 +8,7 @@ import numpy as np
 
 from studies.battery.orbits import ORBIT_SAMPLES, Regime, battery_current, draw_load
 from studies.battery.record import Recorded
-from studies.battery.simulate import MODELS, simulate
+from studies.battery.simulate import MODELS, Model, simulate
 from studies.battery.windows import WINDOW, coarse_windows
 
 _SPEED_ORBITS, _SPEED_REPEATS, _SPEED_WINDOWS = 8, 4, 400
@@ -30,7 +30,9 @@ def speed_rows(
         seed: Seed of the simulated orbits.
     """
     current = battery_current(draw_load(_SPEED_ORBITS, regime, np.random.default_rng([seed, 100])), regime)
-    rows = [{"what": f"{model} simulator", "seconds": _solving_time(model, current, regime) / _SPEED_ORBITS} for model in MODELS]
+    rows = [
+        {"what": f"{name} simulator", "seconds": _solving_time(model, current, regime) / _SPEED_ORBITS} for name, model in MODELS.items()
+    ]
     windows = coarse_windows(recorded, "test", _SPEED_WINDOWS)
     for name, predict in enhancers.items():
         predict(windows)
@@ -42,7 +44,7 @@ def speed_rows(
     return rows
 
 
-def _solving_time(model: str, current: np.ndarray, regime: Regime) -> float:
+def _solving_time(model: Model, current: np.ndarray, regime: Regime) -> float:
     """Processor time of a further run of a built model, in seconds: building and the first run cancel in a difference."""
     spent = []
     for number in (1, 1 + _SPEED_REPEATS):

@@ -10,15 +10,13 @@ from enhsim_tf.common.errors import InputError
 from studies.battery import simulate as module
 from studies.battery.faults import Fault
 from studies.battery.orbits import REGIMES, draw_load
-from studies.battery.simulate import simulate, simulate_all
+from studies.battery.simulate import COARSE, MODELS, simulate, simulate_all
 
 os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"  # before PyBaMM is imported
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(importlib.util.find_spec("pybamm") is None, reason="PyBaMM is an optional extra: pip install 'enhsim_tf[battery]'"),
 ]
-
-pytestmark = pytest.mark.slow
 
 GENTLE = REGIMES["gentle"]
 SHORT = 240  # samples
@@ -30,7 +28,7 @@ def pulses():
     """Voltages and temperatures of both simulators for a current with steps, nominal and under three faults from sample 120."""
     current = np.where(np.arange(SHORT) % 60 < 30, 3.0, -1.0)
     faults = [None, Fault("raised resistance", 1.0), Fault("lost capacity", 1.0), Fault("poor heat transfer", 1.0)]
-    return current, {model: simulate(model, current, GENTLE, faults, onset=120) for model in ("coarse", "fine")}
+    return current, {model: simulate(MODELS[model], current, GENTLE, faults, onset=120) for model in MODELS}
 
 
 def test_nothing_is_reported_to_anyone():
@@ -58,14 +56,14 @@ def test_added_resistance_lowers_the_voltage_by_ohms_law(pulses):
 
 def test_a_cell_without_current_keeps_its_voltage_and_the_temperature_around_it():
     for model, celsius in (("coarse", 25.0), ("fine", 15.0)):
-        (run,) = simulate(model, np.zeros(60), GENTLE, [None], onset=10)
+        (run,) = simulate(MODELS[model], np.zeros(60), GENTLE, [None], onset=10)
         assert np.ptp(run.values[:, VOLTS]) < 1e-3
         np.testing.assert_allclose(run.values[:, CELSIUS], celsius, atol=0.01)
 
 
 def test_charge_that_is_returned_restores_the_voltage():
     rest, there = np.zeros(300), np.full(90, 2.5)
-    (run,) = simulate("coarse", np.concatenate([np.zeros(10), there, -there, rest]), GENTLE, [None], onset=10)
+    (run,) = simulate(COARSE, np.concatenate([np.zeros(10), there, -there, rest]), GENTLE, [None], onset=10)
     assert run.values[99, VOLTS] < run.values[0, VOLTS] - 0.05
     assert run.values[-1, VOLTS] == pytest.approx(run.values[0, VOLTS], abs=0.003)
 

@@ -1,0 +1,185 @@
+"""An A320 and its coarse simulators, from the same model with wrong parameters to a point mass, for the study."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from enhsim_tf.common.errors import InputError
+from studies.reference_or_source.aircraft_faults import ALL, ONSET, UNIT_SAMPLES, Fault, sizes_over_flight
+from studies.reference_or_source.aircraft_flight import Vehicle, check_installed, draw_wind, fly
+from studies.reference_or_source.aircraft_point_mass import Constants, simulate
+
+COMMANDS = ("target altitude", "target airspeed")
+VEHICLES = {
+    "own": Vehicle(),
+    "off 10 %": Vehicle(fuel=1.1, thrust=1.1, drag=1.1, elevator=0.9, gains=0.9),
+    "off 30 %": Vehicle(fuel=1.3, thrust=1.3, drag=1.3, elevator=0.7, gains=0.7),
+}
+"""The coarse simulators in JSBSim. The signs are fixed.
+
+| quantity | real | assumed when off by 10 % (30 % alike) |
+|---|---|---|
+| fuel at the start | 30,000 lb of 141,000 lb | 33,000 lb |
+| thrust at equal N1 | 1 | 1.1 |
+| drag coefficient at zero lift | 0.016 | 0.0176 |
+| elevator's deflection | 1 | 0.9 |
+| gains of the autopilot | 1 | 0.9 |
+"""
+POINT_MASSES = {"wrong physics": True, "missing state": False}
+"""The point masses, and whether the climb rate has its lag: without it a run changes more than without that of airspeed or N1."""
+NOISE_SD = (0.5, 30.0, 0.05, 0.1, 0.1, 6.0)
+"""Standard deviation of each channel's sensor noise, in the channel's unit."""
+RESOLUTION = (0.25, 16.0, 0.05, 0.1, 0.1, 4.0)
+"""Resolution of each channel's sensor, in the channel's unit."""
+_HOLDS_S = (60, 120)  # shortest and longest time between two steps of a target; the mean is 90 s
+_ALTITUDES_FT, _ALTITUDE_STEP_FT, _ALTITUDE_GRID_FT = (8_000, 16_000), 1_500, 100
+_SPEEDS_KT, _SPEED_STEP_KT, _SPEED_GRID_KT = (230, 290), 20, 1
+
+
+class Aircraft:
+    """An A320 in JSBSim that flies targets of altitude and airspeed.
+
+    Its telemetry is airspeed as it reads in knots, climb rate in feet a minute, pitch in degrees, N1 of the left and the right engine in
+    percent and altitude in feet, once a second. A flight lasts 20 minutes and starts in the air, trimmed at its first targets. A fault
+    acts from sample `onset` of every flight to its end.
+    """
+
+    name = "aircraft"
+    channels = ("airspeed", "climb rate", "pitch", "N1 left", "N1 right", "altitude")
+    coarse_columns = (*channels, *COMMANDS)
+    interval_s = 1.0
+    unit_samples = UNIT_SAMPLES
+    onset = ONSET
+    window = 120
+    unit = "flight"
+    simulators = (*VEHICLES, *POINT_MASSES)
+    faults: tuple[Fault, ...] = ALL
+    parameters = tuple(field.name for field in dataclasses.fields(Constants))
+    """Parameters of the point mass that can be fitted to telemetry."""
+    first_values = np.array([field.default for field in dataclasses.fields(Constants)])
+    steps, bounds = first_values / 2, (-1.8, 6.0)
+    """Unit of each parameter in the fit, and the limits of its change in these units."""
+
+    def check_installed(self) -> None:
+        """Raises an `InputError` if JSBSim is not installed."""
+        check_installed()
+
+    def draw_commands(self, num_units: int, rng: np.random.Generator) -> np.ndarray:
+        """Draws targets, each of which takes a random step every 60 to 120 seconds.
+
+        Args:
+            num_units: Number of flights.
+            rng: Random number generator.
+
+        Returns:
+            Target altitude in feet and airspeed in knots, float64 of shape `(num_units * unit_samples, 2)`.
+        """
+        flights = [
+            np.stack(
+                [
+                    _draw_target(_ALTITUDES_FT, _ALTITUDE_STEP_FT, _ALTITUDE_GRID_FT, rng),
+                    _draw_target(_SPEEDS_KT, _SPEED_STEP_KT, _SPEED_GRID_KT, rng),
+                ],
+                axis=1,
+            )
+            for _ in range(num_units)
+        ]
+        return np.concatenate(flights) if flights else np.empty((0, len(COMMANDS)))
+
+    def run_real(
+        self, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), rng: np.random.Generator | None = None
+    ) -> list[np.ndarray]:
+        """Runs the fine simulator.
+
+        Args:
+            commands: Targets, see `draw_commands`.
+            faults: Faults, each of which acts from sample `onset` of every flight; None for nominal.
+            rng: Random number generator of the turbulence, which the runs share; None for calm air.
+
+        Returns:
+            For each fault, the channels before the sensors' noise, float32 of shape `(samples, 6)`. The error of a pitot tube is in the
+            airspeed, and the autopilot flies by it.
+
+        Raises:
+            InputError: If JSBSim is not installed, or `commands` are no whole number of flights, or cannot be flown.
+        """
+        flights = _as_flights(commands)
+        winds = [None] * len(flights) if rng is None else [draw_wind(own) for own in rng.spawn(len(flights))]
+        return [_fly_all(flights, Vehicle(), fault, winds) for fault in faults]
+
+    def run_coarse(
+        self, simulator: str, commands: np.ndarray, faults: Sequence[Fault | None] = (None,), values: Sequence[float] | None = None
+    ) -> list[np.ndarray]:
+        """Runs a coarse simulator, in calm air.
+
+        Args:
+            simulator: One of `simulators`.
+            commands: Targets, see `draw_commands`.
+            faults: Faults, each of which acts as far as the simulator can express it; None for nominal.
+            values: Values of `parameters` of a point mass; None: those of textbooks.
+
+        Returns:
+            For each fault, columns `coarse_columns`: the channels as the simulator computes them, then the commands; float32 of shape
+            `(samples, 8)`.
+
+        Raises:
+            InputError: If JSBSim is not installed although the simulator needs it, or `commands` are no whole number of flights.
+        """
+        flights, found = _as_flights(commands), []
+        for fault in faults:
+            if simulator in VEHICLES:
+                run = _fly_all(flights, VEHICLES[simulator], fault, [None] * len(flights))
+            else:
+                constants = Constants() if values is None else Constants(*map(float, values))
+                run = simulate(flights, sizes_over_flight(fault), POINT_MASSES[simulator], constants).reshape(-1, len(self.channels))
+            found.append(np.concatenate([run, commands], axis=1).astype(np.float32))
+        return found
+
+    def can_simulate(self, simulator: str, kind: str) -> bool:
+        """Returns whether a coarse simulator can express a kind of fault: a point mass has no elevator."""
+        return simulator in VEHICLES or kind != "elevator"
+
+    def measure(self, values: np.ndarray, rng: np.random.Generator, scale: float = 1.0) -> np.ndarray:
+        """Measures channels with sensors that add white noise and round to their resolution.
+
+        Args:
+            values: Channels, shape `(samples, 6)`.
+            rng: Random number generator.
+            scale: Factor of the noise; 0 leaves the rounding only.
+
+        Returns:
+            Telemetry, float32 of the same shape.
+        """
+        steps = np.array(RESOLUTION)
+        noisy = values + scale * np.array(NOISE_SD) * rng.standard_normal(np.shape(values))
+        return (np.rint(noisy / steps) * steps).astype(np.float32)
+
+
+def _draw_target(limits: tuple[int, int], step: int, grid: int, rng: np.random.Generator) -> np.ndarray:
+    """Draws one target over one flight: a random walk that limits reflect, in steps of at most `step`, rounded to a grid."""
+    target, value, begin = np.empty(UNIT_SAMPLES), rng.uniform(*limits), 0
+    while begin < UNIT_SAMPLES:
+        end = begin + int(rng.integers(_HOLDS_S[0], _HOLDS_S[1] + 1))
+        target[begin:end] = np.rint(value / grid) * grid
+        value += rng.uniform(-step, step)
+        value = limits[0] + abs(value - limits[0])  # reflected at the lower limit, and then at the upper one
+        value = limits[1] - abs(limits[1] - value)
+        begin = end
+    return target
+
+
+def _as_flights(commands: np.ndarray) -> np.ndarray:
+    """Returns commands as `(flights, UNIT_SAMPLES, 2)`."""
+    if commands.ndim != 2 or commands.shape[1] != len(COMMANDS) or len(commands) % UNIT_SAMPLES:
+        raise InputError(
+            f"Expected commands of shape (flights * {UNIT_SAMPLES}, {len(COMMANDS)}). Received: {commands.shape}. Draw them with draw_commands."
+        )
+    return np.asarray(commands, dtype=float).reshape(-1, UNIT_SAMPLES, len(COMMANDS))
+
+
+def _fly_all(flights: np.ndarray, vehicle: Vehicle, fault: Fault | None, winds: list[np.ndarray | None]) -> np.ndarray:
+    """Runs JSBSim over flights, each with a simulator of its own, so that no flight depends on the ones before it."""
+    sizes = sizes_over_flight(fault)
+    runs = [fly(targets, vehicle, sizes, wind) for targets, wind in zip(flights, winds, strict=True)]
+    return np.concatenate(runs).astype(np.float32) if runs else np.empty((0, len(Aircraft.channels)), dtype=np.float32)

@@ -1,0 +1,79 @@
+"""Writes the small recorded pair of an aircraft: `python -m studies.reference_or_source.example examples/aircraft`.
+
+The files need no JSBSim to be read. Times count seconds; nominal flights of 20 minutes begin an hour apart.
+
+    telemetry.csv        the fine simulator through noisy sensors: what the aircraft's recorder would keep
+    simulator.csv        the point mass over the same flights: its channels, and the commands that drive it
+    telemetry_fault.csv  another flight, whose left engine answers its throttle 5 % too little after five minutes
+    simulator_fault.csv  the point mass over that flight as planned: an operator does not know of the fault
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from enhsim_tf.common.atomic_files import make_folder, replace_file
+from enhsim_tf.common.console import Parser, run_command, tell
+from studies.reference_or_source.aircraft import Aircraft
+from studies.reference_or_source.aircraft_faults import Fault
+
+SEED = 7
+NUM_FLIGHTS = 6
+SIMULATOR = "wrong physics"
+FAULT = Fault("left engine", 0.6)
+_PERIOD_S = 3_600  # from the start of a flight to that of the next
+_TELEMETRY_DIGITS = (2, 0, 2, 1, 1, 0)
+_SIMULATOR_DIGITS = (2, 0, 2, 1, 1, 0, 0, 0)
+
+
+def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS) -> None:
+    """Simulates the flights and writes the four files.
+
+    Args:
+        folder: The output folder, which is created.
+        seed: Seed of the commands, of the turbulence and of the sensors.
+        num_flights: Number of nominal flights; one flight with the fault follows.
+
+    Raises:
+        InputError: If JSBSim is not installed or the folder cannot be written to.
+    """
+    import pandas as pd
+
+    folder, aircraft = make_folder(folder), Aircraft()
+    for part, (number, fault, suffix) in enumerate(((num_flights, None, ""), (1, FAULT, "_fault"))):
+        rng = np.random.default_rng([seed, part])
+        commands = aircraft.draw_commands(number, rng)
+        telemetry = aircraft.measure(aircraft.run_real(commands, [fault], rng)[0], rng)
+        (simulator,) = aircraft.run_coarse(SIMULATOR, commands)
+        samples = np.arange(len(commands))
+        times = samples // aircraft.unit_samples * _PERIOD_S + samples % aircraft.unit_samples
+        for name, columns, digits, values in (
+            ("telemetry", aircraft.channels, _TELEMETRY_DIGITS, telemetry),
+            ("simulator", aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
+        ):
+            cells = zip(columns, digits, values.T, strict=True)
+            table = pd.DataFrame(
+                {column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells}
+            )
+            table.insert(0, "time", times)
+            with replace_file(folder / f"{name}{suffix}.csv") as temporary:
+                table.to_csv(temporary, index=False, lineterminator="\n")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command. An error of the user is reported as one line, with exit code 2."""
+
+    def write() -> int:
+        parser = Parser(prog="python -m studies.reference_or_source.example", description="Writes the recorded pair of an aircraft.")
+        parser.add_argument("folder", type=Path, help="the output folder, such as examples/aircraft")
+        folder = parser.parse_args(arguments).folder
+        write_example(folder)
+        tell(f"telemetry and simulator with and without a fault in {folder}/")
+        return 0
+
+    return run_command(write, "interrupted; complete files are kept")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,223 @@
+"""Physical oracles of the aircraft and its coarse simulators. Those in JSBSim are skipped without it."""
+
+import functools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from enhsim_tf.common.errors import InputError
+from enhsim_tf.telemetry.sources import read_source
+from studies.reference_or_source import aircraft_flight, aircraft_point_mass, example
+from studies.reference_or_source.aircraft import NOISE_SD, RESOLUTION, Aircraft
+from studies.reference_or_source.aircraft_faults import ALL, ONSET, SEVERITIES, SIZES, UNIT_SAMPLES, Fault, sizes_over_flight
+
+AIRCRAFT = Aircraft()
+AIRSPEED, CLIMB, PITCH, LEFT, RIGHT, ALTITUDE = range(6)
+FOLDER = Path(__file__).parents[3] / "examples" / "aircraft"
+LATE = slice(ONSET + 450, None)  # when the fine simulator has settled after a fault's onset
+
+
+@pytest.fixture(scope="module")
+def jsbsim():
+    return pytest.importorskip("jsbsim", reason="JSBSim is an optional extra: pip install 'enhsim_tf[aircraft]'")
+
+
+@pytest.fixture(scope="module")
+def level():
+    """Targets of a level flight."""
+    return np.tile([12_000.0, 260.0], (UNIT_SAMPLES, 1))
+
+
+@pytest.fixture(scope="module")
+def stepped(level):
+    """Targets of a flight with a step of the altitude at sample 100 and one of the airspeed at sample 600."""
+    commands = level.copy()
+    commands[100:, 0], commands[600:, 1] = 13_000, 275
+    return commands
+
+
+@pytest.fixture(scope="module")
+def calm(jsbsim, level):
+    return AIRCRAFT.run_real(level)[0]
+
+
+@pytest.fixture(scope="module")
+def run_with(jsbsim, level):
+    """`run_with(kind)` is the level flight with the largest fault of a kind."""
+    return functools.cache(lambda kind: AIRCRAFT.run_real(level, [Fault(kind, 1.0)])[0])
+
+
+def test_level_flight_keeps_its_targets(calm):
+    assert calm.shape == (UNIT_SAMPLES, 6) and calm.dtype == np.float32
+    assert np.abs(calm[:, ALTITUDE] - 12_000).max() < 2 and np.abs(calm[:, AIRSPEED] - 260).max() < 0.1
+    assert np.abs(calm[:, CLIMB]).max() < 10
+
+
+def test_level_flight_takes_less_thrust_as_fuel_burns(calm):
+    assert -1.0 < calm[-1, LEFT] - calm[0, LEFT] < -0.1 and calm[-1, PITCH] < calm[0, PITCH]
+    np.testing.assert_array_equal(calm[:, LEFT], calm[:, RIGHT])
+
+
+@pytest.mark.parametrize("simulator", ["off 30 %", "wrong physics", "missing state"])
+def test_steps_of_the_targets_are_reached(request, simulator, stepped):
+    if simulator == "off 30 %":
+        request.getfixturevalue("jsbsim")
+    run = AIRCRAFT.run_coarse(simulator, stepped)[0]
+    np.testing.assert_array_equal(run[:, 6:], stepped)
+    assert np.abs(run[:101, ALTITUDE] - 12_000).max() < 5 and abs(run[400, ALTITUDE] - 13_000) < 20
+    assert abs(run[599, AIRSPEED] - 260) < 1 and abs(run[-1, AIRSPEED] - 275) < 1
+    np.testing.assert_allclose(run[100:400, CLIMB].sum() / 60, 1_000, rtol=0.02)  # climb rate is the altitude's derivative
+
+
+def test_own_is_the_fine_simulator_in_calm_air(calm, level):
+    np.testing.assert_array_equal(AIRCRAFT.run_coarse("own", level)[0][:, :6], calm)
+
+
+def test_turbulence_has_its_standard_deviation_and_correlation():
+    wind = np.concatenate([aircraft_flight.draw_wind(np.random.default_rng(seed)) for seed in range(20)])
+    np.testing.assert_allclose(wind.std(0), [1.0, 0.8], rtol=0.05)
+    for column, time_s in zip(wind.T, (8.0, 4.0), strict=True):
+        shift = int(time_s * aircraft_flight.CONTROLS_A_SECOND)
+        assert np.corrcoef(column[:-shift], column[shift:])[0, 1] == pytest.approx(np.exp(-1), abs=0.05)
+
+
+def test_equal_seeds_give_equal_runs_in_light_turbulence(calm, level):
+    first, again = (AIRCRAFT.run_real(level, rng=np.random.default_rng(1))[0] for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+    assert 0.2 < (first - calm)[:, AIRSPEED].std() < 1
+
+
+def test_a_pitot_tube_that_reads_high_slows_the_aircraft_by_as_much(jsbsim, calm, level):
+    run = AIRCRAFT.run_real(level, [Fault("pitot", 0.6)])[0]
+    np.testing.assert_array_equal(run[:ONSET], calm[:ONSET])
+    assert run[ONSET, AIRSPEED] == pytest.approx(264, abs=0.1)
+    assert np.abs(run[LATE, AIRSPEED] - 260).max() < 0.2  # it reads the target
+    slower = level.copy()
+    slower[ONSET:, 1] = 256
+    np.testing.assert_allclose(run[LATE, [PITCH]], AIRCRAFT.run_real(slower)[0][LATE, [PITCH]], atol=0.01)  # and flies at 256 kt
+
+
+@pytest.mark.parametrize(
+    ("kind", "raised", "lowered", "kept"),
+    [
+        ("left engine", {RIGHT: 5}, {LEFT: 5}, {AIRSPEED: 0.5, ALTITUDE: 5}),
+        ("both engines", {LEFT: 2, RIGHT: 2}, {}, {AIRSPEED: 0.5, ALTITUDE: 5, PITCH: 0.05}),
+        ("icing", {LEFT: 4, RIGHT: 4, PITCH: 0.8}, {}, {AIRSPEED: 0.5, ALTITUDE: 10}),
+        ("fuel leak", {}, {LEFT: 1, RIGHT: 1, PITCH: 0.1}, {AIRSPEED: 0.5, ALTITUDE: 5}),
+        ("elevator", {}, {}, {AIRSPEED: 0.5, ALTITUDE: 30, PITCH: 0.05, LEFT: 1}),  # once the autopilot has trimmed again
+    ],
+)
+def test_a_fault_changes_the_channels_that_physics_says_and_nothing_before(calm, run_with, kind, raised, lowered, kept):
+    run = run_with(kind)
+    np.testing.assert_array_equal(run[: ONSET + 1], calm[: ONSET + 1])
+    assert np.abs(run - calm)[ONSET + 1 :].max() > 0.05
+    change = (run - calm)[LATE].mean(0)
+    for channel, least in raised.items():
+        assert change[channel] > least, channel
+    for channel, least in lowered.items():
+        assert change[channel] < -least, channel
+    for channel, most in kept.items():
+        assert abs(change[channel]) < most, channel
+
+
+def test_worn_engines_turn_faster_for_the_same_thrust_by_the_law_of_the_throttle(calm, run_with):
+    run = run_with("both engines")
+    throttle = (np.array([calm[-1, LEFT], run[-1, LEFT]]) - 30) / 70
+    # thrust is an idle part, which is small, and a part with the square of the throttle
+    assert throttle[1] / throttle[0] == pytest.approx(1 / np.sqrt(1 - 0.3), rel=0.03)
+
+
+@pytest.mark.parametrize("kind", sorted(SIZES))
+def test_the_point_mass_expresses_the_faults_that_it_says(level, kind):
+    for simulator in ("wrong physics", "missing state"):
+        nominal, faulty = (AIRCRAFT.run_coarse(simulator, level, [fault])[0] for fault in (None, Fault(kind, 1.0)))
+        assert AIRCRAFT.can_simulate(simulator, kind) == bool(np.any(nominal != faulty))
+        np.testing.assert_array_equal(nominal[:ONSET], faulty[:ONSET])
+    assert AIRCRAFT.can_simulate("off 30 %", kind)
+
+
+def test_lags_of_the_point_mass_have_their_closed_form(level):
+    commands = level.copy()
+    commands[100:, 1] = 275
+    run = AIRCRAFT.run_coarse("wrong physics", commands)[0]
+    seconds = np.arange(UNIT_SAMPLES - 100)
+    expected = 275 - 15 * np.exp(-seconds / aircraft_point_mass.Constants().speed_s)
+    np.testing.assert_allclose(run[100:, AIRSPEED], expected, atol=1e-3)
+    commands = level.copy()
+    commands[100:, 0] = 16_000  # so far above that the climb rate stays at its limit for a minute
+    limit, lag_s = 60 * aircraft_point_mass.MOST_CLIMB, aircraft_point_mass.Constants().climb_s
+    climb = AIRCRAFT.run_coarse("wrong physics", commands)[0][100:160, CLIMB]
+    np.testing.assert_allclose(climb, limit * (1 - np.exp(-np.arange(60) / lag_s)), rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(AIRCRAFT.run_coarse("missing state", commands)[0][101:160, CLIMB], limit, rtol=1e-6)
+
+
+def test_pitch_of_the_point_mass_in_level_flight_by_hand(level):
+    lift = 141_000 / (0.5 * 0.0023769 * (260 * 1.6878) ** 2 * 1_317)  # lift coefficient
+    by_hand = np.rad2deg(lift / (2 * np.pi * 9.4 / 11.4)) - 2
+    np.testing.assert_allclose(AIRCRAFT.run_coarse("wrong physics", level)[0][:, PITCH], by_hand, rtol=1e-5)
+
+
+def test_commands_stay_within_their_limits_and_step_every_90_seconds():
+    commands = AIRCRAFT.draw_commands(40, np.random.default_rng(0))
+    assert commands.shape == (40 * UNIT_SAMPLES, 2)
+    for column, low, high, largest in ((0, 8_000, 16_000, 1_600), (1, 230, 290, 21)):
+        values = commands[:, column].reshape(40, UNIT_SAMPLES)
+        steps = np.abs(np.diff(values, axis=1))
+        assert low <= values.min() and values.max() <= high and steps.max() <= largest
+        assert UNIT_SAMPLES / np.count_nonzero(steps, axis=1).mean() == pytest.approx(90, rel=0.15)
+    np.testing.assert_array_equal(commands, AIRCRAFT.draw_commands(40, np.random.default_rng(0)))
+
+
+def test_sensors_have_their_noise_and_resolution():
+    values = np.random.default_rng(0).uniform(100, 200, (50_000, 6))
+    telemetry = AIRCRAFT.measure(values, np.random.default_rng(1), scale=2.0).astype(float)
+    rounding = np.array(RESOLUTION) / np.sqrt(12)
+    np.testing.assert_allclose((telemetry - values).std(0), np.hypot(2 * np.array(NOISE_SD), rounding), rtol=0.02)
+    np.testing.assert_allclose(telemetry / RESOLUTION, np.rint(telemetry / RESOLUTION), atol=1e-3)
+    without = AIRCRAFT.measure(values, np.random.default_rng(1), scale=0.0)
+    assert np.all(np.abs(without - values) <= np.array(RESOLUTION) / 2 + 1e-4)
+
+
+def test_faults_are_all_kinds_at_all_severities_and_grow_with_them():
+    assert len(set(ALL)) == len(SIZES) * len(SEVERITIES) and AIRCRAFT.faults == ALL
+    for fault in ALL:
+        sizes = sizes_over_flight(fault)
+        assert sizes[fault.kind][-1] == pytest.approx(fault.size) and not any(values[:ONSET].any() for values in sizes.values())
+        assert [kind for kind, values in sizes.items() if values.any()] == [fault.kind]
+    assert all(list(sizes) == sorted(sizes) for sizes in SIZES.values())
+
+
+def test_errors_are_one_line(monkeypatch, jsbsim, level):
+    with pytest.raises(InputError, match=r"\(600, 2\)"):
+        AIRCRAFT.run_real(level[:600])
+    with pytest.raises(InputError, match="60 kt"):
+        AIRCRAFT.run_real(np.tile([12_000.0, 60.0], (UNIT_SAMPLES, 1)))
+    monkeypatch.setitem(sys.modules, "jsbsim", None)
+    aircraft_flight._jsbsim.cache_clear()
+    with pytest.raises(InputError, match="enhsim_tf\\[aircraft\\]"):
+        aircraft_flight.check_installed()
+
+
+def test_the_recorded_pair_is_small_and_its_fault_parts_the_engines():
+    tables = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("telemetry", "simulator", "telemetry_fault", "simulator_fault")}
+    assert sum((FOLDER / f"{name}.csv").stat().st_size for name in tables) < 1_000_000
+    assert tuple(read_source(FOLDER / "telemetry.csv")) == AIRCRAFT.channels
+    for suffix, flights in (("", example.NUM_FLIGHTS), ("_fault", 1)):
+        telemetry, simulator = tables[f"telemetry{suffix}"], tables[f"simulator{suffix}"]
+        assert len(telemetry) == flights * UNIT_SAMPLES and not telemetry.isna().any().any()
+        assert telemetry["time"].equals(simulator["time"]) and simulator["N1 left"].equals(simulator["N1 right"])
+    difference = tables["telemetry_fault"]["N1 right"] - tables["telemetry_fault"]["N1 left"]
+    throttle = (tables["telemetry_fault"]["N1 right"] - 30)[LATE].mean()
+    assert abs(difference[:ONSET].mean()) < 0.05
+    assert difference[LATE].mean() == pytest.approx(example.FAULT.size * throttle, rel=0.05)
+
+
+def test_the_example_is_written_again_as_it_is(jsbsim, tmp_path):
+    example.write_example(tmp_path, num_flights=1)
+    for name in ("simulator", "telemetry_fault", "simulator_fault"):
+        table, shipped = pd.read_csv(tmp_path / f"{name}.csv"), pd.read_csv(FOLDER / f"{name}.csv")[:UNIT_SAMPLES]
+        assert list(table) == list(shipped)
+        assert np.mean(table.to_numpy() == shipped.to_numpy()) > 0.99  # another processor may round a few values to the next step

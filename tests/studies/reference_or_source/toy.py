@@ -1,0 +1,46 @@
+"""A system whose truth is known in closed form: two channels that follow a command, one twice as strongly in reality as in the simulator."""
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Offset:
+    kind: str
+    severity: float
+
+
+class Toy:
+    name, channels, interval_s = "toy", ("first", "second"), 1.0
+    unit, unit_samples, window, onset = "day", 200, 20, 50
+    simulators = {"own": 2.0, "wrong physics": 1.0}
+    faults = (Offset("offset", 0.5), Offset("offset", 1.0), Offset("silence", 1.0))
+    parameters, first_values = ("gain",), np.array([1.0])
+    steps, bounds = np.array([0.5]), ((-10.0,), (10.0,))
+    sd = 0.1
+
+    def draw_commands(self, num_units, rng):
+        return np.repeat(rng.standard_normal((num_units * self.unit_samples // 10, 1)), 10, axis=0)
+
+    def _faulty(self, values, fault):
+        values = values.copy()
+        inside = np.arange(len(values)) % self.unit_samples >= self.onset
+        if fault is not None and fault.kind == "offset":
+            values[inside, 0] += fault.severity
+        return values.astype(np.float32)
+
+    def run_real(self, commands, faults=(None,), rng=None):
+        return [self._faulty(np.concatenate([2 * commands, -commands], axis=1), fault) for fault in faults]
+
+    def run_coarse(self, simulator, commands, faults=(None,), values=None):
+        gain = self.simulators[simulator] if values is None else values[0]
+        clean = np.concatenate([gain * commands, -commands], axis=1)
+        return [np.concatenate([self._faulty(clean, fault), commands.astype(np.float32)], axis=1) for fault in faults]
+
+    def can_simulate(self, simulator, kind):
+        return kind == "offset"
+
+    def measure(self, values, rng, scale=1.0):
+        common = rng.standard_normal((len(values), 1))  # noise that the channels share
+        return (values + scale * self.sd * common).astype(np.float32)
