@@ -227,7 +227,13 @@ def build_slides(out: Path) -> None:
     deck = jupytext.read(FOLDER / "slides.py", fmt="py:percent")
     for cell in deck.cells:
         cell.source = IMAGE.sub(embed, cell.source)
-    exporter = SlidesExporter(reveal_theme="white", reveal_transition="none", reveal_number="c/t")
+    exporter = SlidesExporter(
+        reveal_theme="white",
+        reveal_transition="none",
+        reveal_number="c/t",
+        reveal_width="1280",
+        reveal_height="720",
+    )
     page, _ = exporter.from_notebook_node(
         deck, {"metadata": {"name": "From a coarse simulation to telemetry"}}
     )
