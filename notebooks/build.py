@@ -44,7 +44,7 @@ if not importlib.util.find_spec("lesson_tools"):
         subprocess.run(install, check=True)
     os.chdir("lessons/notebooks")
     sys.path.insert(0, os.getcwd())"""
-IMAGE = re.compile(r"!\[(.*?)\]\((.*?)\)")
+IMAGE = re.compile(r'(<img [^>]*src=)"(.*?)"')  # in a page
 TIMEOUT_S = 1_800  # for one cell: in a fresh clone it trains
 
 
@@ -214,7 +214,7 @@ def build_slides(out: Path) -> None:
     from nbconvert import SlidesExporter
 
     def embed(match: re.Match) -> str:
-        alt, name = match.groups()
+        begin, name = match.groups()
         path, _, number = name.partition("#")
         if number:
             cells = nbformat.read(FOLDER / path, as_version=4).cells
@@ -222,11 +222,9 @@ def build_slides(out: Path) -> None:
             png = [each["image/png"] for each in data if "image/png" in each][int(number) - 1]
         else:
             png = base64.b64encode((FOLDER / path).read_bytes()).decode()
-        return f'<img alt="{alt}" src="data:image/png;base64,{png}">'
+        return f'{begin}"data:image/png;base64,{png}"'
 
     deck = jupytext.read(FOLDER / "slides.py", fmt="py:percent")
-    for cell in deck.cells:
-        cell.source = IMAGE.sub(embed, cell.source)
     exporter = SlidesExporter(
         reveal_theme="white",
         reveal_transition="none",
@@ -238,7 +236,7 @@ def build_slides(out: Path) -> None:
         deck, {"metadata": {"name": "From a coarse simulation to telemetry"}}
     )
     with replace_file(out) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(IMAGE.sub(embed, page), encoding="utf-8")
 
 
 def main(arguments: list[str] | None = None) -> int:
