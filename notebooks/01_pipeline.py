@@ -1,7 +1,7 @@
 # %% [markdown]
 # # The pipeline (Figure 1)
 #
-# **Question:** how do a crude simulator and two networks become realistic telemetry, also for faults that nobody has recorded?
+# **Question:** how do a crude simulator and two networks become realistic telemetry, and what do they take for granted about noise?
 #
 # - **After this lesson** you can name the nine steps of the paper, compute a window of telemetry step by step, and say what the pipeline
 #   assumes about noise.
@@ -84,6 +84,9 @@ assert difference < 1e-5
 # %% [markdown]
 # `python -m enhsim_tf.reproduce --telemetry my.csv` runs these steps on telemetry of your own. The tool (`python -m enhsim_tf fit my.csv`)
 # has a simulator with more choices: it fits the coarse simulator, and chooses the enhancer and the noise model by held-out telemetry.
+#
+# **Answer.** One network turns square waves into a waveform, another turns random numbers into noise, and the two are added. This takes for
+# granted that noise does not depend on the signal. Whether the waveform of a fault is right is the question of notebook 23.
 #
 # ## Exercises
 #

@@ -136,6 +136,9 @@ assert distinct == 480
 # However much telemetry is recorded, the enhancer only ever sees these inputs. "Held out" in this example means other noise and other
 # times, not other inputs. A real channel, whose period is no whole number of samples, is harder.
 #
+# **Answer.** The simulator knows *when* the signal changes its sign, and nothing of its shape: its error is 0.67 standard deviations of the
+# signal.
+#
 # ## Exercises
 #
 # **1.** What is the smallest NRMSE that a square wave of the right period can have for a sine? Give a formula or a number with three

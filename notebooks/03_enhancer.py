@@ -61,7 +61,7 @@ assert 0.74 < max(by_hand) / sum(by_hand) < 0.76
 # needed. Only the order of the windows is drawn by hand, so that the numbers can be compared with those of the package; Keras' own
 # shuffling would do as well.
 #
-# One epoch takes some seconds. Set `num_epochs = 40` to train as long as the paper.
+# Set `num_epochs = 40` to train as long as the paper.
 
 # %%
 from enhsim_tf.paper.enhancer import build_enhancer
@@ -139,9 +139,9 @@ with drawing(alt, height=2.3, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the held-out loss stays above the dotted line and hardly falls after the first few epochs. In the later epochs the
-# training loss is lower, because a network with 13.7 million parameters learns some of the noise of the windows that it sees 40 times by
-# heart. What lies between the two curves is this memory.
+# *What to see:* the held-out loss stays above the dotted line and hardly falls after the first few epochs. In the later epochs the training
+# loss is lower, because a network with 13.7 million parameters learns some of the noise of the windows that it sees 40 times by heart. What
+# lies between the two curves is this memory.
 
 # %%
 say(
@@ -151,6 +151,9 @@ assert variance * 0.9 < history["val_loss"][-1] < variance * {"full": 1.3, "smok
 assert budget == "smoke" or history["loss"][-1] < history["val_loss"][-1]
 
 # %% [markdown]
+# **Answer.** Noise cannot be predicted from the coarse window, so the waveform without noise has the smallest loss. The network comes near
+# it, and learns some of the noise of its training windows by heart.
+#
 # ## Exercises
 #
 # **1.** How many parameters has the enhancer for a window of $w$ samples? Complete the function.

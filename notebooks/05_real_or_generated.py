@@ -210,8 +210,8 @@ check_answer(
 # print(f"{names[best]}: AUC {best_auc:.2f}")
 # ```
 #
-# At full budget a single feature is enough: the power in a band of low frequencies. The 2-minute wave lies there, of which the moving
-# average leaves a little in the real noise (notebook 08), in every window the same amount. The generator misses it.
+# Which frequencies does the best feature describe? The moving average leaves a little of the 2-minute wave in real noise (notebook 08), and
+# notebook 21 looks for it in generated noise.
 #
 # </details>
 
@@ -223,7 +223,7 @@ check_answer(
 # print(needed)
 # ```
 #
-# About $n/2+0.8\sqrt{n}$. For eight windows in groups of four, all must be right. The eye's failure on eight windows says little about it,
-# and its success would too.
+# About $n/2+1/2+0.82\sqrt{n}$, rounded up. For eight windows in groups of four, all must be right. The eye's failure on eight windows says
+# little about it, and its success would too.
 #
 # </details>

@@ -189,6 +189,9 @@ say(f"Lag 1: **{measured[0]:.3f}** measured, **{closed_form[0]:.3f}** computed."
 assert np.abs(measured - closed_form).max() < 0.02
 
 # %% [markdown]
+# **Answer.** Subtract a moving average. What is left has nearly the right standard deviation, but 7 % of the 2-minute wave stay in it, and
+# near samples become negatively correlated.
+#
 # ## Exercises
 #
 # **1.** For which odd width from 3 to 121 is the standard deviation of the extracted noise closest to the one that was put in? Is the

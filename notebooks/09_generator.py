@@ -183,8 +183,8 @@ assert beyond["generated, before the tanh"] < 1e-9 and beyond["real noise"] > 0.
 assert rank(generated) < rank(real) / 2
 
 # %% [markdown]
-# For a detector that looks at the residual outside the main dimensions, this difference decides, as notebook 13 shows: the residual
-# outside the main dimensions is exactly what many detectors look at.
+# **Answer.** Sixteen numbers and 64 neurons write every window as a sum of 64 shapes, so that generated windows differ from each other in
+# few dimensions, and real ones in all. Many detectors look at just that: what lies outside the main dimensions (notebook 13).
 #
 # ## Exercises
 #
@@ -266,8 +266,7 @@ check_answer(
 #     print(sizes, f"effective rank {rank_of_untrained(*sizes):.0f}")
 # ```
 #
-# Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it. Only
-# both together reach more than half of the rank of real noise, and training still decides how much of that rank is reached. A generator
-# that gets a random number for *every sample* and works along time does not have the problem at all.
+# Both are bottlenecks: a longer latent vector helps until the 64 neurons limit it, and more neurons help until 16 numbers limit it. Compare
+# the numbers with the rank of real noise above. Training then decides how much of its rank a generator uses.
 #
 # </details>

@@ -43,7 +43,7 @@ show(pipeline, "fig11_gan_training")
 # %% [markdown]
 # ## The classic pattern
 #
-# A small pair of networks and the real noise, so that sixty iterations take seconds.
+# A small pair of networks, the real noise, and sixty iterations.
 
 
 # %%
@@ -195,6 +195,9 @@ say(
 assert classic_last > classic_first and named_last < named_first / 2
 
 # %% [markdown]
+# **Answer.** Keras 3 reads `trainable` when the training step is built, which is after the freeze. Nobody notices, because the loss moves
+# all the same: the generator learns.
+#
 # ## Exercises
 #
 # **1.** Keras 3 reads `trainable` when the training step is *built*. Rescue the classic pattern: change one line of the function, or add

@@ -259,9 +259,9 @@ assert found["truth"] == 1 and limits["coarse"] > 0.9
 assert not is_full or (found["coarse"] < 0.02 and limits["enhanced + GAN"] < 0.05)
 
 # %% [markdown]
-# The limit check turns the order round. Square waves never leave their levels, and real noise always does: the coarse arm alarms on every
-# window. With the GAN's noise it hardly alarms, because that noise has the right values. So the false alarms of one detector say little
-# about a simulation.
+# The limit check judges the arms otherwise. Square waves never leave their levels, and real noise always does: the coarse arm alarms on
+# every window. With the GAN's noise, whose values are nearly right (notebook 21), it hardly alarms. So the false alarms of one detector say
+# little about a simulation.
 #
 # ## All of it at once
 #
@@ -305,8 +305,8 @@ _ = verdict(pipeline, "C8")
 
 # %% [markdown]
 # The noise of the training windows decides the false alarms. Its scale must be right to a few per cent, but that is not enough: with the
-# same scale, noise of few directions or of another kind sets another threshold. Noise that is drawn from real residuals is right in all of
-# this.
+# same scale, noise of few directions or of another kind sets another threshold. Noise that is drawn from real residuals sets a threshold
+# that is right in all of these cases; but its detector finds fewer ramps than the one that was trained on real windows.
 #
 # ## Exercises
 #

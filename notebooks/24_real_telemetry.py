@@ -368,11 +368,12 @@ with drawing(alt, 5, 1.9, title, sharey=True) as panels:
     panels[0].set_ylabel("value (dimensionless)")
 
 # %% [markdown]
-# *What to see:* black is telemetry, dashed blue the aligned simulator, and grey the anomaly. Wrong shapes and clocks leave a large rest.
-# A spike is one sample of 194, whose square counts little in the mean over the window; the largest step misses none. A swell is seen
-# mostly at its edges: between them, the gain takes it up, which is what the gain is for, and the moving deviation sees it. No score sees
-# everything, and where a score of one line wins, it costs nothing. With a long past, the PCA residual is as good as the aligned
-# simulator: what the simulator brings here is that ten windows are enough.
+# *What to see:* black is telemetry, dashed blue the aligned simulator, and grey the anomaly. Wrong shapes and clocks leave a large rest. A
+# spike is one sample of 194, whose square counts little in the mean over the window; the largest step misses none. A swell is seen mostly
+# at its edges: between them, the gain takes it up, which is what the gain is for, and the moving deviation sees it. No score sees
+# everything, and where a score of one line wins, it costs nothing. With a long past, the PCA residual is as good as the aligned simulator:
+# what the simulator brings here is that ten windows are enough. All of this is one draw of noise and anomalies: a difference of one find
+# means nothing.
 
 # %%
 plateau = np.zeros(len(starts), bool)  # windows that lie within the swollen cycles, apart from the edges
@@ -448,6 +449,9 @@ assert max(area["sources"].values()) < min(without) < max(without) < min(area["r
 assert found["num_sequences"] == 8
 
 # %% [markdown]
+# **Answer.** On the spacecraft, the simulator is worth most as a reference: what is left of the telemetry beside it ranks anomalies better
+# than any one-line score does. As a source of training windows, it does worse than the one-line scores.
+#
 # ## Exercises
 #
 # **1.** The residual misses a spike, and the largest step some lost dips. Combine them: divide each score by its matched threshold for

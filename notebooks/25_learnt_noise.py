@@ -299,10 +299,10 @@ with drawing(alt, 2, 2.1, title, sharex=True, sharey=True) as panels:
     panels[0].invert_yaxis()
 
 # %% [markdown]
-# *What to see:* on white noise, the first three bars end near the floor. The network of the study goes a little beyond: two of its
-# components have heavy tails, and so has its noise (its kurtosis is above 3, that of a normal distribution). On bursts, the normal
-# distribution and the autoregression are recognised at once, although their spectrum is right: all of their windows are equally loud. The
-# networks are harder to recognise.
+# *What to see:* on white noise, the first three bars end near the floor. The network of the study goes beyond it; two of its components
+# have heavy tails, and the kurtosis of its noise is above 3, that of a normal distribution. On bursts, the normal distribution and the
+# autoregression are recognised at once, although their spectrum is right: all of their windows are equally loud. The networks are harder to
+# recognise.
 #
 # Residual windows *are* real, and the classifier still recognises some: it has met the same windows in its training. Repeated windows have
 # a lower rank, too. The tool therefore draws no window twice while others are left.
@@ -365,7 +365,7 @@ assert set(rates) - passed["residual windows"] == {"signal_dependent"}
 # %% [markdown]
 # So a network learns from the likelihood alone what an autoregression cannot: here, when the next samples will be loud. That does not make
 # it worth its training. A detector that needs noise like the real noise gets it from real windows, drawn again. What a learnt model has
-# over them is that its windows are new, which counts where real windows are few (exercise 2).
+# over them is that its windows are new; exercise 2 shows what repeated windows lack.
 #
 # ## Exercises
 #
@@ -419,7 +419,6 @@ check_answer(
 # print(f"{drawn_rank:.0f} of {measures.effective_rank(noises['white'][0]):.0f}")
 # ```
 #
-# At most 50: drawing again adds no direction. A model that has learnt the noise makes new windows, which is its worth where windows are
-# few.
+# At most 50: drawing again adds no direction. A model that has learnt the noise makes new windows.
 #
 # </details>

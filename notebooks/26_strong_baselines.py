@@ -113,8 +113,7 @@ assert (
 )
 
 # %% [markdown]
-# The one-line noise wins because its windows *are* real. It can only repeat what it has, though: notebook 28 asks how many windows that
-# takes.
+# The windows of this noise *are* real. It can only repeat what it has, though: notebook 28 asks how many windows that takes.
 #
 # ## Trap 1: a baseline that was not tuned
 #
@@ -368,8 +367,8 @@ with drawing(alt, height=2.4, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* without a square, the network has nothing to find and can only add error. The more of the signal is nonlinear, the further
-# ridge regression falls behind. The nearest windows can follow a curve, too, but need a training window near *every* new one; in a hundred
-# dimensions they seldom have it.
+# ridge regression falls behind. The error of the nearest windows hardly depends on the share: they can follow a curve, too, but are behind
+# the network at every share.
 
 # %%
 for name, values in rows.items():
@@ -513,9 +512,9 @@ for words, name in told.items():
     )
 
 # %% [markdown]
-# So a network pays where the map has a part that no matrix has, *and* enough independent windows show that part. To be fair, give every
-# method the same data; choose every setting, of the baseline too, on training time; set thresholds in the same way; and judge on blocks of
-# time. Then the smaller error is worth believing, whichever method has it.
+# **Answer.** A network pays where the map has a part that no matrix has. (How many windows it needs to learn that part, this lesson does
+# not vary.) To be fair, give every method the same data; choose every setting, of the baseline too, on training time; set thresholds in the
+# same way; and judge on blocks of time. Then the smaller error is worth believing, whichever method has it.
 #
 # ## Exercises
 #

@@ -17,7 +17,7 @@
 
 # %%
 import numpy as np
-from lesson_tools import ROOT, check_answer, drawing, say
+from lesson_tools import ROOT, check_answer, drawing, open_study, say
 
 from enhsim_tf import clean, read_source
 from enhsim_tf.coarse_simulator.recording_files import read_recording
@@ -109,8 +109,7 @@ assert (
 )
 
 # %% [markdown]
-# The other columns nearly halve what the best model of the voltage leaves, and most of that is due to the current: it *causes* the
-# voltage, and the coarse simulator, which is driven by the same current, is wrong about its effect.
+# The other columns nearly halve what the best model of the voltage leaves. Exercise 2 asks which of the two does.
 #
 # ## The same with the package
 #
@@ -176,11 +175,12 @@ assert not outside[~beside].any()
 # ## A detector that knows what should happen
 #
 # Without a fault, telemetry minus enhanced run should be noise. So the detector looks at this residual only: its root mean square in
-# windows, with a conformal threshold from residuals of nominal time. It compares the vehicle with the *nominal* run of the same commands.
+# short windows, with a conformal threshold. Which residuals should set the threshold? Those of time on which ridge regression was fitted
+# are a little too small. *Cross-fitting* repairs this: cut the time into five blocks, fit the enhancer to four of them, without the windows
+# that reach into the fifth, and take the residual of the fifth; and so on.
 
 # %%
-nominal_residual = target - model.enhance_run(run.values)[:, 0]
-later = nominal_residual[int(0.8 * len(target)) :]  # held out from the fit
+from enhsim_tf.enhancer.ridge import time_blocks
 
 
 def scores_of(residual, length=60, stride=10):
@@ -189,68 +189,110 @@ def scores_of(residual, length=60, stride=10):
     return starts, np.sqrt([np.mean(residual[start : start + length] ** 2) for start in starts])
 
 
-_, nominal_scores = scores_of(nominal_residual[: int(0.8 * len(target))])
-rank = int(np.ceil((len(nominal_scores) + 1) * 0.99))
-threshold = np.sort(nominal_scores)[rank - 1]
-_, later_scores = scores_of(later)
-alarming = np.mean(later_scores > threshold)
-say(
-    f"Threshold **{1e3 * threshold:.1f} mV**; false alarms on later nominal telemetry: **{alarming:.1%}** at 1 % set."
-)
+def conformal(scores, rate=0.01):
+    return np.sort(scores)[int(np.ceil((len(scores) + 1) * (1 - rate))) - 1]
+
+
+known = int(0.8 * len(target))  # `fit` held out what comes later
+starts = np.arange(0, known - window + 1, 25)
+columns = np.stack([cut(inputs[name], starts) for name in simulator.columns], axis=2)
+cross_fitted = []
+for learnt, held_out in time_blocks(starts, 5, window):
+    fitted = fit_ridge(columns[learnt], cut(target, starts[learnt]), starts[learnt])
+    apart = held_out[:: window // 25]  # windows that share no sample
+    residuals = cut(target, starts[apart]) - fitted.predict(columns[apart])
+    cross_fitted.append(scores_of(residuals.ravel())[1])
+threshold = conformal(np.concatenate(cross_fitted))
+
+nominal_residual = target - model.enhance_run(run.values)[:, 0]
+fitted_threshold = conformal(scores_of(nominal_residual[:known])[1])
+later = scores_of(nominal_residual[known:])[1]
+for name, limit in {"fitted time": fitted_threshold, "cross-fitting": threshold}.items():
+    print(
+        f"threshold by {name:14} {1e3 * limit:4.1f} mV, false alarms on later time {np.mean(later > limit):.1%}"
+    )
+assert np.mean(later > threshold) <= np.mean(later > fitted_threshold)
 
 # %% [markdown]
-# The rate on later time is above the one that was set: the residuals that set the threshold come from time on which ridge regression was
-# fitted, so they are a little too small, and neighbouring windows are not independent. `score --coarse` trains its detector on generated
-# noise, which is learnt from residuals of blocks that the enhancer had not seen, and takes the larger of two thresholds: that of generated
-# noise, and that of the nominal residual.
+# Only the threshold by cross-fitting keeps about the rate that it was set for.
 #
-# What does the detector see of the fault, if the vehicle has it and the simulator is run without it? The battery's fault run has other
-# orbits than the nominal one, so the run of the same commands *with* the fault stands in: the difference between telemetry and enhanced
-# fault run shows what simulation cannot explain even when it knows the fault, and the difference from the coarse fault run what the
-# enhancer is worth.
+# What does the detector see of the fault? The vehicle has it, and the simulator does not know: `simulator_planned.csv` is the coarse run of
+# the same commands without the fault.
 
 # %%
-places, with_enhancer = scores_of(measured - enhanced)
-_, without = scores_of(measured - coarse)
+plan = read_recording(folder / "simulator_planned.csv", model.alignment.columns, interval_s=model.interval_s)
+(planned,) = model.alignment.usable(plan).parts
+reference = {
+    "coarse run": planned.values[:, model.alignment.columns.index("volts")],
+    "enhanced run": model.enhance_run(planned.values)[:, 0],
+}
+own = {
+    "coarse run": conformal(scores_of(target[:known] - inputs["volts"][:known])[1]),
+    "enhanced run": threshold,
+}
+places = scores_of(measured)[0]
+scores = {name: scores_of(measured - values)[1] for name, values in reference.items()}
 in_fault = np.array([labels[start : start + 60].all() for start in places])
+before = np.array([not labels[start : start + 60].any() for start in places])
 alarms = {
-    name: (np.mean(each[~in_fault] > threshold), np.mean(each[in_fault] > threshold))
-    for name, each in (("coarse", without), ("enhanced", with_enhancer))
+    name: (np.mean(each[before] > own[name]), np.mean(each[in_fault] > own[name]))
+    for name, each in scores.items()
 }
 with drawing(
-    "Root mean square of the residual over the fault run, for the enhanced and the coarse run, with the threshold",
+    "Root mean square of the residual over the run with the fault, beside the enhanced and the coarse planned run",
     height=2.3,
-    title=f"Outside the fault, {alarms['coarse'][0]:.0%} of windows alarm against the coarse run and "
-    f"{alarms['enhanced'][0]:.0%} against the enhanced run",
+    title=f"The enhanced planned run finds {alarms['enhanced run'][1]:.0%} of the fault's windows, the coarse one "
+    f"{alarms['coarse run'][1]:.0%}",
 ) as panel:
     time_h = (places + 30) * model.interval_s / 3_600
-    panel.plot(time_h, 1e3 * without, color=COARSE, linestyle=DASHED, label="telemetry minus coarse run")
-    panel.plot(time_h, 1e3 * with_enhancer, color=ENHANCED, label="telemetry minus enhanced run")
-    panel.axhline(1e3 * threshold, color=REAL, linestyle=":", label="threshold")
-    panel.fill_between(
-        time_h,
-        0,
-        1,
-        where=in_fault,
-        transform=panel.get_xaxis_transform(),
-        color=QUIET,
-        alpha=0.2,
-        label="fault",
+    for name, color, style in (("coarse run", COARSE, DASHED), ("enhanced run", ENHANCED, "-")):
+        panel.plot(time_h, 1e3 * scores[name], color=color, linestyle=style, label=f"telemetry minus {name}")
+        panel.axhline(1e3 * own[name], color=color, linestyle=":", linewidth=0.9)
+    shade = {"transform": panel.get_xaxis_transform(), "color": QUIET, "alpha": 0.2, "label": "fault"}
+    panel.fill_between(time_h, 0, 1, where=in_fault, **shade)
+    panel.set(
+        xlabel="time (h; dotted: the threshold of each)", ylabel="rms of the residual (mV)", yscale="log"
     )
-    panel.set(xlabel="time (h)", ylabel="rms of the residual (mV)", yscale="log")
     panel.minorticks_off()
-    panel.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
-    panel.legend(frameon=False, ncols=4, loc="upper left", bbox_to_anchor=(0, 1.2))
-told = [
-    f"{name} **{outside_it:.0%}** and **{inside_it:.0%}**" for name, (outside_it, inside_it) in alarms.items()
-]
+    panel.set_yticks([5, 10, 20, 50, 100], ["5", "10", "20", "50", "100"])
+    panel.legend(frameon=False, ncols=3, loc="upper left", bbox_to_anchor=(0, 1.2))
 say(
-    f"Windows above the threshold, outside and inside the fault: {'; '.join(told)}. Outside the fault, the threshold was set for 1 %: "
-    "a threshold from one run does not carry over to a run with other orbits."
+    "Windows that raise an alarm before and during the fault: "
+    + "; ".join(
+        f"{name} **{first_part:.0%}** and **{second:.0%}**" for name, (first_part, second) in alarms.items()
+    )
+    + "."
 )
-assert alarms["coarse"][0] > 0.9 and alarms["enhanced"][0] < alarms["enhanced"][1]
+assert alarms["enhanced run"][1] > alarms["coarse run"][1]
 
 # %% [markdown]
+# ## What the study found
+#
+# This is one fault at its full severity, in one run. The [battery study](../studies/battery/README.md) has five faults at five severities,
+# with ten seeds. It uses the same simulator in two ways: as a *reference*, as here, and as a *source* of windows that detectors learn from.
+
+# %%
+uses = open_study("battery")[0]["regimes"]["gentle"]["uses"]
+for name in (
+    "reference: enhanced run",
+    "reference: coarse run",
+    "enhanced + residual windows",
+    "real, 120 orbits",
+):
+    about = uses[name]
+    print(
+        f"{name:30} fault windows found {about['recall']['mean']:6.1%}   false alarms {about['false_alarms']['mean']:.2%}"
+    )
+assert (
+    uses["reference: enhanced run"]["recall"]["mean"]
+    > 3 * uses["enhanced + residual windows"]["recall"]["mean"]
+)
+
+# %% [markdown]
+# **Answer.** Pair the files, let the enhancer learn the difference on nominal time, run the simulator beside the telemetry, and watch what
+# is left. As a reference, the enhanced simulator finds several times as many fault windows as detectors do that learn from what it
+# generates.
+#
 # ## Exercises
 #
 # **1.** Delay the simulator's run by 7 samples against the telemetry, and let the package find the delay. Complete the call: which sign
@@ -260,16 +302,14 @@ assert alarms["coarse"][0] > 0.9 and alarms["enhanced"][0] < alarms["enhanced"][
 from enhsim_tf.coarse_simulator.pairing import estimate_delay  # noqa: F401  for your answer
 
 shifted = telemetry.part(7, len(telemetry))  # telemetry without its first seven samples...
-shifted = type(shifted)(
-    shifted.values, shifted.interval_s, start=telemetry.start
-)  # ...on the old clock: everything happens 70 s earlier
+shifted = type(shifted)(shifted.values, shifted.interval_s, start=telemetry.start)  # ...on the old clock
 delay_s = None  # your answer, with estimate_delay([shifted], simulator, window)
 
 # %%
 check_answer(
     delay_s,
-    lambda answer: answer == -70.0,
-    "Negative: the telemetry is earlier than the run. The field is called seconds.",
+    lambda answer: answer == estimate_delay([shifted], simulator, window).seconds,
+    "Everything happens earlier in the telemetry now. The field is called seconds.",
 )
 
 # %% [markdown]
@@ -311,6 +351,7 @@ check_answer(
 # ratio = nrmse(fit_ridge_by_hand(["volts", "amperes"], 10.0)(last), cut(target, last)) / errors["ridge, all columns"]
 # ```
 #
-# In this gentle regime the temperature adds little. In the hard regime of the study, with a cold cell, it adds more.
+# A ratio near 1 means that the temperature adds little, and the current is what helps. In the study, over ten seeds, both regimes say the
+# same: 0.042 and 0.039 in the gentle one, 0.073 and 0.070 in the hard one.
 #
 # </details>

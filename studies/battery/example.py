@@ -6,6 +6,7 @@ The files need no PyBaMM to be read. Times count seconds.
     simulator.csv        the coarse simulator over the same orbits: voltage, current and temperature
     simulator_fault.csv  the coarse simulator over other orbits: a nominal orbit, then raised resistance, with its labels
     telemetry_fault.csv  the telemetry of those orbits
+    simulator_planned.csv  the coarse simulator over those orbits without the fault: what should have happened
 """
 
 import sys
@@ -26,7 +27,7 @@ _DIGITS = tuple(zip(COLUMNS, (4, 3, 2), strict=True))
 
 
 def write_example(folder: Path, seed: int = SEED, num_orbits: int = NUM_ORBITS, num_fault_orbits: int = NUM_FAULT_ORBITS) -> None:
-    """Simulates the pair in the gentle regime and writes its four files.
+    """Simulates the pair in the gentle regime and writes its five files.
 
     Args:
         folder: The output folder, which is created.
@@ -39,25 +40,29 @@ def write_example(folder: Path, seed: int = SEED, num_orbits: int = NUM_ORBITS, 
     """
     import pandas as pd
 
+    def in_columns(times: np.ndarray, values: np.ndarray) -> pd.DataFrame:
+        columns = {name: [f"{value:.{digits}f}" for value in column] for (name, digits), column in zip(_DIGITS, values.T, strict=True)}
+        return pd.DataFrame({"time": times} | columns)
+
     folder, regime = make_folder(folder), REGIMES["gentle"]
     loads, noise = np.random.default_rng([seed, 0]), np.random.default_rng([seed, 1])
     for number, fault, suffix in ((num_orbits, None, ""), (num_fault_orbits, FAULT, "_fault")):
         load = draw_load(number + 1, regime, loads)  # in the first orbit, which is left out, the battery reaches its usual temperature
-        runs = simulate_all(load, regime, [fault], onset=2 * ORBIT_SAMPLES)[0]
+        *planned, runs = simulate_all(load, regime, [fault] if fault is None else [None, fault], onset=2 * ORBIT_SAMPLES)
         coarse, fine = (run.values[ORBIT_SAMPLES:] for run in runs)
         times = np.arange(len(coarse)) * int(INTERVAL_S)
-        simulator = pd.DataFrame(
-            {name: [f"{value:.{digits}f}" for value in column] for (name, digits), column in zip(_DIGITS, coarse.T, strict=True)}
-        )
-        simulator.insert(0, "time", times)
+        simulator = in_columns(times, coarse)
+        tables = {}
         if fault is not None:
+            tables["simulator_planned"] = in_columns(times, planned[0][0].values[ORBIT_SAMPLES:])
             is_faulty = times >= ORBIT_SAMPLES * INTERVAL_S
             simulator["scenario"] = np.where(is_faulty, fault.kind, "nominal")
             simulator["severity"], simulator["mask"] = np.where(is_faulty, fault.severity, 0.0), is_faulty.astype(int)
         volts = measure(fine[:, 0], SENSOR_NOISE_V, SENSOR_STEP_V, noise)
         telemetry = pd.DataFrame({"time": times, "volts": [f"{value:.4f}" for value in volts]})
-        for name, table in (("telemetry", telemetry), ("simulator", simulator)):
-            with replace_file(folder / f"{name}{suffix}.csv") as temporary:
+        tables |= {f"telemetry{suffix}": telemetry, f"simulator{suffix}": simulator}
+        for name, table in tables.items():
+            with replace_file(folder / f"{name}.csv") as temporary:
                 table.to_csv(temporary, index=False, lineterminator="\n")
 
 

@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 
 import nbformat
 import pytest
@@ -109,6 +111,72 @@ def test_a_check_without_a_solution_is_refused():
         build.solve(notebook)
 
 
+# -- for students, and outside a clone ---------------------------------------------------------------------------------------
+
+ADDRESS = "https://github.com/someone/something"
+
+
+@each_lesson
+def test_a_lesson_for_students_has_every_check_and_no_solution(source):
+    notebook = build.keep_outputs(source)
+    checks = [cell.source for cell in notebook.cells if build.CHECK in cell.source]
+    solutions = [code for cell in notebook.cells for code in build.SOLUTION.findall(cell.source)]
+    build.drop_solutions(notebook)
+    left = "\n".join(cell.source for cell in notebook.cells)
+    assert solutions and not any(code in left for code in solutions)
+    assert [cell.source for cell in notebook.cells if build.CHECK in cell.source] == checks
+
+
+def test_outputs_are_kept_only_if_no_code_has_changed(tiny):
+    notebook = nbformat.read(tiny.with_suffix(".ipynb"), as_version=4)
+    notebook.cells[1].outputs = [nbformat.v4.new_output("stream", text="seen")]
+    nbformat.write(notebook, tiny.with_suffix(".ipynb"))
+    tiny.write_text(tiny.read_text(encoding="utf-8").replace("Tiny", "Small"), encoding="utf-8")
+    kept = build.keep_outputs(tiny)
+    assert kept.cells[0].source == "# Small" and kept.cells[1].outputs[0].text == "seen"
+    nbformat.write(kept, tiny.with_suffix(".ipynb"))
+    assert build.faults(tiny) == []
+    tiny.write_text(tiny.read_text(encoding="utf-8").replace("battery", "factorial"), encoding="utf-8")
+    with pytest.raises(ValueError, match="99_tiny"):
+        build.keep_outputs(tiny)
+
+
+def test_badges_and_set_up_are_there_with_an_address_and_not_without(tiny, monkeypatch):
+    monkeypatch.setattr(build, "published_at", lambda: None)
+    without = build.keep_outputs(tiny)
+    monkeypatch.setattr(build, "published_at", lambda: ADDRESS)
+    published = build.keep_outputs(tiny)
+    assert [cell.source for cell in without.cells] == ["# Tiny", 'open_study("battery")']
+    title, set_up, code = (cell.source for cell in published.cells)
+    assert "colab.research.google.com/github/someone/something/blob/main/notebooks/99_tiny.ipynb" in title
+    assert "mybinder.org/v2/gh/someone/something/main" in title
+    assert ADDRESS in set_up and code == without.cells[1].source
+    nbformat.write(published, tiny.with_suffix(".ipynb"))
+    assert build.faults(tiny) == []
+
+
+def test_the_set_up_fetches_a_clone_and_starts_in_its_lessons(tmp_path):
+    clone, elsewhere = tmp_path / "origin", tmp_path / "elsewhere"
+    (clone / "notebooks").mkdir(parents=True)
+    elsewhere.mkdir()
+    (clone / "notebooks" / "lesson_tools.py").write_text("found = True\n")
+    (clone / "requirements.txt").write_text("")
+    for command in (["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-q", "-m", "first"]):
+        subprocess.run(["git", *command], cwd=clone, check=True)
+    code = build.SET_UP_CODE.format(address=clone.as_uri())
+    twice = f"{code}\nimport lesson_tools\n{code}\nprint(lesson_tools.found, os.path.basename(os.getcwd()))"
+    for _ in range(2):  # a kernel that starts again finds the clone there
+        done = subprocess.run([sys.executable, "-c", twice], cwd=elsewhere, check=True, capture_output=True, text=True)
+        assert done.stdout.strip().endswith("True notebooks")
+
+
+def test_slides_hold_their_pictures(tmp_path):
+    build.build_slides(tmp_path / "slides.html")
+    page = (tmp_path / "slides.html").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[", (build.FOLDER / "slides.py").read_text(encoding="utf-8"))
+    assert page.count('src="data:image/png;base64,') == len(shown) > 10
+
+
 # -- what they hold ----------------------------------------------------------------------------------------------------------
 
 
@@ -119,6 +187,16 @@ def test_what_a_lesson_tells_to_see_is_asserted(source):
         if "*What to see:*" in cell.source:
             following = "\n".join(cell.source for cell in cells[number + 1 : number + 3] if cell.cell_type == "code")
             assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(following))), cell.source
+
+
+def test_a_claim_has_the_same_numbers_in_every_lesson():
+    said = {}
+    for source in SOURCES:
+        for cell in build.code_cells(nbformat.read(source.with_suffix(".ipynb"), as_version=4)):
+            for output in cell.outputs:
+                if found := re.match(r"> \*\*(C\d): ", output.get("data", {}).get("text/markdown", "")):
+                    said.setdefault(found[1], set()).add(output["data"]["text/markdown"])
+    assert len(said) == 9 and all(len(texts) == 1 for texts in said.values())
 
 
 def test_every_figure_and_every_claim_of_the_paper_is_taught():

@@ -12,7 +12,7 @@ from studies.battery import example
 from studies.battery.orbits import CAPACITY_AH, INTERVAL_S, ORBIT_SAMPLES
 
 FOLDER = Path(__file__).parents[3] / "examples" / "battery"
-NAMES = ("telemetry", "simulator", "telemetry_fault", "simulator_fault")
+NAMES = ("telemetry", "simulator", "telemetry_fault", "simulator_fault", "simulator_planned")
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +48,13 @@ def test_the_fault_raises_the_resistance_after_its_first_orbit(pair):
             for rows in ((np.abs(steps) > 0.3) & (table["mask"] == mask) for mask in (0, 1))
         ]
         assert ohms[1] - ohms[0] == pytest.approx(0.032, abs=0.01)
+
+
+def test_the_planned_run_has_the_commands_of_the_run_with_the_fault_and_not_the_fault(pair):
+    planned, faulty = pair["simulator_planned"], pair["simulator_fault"]
+    assert planned[["time", "amperes"]].equals(faulty[["time", "amperes"]])
+    lower = planned["volts"] - faulty["volts"]
+    assert (lower[:ORBIT_SAMPLES] == 0).all() and np.corrcoef(lower[ORBIT_SAMPLES:], planned["amperes"][ORBIT_SAMPLES:])[0, 1] > 0.9
 
 
 def test_a_linear_map_with_the_current_halves_the_error_of_the_simulator(pair):
