@@ -15,7 +15,8 @@ RESULTS = PUBLISHED / "reference_or_source" / "results"
 def test_recall_is_the_mean_over_kinds_and_seeds_and_false_alarms_are_those_of_nominal_windows():
     about = {"axis": "main", "level": "", "simulator": "wrong physics", "units": 20, "error": 0.1, "coarse_error": 0.4, "system": "battery"}
     rows = [
-        about | {"use": "reference", "detector": detector, "seed": seed, "kind": kind, "severity": severity, "alarms": alarms, "events": events}
+        about
+        | {"use": "reference", "detector": detector, "seed": seed, "kind": kind, "severity": severity, "alarms": alarms, "events": events}
         for detector, factor in (("joint size", 1.0), ("size", 0.5))
         for seed in (1, 2)
         for kind, severity, alarms, events in (
