@@ -273,7 +273,7 @@ MILLION = 10**6
 
 
 MEMORY = """
-import sys, tracemalloc
+import os, sys, tracemalloc
 import pyarrow
 from enhsim_tf.telemetry.influx_store import InfluxStore
 
@@ -286,7 +286,8 @@ for stop in (10**5, 10**6):
     count = sum(len(times) for times, values in store.chunks("million", stop_ns=10**9 * stop))
     found += [count, tracemalloc.get_traced_memory()[1], pyarrow.default_memory_pool().max_memory()]
     tracemalloc.stop()
-print(*found)
+print(*found, flush=True)
+os._exit(0)  # threads of pyarrow sometimes crash the end of an interpreter that has traced memory
 """
 
 
