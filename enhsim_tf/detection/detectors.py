@@ -23,6 +23,11 @@ def features(windows: np.ndarray) -> np.ndarray:
     return np.concatenate([window_features(windows[:, :, channel]) for channel in range(windows.shape[2])], axis=1)
 
 
+def _with_channels(windows: np.ndarray) -> np.ndarray:
+    """Windows of shape `(windows, samples, channels)` in 64 bits."""
+    return np.asarray(windows if windows.ndim == 3 else windows[:, :, None], np.float64)
+
+
 class LimitCheck:
     """Limit check, as it is common in ground stations: the distance by which a window leaves the range of the training samples.
 
@@ -171,7 +176,7 @@ class JointSize:
 
     @staticmethod
     def _means(windows: np.ndarray) -> np.ndarray:
-        values = np.asarray(windows if windows.ndim == 3 else windows[:, :, None], np.float64)
+        values = _with_channels(windows)
         return np.concatenate([part.mean(axis=1) for part in np.array_split(values, min(4, values.shape[1]), axis=1)], axis=1)
 
 
@@ -245,7 +250,7 @@ class Innovation:
 
     def fit(self, windows: np.ndarray) -> "Innovation":
         """Fits the prediction and the covariance of its errors to nominal windows."""
-        values = self._channels(windows)
+        values = _with_channels(windows)
         self._mean, order = values.mean(axis=(0, 1)), max(1, min(self.order, values.shape[1] // 4))
         number = max(1, self.most_rows // (values.shape[1] - order))
         centred = (values - self._mean)[np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)]
@@ -263,7 +268,7 @@ class Innovation:
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the mean square of the weighed errors of each window, about the number of channels for nominal ones."""
-        values = self._channels(windows) - self._mean
+        values = _with_channels(windows) - self._mean
         order, channels = len(self._weights) // values.shape[2], values.shape[2]
         kernels = self._weights.reshape(channels, order, channels).astype(np.float32)  # input, lag from the oldest, output
         scores = np.empty(len(values))
@@ -275,7 +280,3 @@ class Innovation:
                 errors -= some[:, lag : lag - order] @ kernels[:, lag]
             scores[first : first + step] = np.mean(np.sum((errors @ self._whiten.astype(np.float32)) ** 2, axis=2), axis=1)
         return scores
-
-    @staticmethod
-    def _channels(windows: np.ndarray) -> np.ndarray:
-        return np.asarray(windows if windows.ndim == 3 else windows[:, :, None], np.float64)

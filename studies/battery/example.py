@@ -9,16 +9,17 @@ The files need no PyBaMM to be read. Times count seconds.
     simulator_planned.csv  the coarse simulator over those orbits without the fault: what should have happened
 """
 
+import functools
 import sys
 from pathlib import Path
 
 import numpy as np
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file
-from enhsim_tf.common.console import Parser, run_command, tell
 from studies.battery.faults import SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, REGIMES, draw_load
 from studies.battery.simulate import COLUMNS, simulate_all
+from studies.common.command import example_command
 
 SEED = 7
 NUM_ORBITS, NUM_FAULT_ORBITS = 32, 4
@@ -66,19 +67,7 @@ def write_example(folder: Path, seed: int = SEED, num_orbits: int = NUM_ORBITS, 
                 table.to_csv(temporary, index=False, lineterminator="\n")
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Runs the command. An error of the user is reported as one line, with exit code 2."""
-
-    def write() -> int:
-        parser = Parser(prog="python -m studies.battery.example", description="Writes the recorded pair of battery simulators.")
-        parser.add_argument("folder", type=Path, help="the output folder, such as examples/battery")
-        folder = parser.parse_args(arguments).folder
-        write_example(folder)
-        tell(f"telemetry and simulator with and without a fault in {folder}/")
-        return 0
-
-    return run_command(write, "interrupted; complete files are kept")
-
+main = functools.partial(example_command, "battery", "battery", write_example)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,12 +1,10 @@
 """Faults of the battery, which both simulators can express, and the sensor that turns a simulated voltage into telemetry."""
 
-import dataclasses
-
 import numpy as np
 
 from studies.battery.orbits import ORBIT_SAMPLES, Regime
+from studies.common import faults as common
 
-SEVERITIES = (0.2, 0.4, 0.6, 0.8, 1.0)
 SIZES = {
     "raised resistance": (0.002, 0.004, 0.008, 0.016, 0.032),
     "lost capacity": (0.02, 0.05, 0.1, 0.15, 0.2),
@@ -14,7 +12,7 @@ SIZES = {
     "drifting sensor": (0.005, 0.01, 0.02, 0.04, 0.08),
     "payload stuck on": (0.2, 0.4, 0.6, 0.8, 1.0),
 }
-"""For each fault its size at each of `SEVERITIES`: added resistance in ohms; lost share of the active material of both electrodes;
+"""For each fault its size at each of `common.SEVERITIES`: added resistance in ohms; lost share of the active material of both electrodes;
 lost share of the heat transfer; drift of the voltage sensor in volts an orbit; share of the regime's `stuck_a`."""
 SENSOR_NOISE_V, SENSOR_STEP_V = 0.002, 5.0 / 4096
 """Standard deviation of the voltage sensor's noise, and its resolution: 12 bits over 5 V."""
@@ -22,25 +20,13 @@ SENSOR_NOISE_C, SENSOR_STEP_C = 0.1, 0.0625
 """The same of the temperature sensor, in degrees Celsius."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Fault:
-    """A fault of the battery.
+class Fault(common.Fault):
+    """A fault of the battery."""
 
-    Args:
-        kind: A key of `SIZES`.
-        severity: One of `SEVERITIES`.
-    """
-
-    kind: str
-    severity: float
-
-    @property
-    def size(self) -> float:
-        """Size of the fault, in the unit of `SIZES`."""
-        return SIZES[self.kind][SEVERITIES.index(self.severity)]
+    sizes = SIZES
 
 
-ALL = tuple(Fault(kind, severity) for kind in SIZES for severity in SEVERITIES)
+ALL = Fault.all()
 """Every fault at every severity."""
 _INPUTS = {"raised resistance": "added resistance", "lost capacity": "lost material", "poor heat transfer": "lost heat transfer"}
 

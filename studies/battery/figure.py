@@ -9,7 +9,7 @@ import numpy as np
 from enhsim_tf.common.figure import Figure
 from enhsim_tf.common.plot_style import DOUBLE, ENHANCED, GENERATED, QUIET, REAL, new_sheet, panels
 from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, REAL_120, WITH_RESIDUALS
-from studies.battery.faults import SEVERITIES
+from studies.common.faults import SEVERITIES
 
 SHOWN: dict[str, tuple[str, dict[str, Any]]] = {
     ENHANCED_RUN: ("enhanced run as reference", {"color": ENHANCED, "linestyle": "-", "marker": "s"}),

@@ -9,7 +9,7 @@ from enhsim_tf.detection.registry import DETECTORS
 from studies.battery.detectors import NETWORKS, REAL_120, WITH_RESIDUALS
 from studies.battery.errors import ENHANCERS, FLOOR
 from studies.battery.run import TABLES
-from studies.common.statistics import crossed_interval
+from studies.common.statistics import mean_interval
 from studies.common.tables import KeptTables
 
 if TYPE_CHECKING:
@@ -107,8 +107,7 @@ def _use(alarms: "pd.DataFrame") -> dict[str, Any]:
 
 
 def _interval(cells: "pd.DataFrame", value: str) -> dict[str, float]:
-    found = crossed_interval(cells, value, ["detector", "seed"])
-    return {"mean": found.estimate, "low": found.low, "high": found.high}
+    return mean_interval(cells.set_index(["detector", "seed"])[value], ["detector", "seed"])
 
 
 def _false_alarms(alarms: "pd.DataFrame") -> dict[str, dict[str, float]]:

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from enhsim_tf.simulator.joint import cut
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
 from studies.battery.faults import SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
 from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES
@@ -77,4 +78,4 @@ def coarse_windows(recorded: Recorded, part: str, number: int, fault: Fault | No
 
 def cut_columns(run: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Cuts windows of shape `(windows, WINDOW, columns)` out of a run of shape `(samples, columns)`."""
-    return np.lib.stride_tricks.sliding_window_view(run, WINDOW, axis=0)[starts].transpose(0, 2, 1)
+    return cut([run], starts, WINDOW)

@@ -90,3 +90,27 @@ class Command:
         self.run(options, make_settings(options.budget, **turned), out)
         tell(f"tables, findings.json and figures in {out}/")
         return 0
+
+
+def example_command(study: str, what: str, write: Callable[[Path], None], arguments: list[str] | None = None) -> int:
+    """The command `python -m studies.STUDY.example`, which writes the recorded pair that ships with the project.
+
+    Args:
+        study: Name of the study.
+        what: Of what the pair is, which is also the name of its folder in `examples`.
+        write: Writes the files to a folder.
+        arguments: The command line; None: that of the process.
+
+    Returns:
+        The exit code. An error of the user is reported as one line, with exit code 2.
+    """
+
+    def run() -> int:
+        parser = Parser(prog=f"python -m studies.{study}.example", description=f"Writes the recorded pair of the {what}.")
+        parser.add_argument("folder", type=Path, help=f"the output folder, such as examples/{what}")
+        folder = parser.parse_args(arguments).folder
+        write(folder)
+        tell(f"telemetry and simulator with and without a fault in {folder}/")
+        return 0
+
+    return run_command(run, "interrupted; complete files are kept")

@@ -52,7 +52,6 @@ class Aircraft:
     unit_samples = UNIT_SAMPLES
     onset = ONSET
     window = 120
-    unit = "flight"
     simulators = (*VEHICLES, *POINT_MASSES)
     faults: tuple[Fault, ...] = ALL
     parameters = tuple(field.name for field in dataclasses.fields(Constants))

@@ -1,13 +1,12 @@
 """Faults of the aircraft and their course over a flight, which the fine and the coarse simulators share."""
 
-import dataclasses
-
 import numpy as np
+
+from studies.common import faults as common
 
 UNIT_SAMPLES = 1_200
 ONSET = UNIT_SAMPLES // 4
 """Samples of a flight, and the first one of a fault in it."""
-SEVERITIES = (0.2, 0.4, 0.6, 0.8, 1.0)
 SIZES = {
     "left engine": (0.005, 0.02, 0.05, 0.1, 0.3),
     "both engines": (0.02, 0.05, 0.1, 0.2, 0.3),
@@ -16,7 +15,7 @@ SIZES = {
     "icing": (0.02, 0.05, 0.1, 0.15, 0.2),
     "fuel leak": (1.0, 2.0, 4.0, 8.0, 12.0),
 }
-"""For each fault its size at each of `SEVERITIES`.
+"""For each fault its size at each of `common.SEVERITIES`.
 
 | kind | size | unit | course |
 |---|---|---|---|
@@ -32,25 +31,13 @@ ICE_DRAG, ICE_LB = 0.05, 10_000.0
 _ICING_SAMPLES = 300
 
 
-@dataclasses.dataclass(frozen=True)
-class Fault:
-    """A fault of the aircraft.
+class Fault(common.Fault):
+    """A fault of the aircraft."""
 
-    Args:
-        kind: A key of `SIZES`.
-        severity: One of `SEVERITIES`.
-    """
-
-    kind: str
-    severity: float
-
-    @property
-    def size(self) -> float:
-        """Size of the fault, in the unit of `SIZES`."""
-        return SIZES[self.kind][SEVERITIES.index(self.severity)]
+    sizes = SIZES
 
 
-ALL = tuple(Fault(kind, severity) for kind in SIZES for severity in SEVERITIES)
+ALL = Fault.all()
 """Every fault at every severity."""
 
 

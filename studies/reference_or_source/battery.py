@@ -33,7 +33,7 @@ class Battery:
     is continuous; an orbit before it, in which the battery reaches its usual temperature, is left out.
     """
 
-    name, unit = "battery", "orbit"
+    name = "battery"
     channels = ("voltage", "current", "temperature")
     interval_s = INTERVAL_S
     unit_samples, window = ORBIT_SAMPLES, 100

@@ -72,7 +72,9 @@ def points(system: Any, units: Sequence[int], middle: int) -> list[Point]:
     return found
 
 
-def rows_of(system: Any, runs: Mapping[str, np.ndarray], point: Point, seed: int) -> list[dict[str, Any]]:
+def rows_of(
+    system: Any, runs: Mapping[str, np.ndarray], point: Point, seed: int, alone: dict[str, Scores] | None = None
+) -> list[dict[str, Any]]:
     """The rows of one point of the map: false alarms, and the share of windows found of each kind of fault.
 
     Args:
@@ -80,9 +82,10 @@ def rows_of(system: Any, runs: Mapping[str, np.ndarray], point: Point, seed: int
         runs: The arrays that `recordings.record` wrote.
         point: The point.
         seed: The seed.
+        alone: Scores without a simulator of points with the same telemetry, see `uses.Cell`.
     """
     windows = windows_of(system, runs, point.simulator, point.units, seed, **point.windows)
-    cell, rows = Cell(windows, seed, **point.cell), []
+    cell, rows = Cell(windows, seed, **point.cell, alone=alone), []
     number = len(system.channels)
     coarse = (
         windows.known.telemetry - windows.known.coarse[:, :, :number] / windows.scale if point.simulator != COMMANDS else cell.residuals

@@ -11,6 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.detection import detectors, metrics
+from studies.reference_or_source.windows import by_fold
 
 RATE = 0.01
 """Share of false alarms that thresholds are set for."""
@@ -73,11 +74,11 @@ def across_folds(make: Callable[[int], Any], windows: np.ndarray, folds: np.ndar
     Returns:
         The detector, and the scores.
     """
-    scores = np.empty(len(windows))
-    for fold in np.unique(folds):
-        held_out = folds == fold
-        scores[held_out] = make(seed).fit(windows[~held_out] if not held_out.all() else windows).score(windows[held_out])
-    return make(seed).fit(windows), scores
+
+    def score(learnt: np.ndarray, held_out: np.ndarray) -> np.ndarray:
+        return np.asarray(make(seed).fit(windows[learnt]).score(windows[held_out]), np.float64)
+
+    return make(seed).fit(windows), by_fold(folds, score)
 
 
 def classifier(name: str, nominal: np.ndarray, faulty: np.ndarray, seed: int) -> Callable[[np.ndarray], np.ndarray]:

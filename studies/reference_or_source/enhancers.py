@@ -56,10 +56,9 @@ def _random_features(coarse: np.ndarray, telemetry: np.ndarray, folds: np.ndarra
     with threadpool_limits(1):
         rows, errors = features(coarse), np.zeros(len(_PENALTIES))
         held_out = folds == folds.max()
-        if not held_out.all():
-            for place, penalty in enumerate(_PENALTIES):
-                machine = Ridge(penalty).fit(rows[~held_out], targets[~held_out])
-                errors[place] = np.mean((machine.predict(rows[held_out]) - targets[held_out]) ** 2)
+        for place, penalty in enumerate(_PENALTIES):
+            machine = Ridge(penalty).fit(rows[~held_out], targets[~held_out])
+            errors[place] = np.mean((machine.predict(rows[held_out]) - targets[held_out]) ** 2)
         machine = Ridge(_PENALTIES[np.argmin(errors)]).fit(rows, targets)
     return lambda windows: machine.predict(features(windows)).reshape(len(windows), *telemetry.shape[1:]).astype(np.float32)
 

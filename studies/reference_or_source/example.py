@@ -8,13 +8,14 @@ The files need no JSBSim to be read. Times count seconds; nominal flights of 20 
     simulator_fault.csv  the point mass over that flight as planned: an operator does not know of the fault
 """
 
+import functools
 import sys
 from pathlib import Path
 
 import numpy as np
 
 from enhsim_tf.common.atomic_files import make_folder, replace_file
-from enhsim_tf.common.console import Parser, run_command, tell
+from studies.common.command import example_command
 from studies.reference_or_source.aircraft import Aircraft
 from studies.reference_or_source.aircraft_faults import Fault
 
@@ -61,19 +62,7 @@ def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS
                 table.to_csv(temporary, index=False, lineterminator="\n")
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Runs the command. An error of the user is reported as one line, with exit code 2."""
-
-    def write() -> int:
-        parser = Parser(prog="python -m studies.reference_or_source.example", description="Writes the recorded pair of an aircraft.")
-        parser.add_argument("folder", type=Path, help="the output folder, such as examples/aircraft")
-        folder = parser.parse_args(arguments).folder
-        write_example(folder)
-        tell(f"telemetry and simulator with and without a fault in {folder}/")
-        return 0
-
-    return run_command(write, "interrupted; complete files are kept")
-
+main = functools.partial(example_command, "reference_or_source", "aircraft", write_example)
 
 if __name__ == "__main__":
     sys.exit(main())

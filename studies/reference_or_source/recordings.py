@@ -22,7 +22,7 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
     """Simulates all runs of a seed and writes them to `runs.npz`.
 
     Args:
-        system: A system of `systems.SYSTEMS`.
+        system: A system, see `run.make_system`.
         counts: Number of units of `fit`, `test`, `source`, of the telemetry that parameters are fitted to (`parameters`), and of a run
             under each fault (`fault`).
         seed: Seed of the commands.
@@ -41,6 +41,7 @@ def record(system: Any, counts: Mapping[str, int], seed: int, folder: Path, prog
         for fault, run in zip(faults, system.run_real(given, faults, np.random.default_rng([seed, 61, number])), strict=True):
             arrays[f"{key_of(fault)}/real"] = run
     told(1)
+    # commands are drawn unit by unit, so that the first ones are those of `fit`
     few = counts["parameters"] * system.unit_samples
     measured = system.measure(arrays["fit/real"][:few], np.random.default_rng([seed, 50]))
     values = fit_parameters(system, _commands(system, counts["parameters"], seed, 0), measured)

@@ -89,13 +89,15 @@ def table_of(settings: Settings, stages: Stages, name: str, seed: int) -> "pd.Da
     simulated = f"{name} {seed}"
     runs = stages.run(simulated, simulate, (name, counts, seed, version, _VERSION))
     arrays: dict[str, Any] = {}
+    alone: dict[str, dict[str, Any]] = {}  # what does not depend on the simulator, by telemetry
     found = []
     for point in points(system, known, max(1, chosen.middle // inside)):
 
         def judge(folder: Path, point: Any = point) -> None:
             if not arrays:
                 arrays.update(load_arrays(runs, "runs"))
-            pd.DataFrame(rows_of(system, arrays, point, seed)).to_parquet(folder / "rows.parquet")
+            same = alone.setdefault(repr((point.units, point.windows)), {})
+            pd.DataFrame(rows_of(system, arrays, point, seed, same)).to_parquet(folder / "rows.parquet")
 
         about = f"{name} {seed}, {point.axis} {point.level} {point.simulator} {point.units}".replace("  ", " ")
         found.append(pd.read_parquet(stages.run(about, judge, (repr(point), seed, _VERSION), [simulated]) / "rows.parquet"))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from studies.common.statistics import crossed_interval
+from studies.common.statistics import mean_interval
 from studies.common.tables import KeptTables
 from studies.reference_or_source.cells import MAIN, NOMINAL
 from studies.reference_or_source.recordings import COMMANDS
@@ -66,8 +66,7 @@ def _use(use: str, rows: "pd.DataFrame") -> dict[str, Any]:
 
 
 def _interval(rows: "pd.DataFrame", value: str, factors: list[str]) -> dict[str, float]:
-    found = crossed_interval(rows, value, factors)
-    return {"mean": found.estimate, "low": found.low, "high": found.high}
+    return mean_interval(rows.set_index(factors)[value], factors)
 
 
 def _severities(rows: "pd.DataFrame") -> dict[str, dict[str, list[float]]]:

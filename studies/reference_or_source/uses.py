@@ -22,7 +22,7 @@ import numpy as np
 
 from studies.reference_or_source.detectors import CLASSIFIERS, ONE_CLASS, ONE_LINERS, across_folds, classifier
 from studies.reference_or_source.enhancers import Map, fit_map
-from studies.reference_or_source.windows import Judged
+from studies.reference_or_source.windows import Judged, by_fold
 
 SOURCE, SOURCE_FAULTS = "source", "source, faults"
 REFERENCE, COARSE_REFERENCE, REFERENCE_FAULTS = "reference", "coarse reference", "reference, faults"
@@ -59,17 +59,25 @@ class Cell:
         enhancer: The enhancer, see `enhancers.fit_map`.
         draws: How noise is drawn, one of `DRAWS`.
         is_unknown: Whether the commands are unknown. Windows of the known telemetry are then paired with the most similar ones of the source.
+        alone: Scores without a simulator of cells with the same telemetry, by detector, to which those of this one are added.
     """
 
-    def __init__(self, windows: Judged, seed: int, enhancer: str = "ridge", draws: str = "joint", is_unknown: bool = False):
+    def __init__(
+        self,
+        windows: Judged,
+        seed: int,
+        enhancer: str = "ridge",
+        draws: str = "joint",
+        is_unknown: bool = False,
+        alone: dict[str, Scores] | None = None,
+    ):
+        self.alone = {} if alone is None else alone
         self.windows, self.seed, self.enhancer, self.draws, self.is_unknown = windows, seed, enhancer, draws, is_unknown
         known = windows.known
         self.planned = self._nearest(known.telemetry) if is_unknown else known.coarse
-        self.residuals = np.empty_like(known.telemetry)
-        for fold in np.unique(known.folds):
-            held_out = known.folds == fold
-            rows = ~held_out if not held_out.all() else held_out
-            self.residuals[held_out] = self._less(known.telemetry[held_out], self.planned[held_out], self._map(rows))
+        self.residuals = by_fold(
+            known.folds, lambda learnt, held_out: self._less(known.telemetry[held_out], self.planned[held_out], self._map(learnt))
+        )
 
     def _map(self, rows: Any) -> Map:
         known = self.windows.known
@@ -172,21 +180,23 @@ class Cell:
         for use in (use for use in signals if use in uses):
             normal, wrong, learnt, judged = signals[use]
             for name in CLASSIFIERS:
+                make = functools.partial(self._classifier, name, normal, wrong)
+                scores = by_fold(known.folds, lambda rows, held_out, make=make, learnt=learnt: make(rows)(learnt[held_out]))
+                yield Scores(use, name, scores, make()(judged))
 
-                def make(rows: np.ndarray | None, name: str = name, normal: np.ndarray = normal, wrong: np.ndarray = wrong) -> Any:
-                    drawn = [each + self.noise(len(each), stream, rows) for stream, each in enumerate((normal, wrong), 2)]
-                    return classifier(name, *drawn, self.seed)
-
-                scores = np.empty(len(learnt))
-                for fold in np.unique(known.folds):
-                    held_out = known.folds == fold
-                    rows = None if held_out.all() else np.flatnonzero(~held_out)
-                    scores[held_out] = make(rows)(learnt[held_out])
-                yield Scores(use, name, scores, make(None)(judged))
+    def _classifier(self, name: str, nominal: np.ndarray, faulty: np.ndarray, rows: np.ndarray | None = None) -> Map:
+        """Trains a classifier of windows to which residuals of some known windows are added."""
+        drawn = [each + self.noise(len(each), stream, rows) for stream, each in enumerate((nominal, faulty), 2)]
+        return classifier(name, *drawn, self.seed)
 
     def _one_class(self, use: str, name: str, make: Callable[[int], Any], learnt: np.ndarray, judged: np.ndarray) -> Scores:
-        fitted, scores = across_folds(make, learnt, self.windows.known.folds, self.seed)
-        return Scores(use, name, scores, fitted.score(judged))
+        if use == NO_SIMULATOR and name in self.alone:
+            return self.alone[name]
+        fitted, known = across_folds(make, learnt, self.windows.known.folds, self.seed)
+        scores = Scores(use, name, known, fitted.score(judged))
+        if use == NO_SIMULATOR:
+            self.alone[name] = scores
+        return scores
 
     def _as_channels(self, coarse: np.ndarray) -> np.ndarray:
         """The coarse columns of the channels, in the units of the telemetry windows."""

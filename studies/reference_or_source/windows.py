@@ -1,11 +1,12 @@
 """Windows of recorded runs: what an engineer knows, and what everything is judged on."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+from enhsim_tf.simulator.joint import cut
 from studies.reference_or_source.recordings import COMMANDS, CRUDE, key_of
 
 MOST_KNOWN = 1_200  # windows of the known telemetry that detectors learn from
@@ -52,9 +53,21 @@ def unit_starts(system: Any, num_units: int, stride: int, first: int = 0) -> tup
     return starts, starts // system.unit_samples
 
 
-def cut(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows of shape `(windows, samples, columns)` out of a run of shape `(samples, columns)`."""
-    return np.lib.stride_tricks.sliding_window_view(values, window, axis=0)[starts].transpose(0, 2, 1)
+def by_fold(folds: np.ndarray, predict: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """Predicts the windows of each fold from those of the others.
+
+    Args:
+        folds: Fold of each window.
+        predict: Takes the masks of the windows to learn from and of those that are held out, and returns a row for each of the latter.
+
+    Returns:
+        The rows of all windows.
+    """
+    parts = {fold: predict(folds != fold, folds == fold) for fold in np.unique(folds)}
+    found = np.empty((len(folds), *parts[folds[0]].shape[1:]), parts[folds[0]].dtype)
+    for fold, part in parts.items():
+        found[folds == fold] = part
+    return found
 
 
 def delayed(coarse: np.ndarray, unit_samples: int, delays: np.ndarray) -> np.ndarray:
@@ -157,7 +170,7 @@ def windows_of(
 
     def windows(telemetry: np.ndarray, coarse: np.ndarray, stride: int, first: int = 0) -> Windows:
         starts, units = unit_starts(system, len(telemetry) // samples, stride, first)
-        return Windows(cut(telemetry, starts, window), cut(coarse, starts, window), starts, units)
+        return Windows(cut([telemetry], starts, window), cut([coarse], starts, window), starts, units)
 
     telemetry, coarse = pair("fit", 0, num_units)
     scale = telemetry.std(axis=0)
@@ -174,7 +187,7 @@ def windows_of(
         if f"{key_of(fault)}/{simulator}/simulated" in runs:
             faulty = runs[f"{key_of(fault)}/{simulator}/simulated"]
             starts, _ = unit_starts(system, len(faulty) // samples, window // 2, system.onset)
-            simulated[number] = tuple(cut(run, starts, window) for run in (faulty, runs[f"{fault.kind}/{simulator}/nominal"]))
+            simulated[number] = tuple(cut([run], starts, window) for run in (faulty, runs[f"{fault.kind}/{simulator}/nominal"]))
     faults = [(fault.kind, fault.severity) for fault in system.faults]
     for kind in RELATIONS if with_relations else ():
         parts.append(_unrelated(parts[0], kind, np.random.default_rng([seed, 102])))
@@ -183,7 +196,7 @@ def windows_of(
     tested = Windows(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in dataclasses.fields(Windows)))
     source = planned("source")
     starts, _ = unit_starts(system, len(source) // samples, window // 2)
-    return Judged(known, tested, np.concatenate(labels), tuple(faults), cut(source, starts, window), scale, simulated)
+    return Judged(known, tested, np.concatenate(labels), tuple(faults), cut([source], starts, window), scale, simulated)
 
 
 def _unrelated(nominal: Windows, kind: str, rng: np.random.Generator) -> Windows:

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from studies.battery.faults import ALL, SEVERITIES, SIZES, Fault, drift_under, load_under, measure, simulator_inputs
+from studies.battery.faults import ALL, SIZES, Fault, drift_under, load_under, measure, simulator_inputs
 from studies.battery.orbits import CAPACITY_AH, FIRST_CHARGE, INTERVAL_S, ORBIT_SAMPLES, REGIMES, SUN_SAMPLES, battery_current, draw_load
+from studies.common.faults import SEVERITIES
 
 
 def _charge(current):

@@ -12,9 +12,10 @@ from enhsim_tf.detection.registry import DETECTORS
 from studies.battery import summary
 from studies.battery.detectors import COARSE_RUN, ENHANCED_RUN, REAL_120, SOURCES, WITH_RESIDUALS
 from studies.battery.errors import ENHANCERS, FLOOR
-from studies.battery.faults import ALL, SEVERITIES, SIZES
+from studies.battery.faults import ALL, SIZES
 from studies.battery.figure import FIGURES
 from studies.battery.summary import KEPT, summarise
+from studies.common.faults import SEVERITIES
 from studies.common.figures import save_all
 
 PUBLISHED = Path(summary.__file__).with_name("results")

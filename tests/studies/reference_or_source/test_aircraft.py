@@ -10,9 +10,10 @@ import pytest
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
+from studies.common.faults import SEVERITIES
 from studies.reference_or_source import aircraft_flight, aircraft_point_mass, example
 from studies.reference_or_source.aircraft import NOISE_SD, RESOLUTION, Aircraft
-from studies.reference_or_source.aircraft_faults import ALL, ONSET, SEVERITIES, SIZES, UNIT_SAMPLES, Fault, sizes_over_flight
+from studies.reference_or_source.aircraft_faults import ALL, ONSET, SIZES, UNIT_SAMPLES, Fault, sizes_over_flight
 
 AIRCRAFT = Aircraft()
 AIRSPEED, CLIMB, PITCH, LEFT, RIGHT, ALTITUDE = range(6)

@@ -13,7 +13,7 @@ class Offset:
 
 class Toy:
     name, channels, interval_s = "toy", ("first", "second"), 1.0
-    unit, unit_samples, window, onset = "day", 200, 20, 50
+    unit_samples, window, onset = 200, 20, 50
     simulators = {"own": 2.0, "wrong physics": 1.0}
     faults = (Offset("offset", 0.5), Offset("offset", 1.0), Offset("silence", 1.0))
     parameters, first_values = ("gain",), np.array([1.0])
