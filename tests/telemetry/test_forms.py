@@ -290,6 +290,18 @@ def test_a_state_is_no_key_of_series(tmp_path):
     check(only(read_source(tmp_path / "a.csv")))
 
 
+def test_a_blank_line_at_the_end_of_several_series_is_none_of_them(tmp_path):
+    rows = [
+        f",_result,{number},{time},{value},{field}"
+        for number, field in enumerate(("amps", "volts"))
+        for time, value in zip(TIMES.strftime("%Y-%m-%dT%H:%M:%SZ"), VALUES + number, strict=True)
+    ]
+    (tmp_path / "export.csv").write_text("\r\n".join([",result,table,_time,_value,_field", *rows]) + "\r\n\r\n")
+    channels = read_source(tmp_path / "export.csv")
+    assert list(channels) == ["amps", "volts"]
+    assert [series.to_list() for series in channels.values()] == [VALUES.tolist(), (VALUES + 1).tolist()]
+
+
 def test_the_columns_of_series_and_values_can_be_named(tmp_path):
     long(number=(7, 8)).assign(other=1.0).to_csv(tmp_path / "a.csv", index=False)
     options = Cleaning(series_column="number", value_column="v")

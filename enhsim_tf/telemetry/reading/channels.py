@@ -284,7 +284,8 @@ def _name_series(frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[st
         raise InputError(
             f"Expected at most {MAX_COLUMNS:,} series. Received: {codes.max() + 1:,} values of {', '.join(keys)} in {what}. Give another series_column."
         )
-    order = np.argsort(codes, kind="stable")
+    filled = np.flatnonzero(frame.notna().any(axis=1))  # a blank line, as databases write at the end, is of no series
+    order = filled[np.argsort(codes[filled], kind="stable")]
     rows = np.split(order, np.flatnonzero(np.diff(codes[order])) + 1)
     found = {}
     for inside in rows:
