@@ -89,7 +89,7 @@ def memory_given_back():
 
 @pytest.fixture(scope="module")
 def narrow_enhancer():
-    """Trains networks of 256 and 64 units instead of 3,200 and 256.
+    """Trains the paper's network with 256 units instead of 3,200.
 
     Tests with it check what is around a network. After each training of the wide one, TensorFlow keeps 130 MB of its weights and
     moments until the process ends.
@@ -98,7 +98,6 @@ def narrow_enhancer():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(candidates, "_PAPER_UNITS", 256)
-        patch.setattr(candidates, "_SMALL_UNITS", 64)
         yield
 
 

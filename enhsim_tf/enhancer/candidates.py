@@ -1,8 +1,9 @@
 """The candidates for the enhancer, from the coarse simulator itself to the paper's network, and the choice among them (section 2.2).
 
 The paper's network is one of several maps from coarse to realistic windows. Each is judged on blocks of time that it was not fitted to,
-from cheap to dear. The simplest one whose error is within one standard error of the best is used. A network is trained only if random
-features, which take a second, show that something beyond a linear map can be learnt, or if it is asked for.
+from cheap to dear. The simplest one whose error is within one standard error of the best is used. What no linear map can learn is left to
+random rectified features (Rahimi and Recht 2007): a network whose hidden layer is drawn and whose output layer is a ridge regression, which
+takes a second. The paper's network is trained only if it is asked for.
 """
 
 import dataclasses
@@ -13,15 +14,17 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
+from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
 
 _PAPER_UNITS = 3_200  # units of each hidden layer of the paper's network
-_SMALL_UNITS = 256  # units of each hidden layer of the network on what ridge regression leaves
-_SMALL_RATE, _PAPER_RATE = 5e-4, 1e-3  # initial learning rates, which fall to zero along a cosine
-_BATCH_SIZE = 15  # of both networks, as in the paper
-_CLEAR = 2.0  # standard errors by which they have to be better
-_NUM_FEATURES = 300  # random rectified features that show whether a network can learn more than ridge regression
+_PAPER_RATE = 1e-3  # its initial learning rate, which falls to zero along a cosine
+_BATCH_SIZE = 15  # as in the paper
+_NUM_FEATURES = 1_000  # random rectified features
+
+
+Layers = Sequence[tuple[np.ndarray, np.ndarray]]
+"""Kernel and bias of each Dense layer."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,14 +60,12 @@ class Choice:
         judged: The held-out error of each candidate that was tried.
         edges: Edges of the blocks of time; the blocks of fold 0 were held out.
         without_fold: The chosen candidate as it was judged, fitted without the held-out blocks.
-        note: Why no network was tried; empty if one was.
     """
 
     enhancer: Enhancer
     judged: tuple[Judged, ...]
     edges: np.ndarray
     without_fold: Enhancer
-    note: str
 
 
 def choose_enhancer(
@@ -83,8 +84,8 @@ def choose_enhancer(
         targets: Telemetry windows, shape `(windows, samples, channels)`.
         starts: First sample of each window on a common clock, shape `(windows,)`.
         wanted: Name of a candidate to use whatever the errors are, or `best`.
-        seed: Random seed of the networks and the random features.
-        epochs: Passes of the networks over the windows.
+        seed: Random seed of the network and the random features.
+        epochs: Passes of the network over the windows.
         on_candidate: Called with the name of each candidate before it is fitted.
 
     Raises:
@@ -118,23 +119,11 @@ def choose_enhancer(
         penalties.extend(fitted[name].penalties[len(penalties) :])
         squared[name] = by_stretch(fitted[name].predict(inputs[held_out]))
 
-    note = ""
-    for name in (COARSE, LEVEL_AND_GAIN, RIDGE) if wanted == BEST else [*dict.fromkeys([COARSE, RIDGE, wanted])]:
+    for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
         try_candidate(name)
-    if wanted == BEST:
-        ridge = fitted[RIDGE]
-        rest = _random_features(ridge, inputs[learnt], targets[learnt], inputs[held_out], starts[learnt], seed)
-        gain = squared[RIDGE] - by_stretch(ridge.predict(inputs[held_out]) + rest)
-        if np.mean(gain) > _CLEAR * _standard_error(gain):
-            try_candidate(RIDGE_AND_NETWORK)
-        else:
-            note = (
-                "no network was trained, because random features learn no more than ridge regression on held-out time "
-                f"(gain {np.mean(gain):.2g} ± {_standard_error(gain):.2g} of the variance)"
-            )
     judged = judge(squared)
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
-    return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs, penalties), judged, edges, fitted[chosen], note)
+    return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs, penalties), judged, edges, fitted[chosen])
 
 
 def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
@@ -175,8 +164,8 @@ def fit_enhancer(
         inputs: Coarse windows, shape `(windows, samples, columns)`.
         targets: Telemetry windows, shape `(windows, samples, channels)`.
         starts: First sample of each window, shape `(windows,)`.
-        seed: Random seed of the networks.
-        epochs: Passes of the networks over the windows.
+        seed: Random seed of the network and the random features.
+        epochs: Passes of the network over the windows.
         penalties: Penalty of each channel, as `Enhancer.penalties` of a fit to similar windows; None: chosen by blocks of time.
 
     Raises:
@@ -195,7 +184,6 @@ def fit_enhancer(
     flat, outputs = rows.reshape(len(rows), -1), wanted.reshape(len(wanted), -1)
     column_scale, output_unit = np.tile(scale, window), np.tile(unit, window)
     linear, factors, layers = np.zeros(outputs.shape[1]), (), ()
-    left = outputs
     if name != NETWORK:
         ridge = fit_ridge(rows, outputs, starts, num_channels=channels, chosen=penalties or None)
         penalties = ridge.chosen
@@ -208,12 +196,13 @@ def fit_enhancer(
         maps[0] = maps[0] / column_scale[:, None]
         maps[-1] = maps[-1] * output_unit
         factors = tuple(each.astype(np.float32) for each in maps)
-    if name != RIDGE:
-        spread = float(np.std(left, dtype=np.float64)) or 1.0
-        layers = _train(name, flat, (left / spread).astype(np.float32), window * channels, seed, epochs)
-        kernel, bias = layers[-1]
-        layers[-1] = (kernel * (spread * output_unit), bias * (spread * output_unit))
-        layers[0] = (layers[0][0] / column_scale[:, None], layers[0][1])
+    if name == NETWORK:
+        layers = _train(flat, outputs, seed, epochs)
+    elif name == RIDGE_AND_FEATURES:
+        layers = _random_features(flat, left, starts, channels, seed)
+    if layers:
+        (kernel, bias), (*between, (last, last_bias)) = layers[0], layers[1:]
+        layers = ((kernel / column_scale[:, None], bias), *between, (last * output_unit, last_bias * output_unit))
         layers = tuple((kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers)
         if not all(np.isfinite(each).all() for layer in layers for each in layer):
             raise InputError(
@@ -238,31 +227,28 @@ def _keeping_the_shape(name: str, inputs: np.ndarray, targets: np.ndarray, centr
     )
 
 
-def _train(name: str, rows: np.ndarray, wanted: np.ndarray, outputs: int, seed: int, epochs: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Trains the paper's network, or a small one on what ridge regression leaves; returns kernel and bias of each layer."""
+def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> Layers:
+    """Trains the paper's network."""
     from enhsim_tf.common.backend import keras
     from enhsim_tf.common.training import dense_stack, fit_windows
 
-    units = (outputs, _PAPER_UNITS, _PAPER_UNITS, outputs) if name == NETWORK else (_SMALL_UNITS, _SMALL_UNITS, outputs)
-    network = dense_stack(rows.shape[1], units, seed, "enhancer")
-    rate = _PAPER_RATE if name == NETWORK else _SMALL_RATE
-    falling = keras.optimizers.schedules.CosineDecay(rate, epochs * -(-len(rows) // _BATCH_SIZE))
-    fit_windows(network, rows, wanted, epochs, _BATCH_SIZE, seed, falling, verbose=0)
-    return [tuple(layer.get_weights()) for layer in network.layers]
+    outputs = wanted.shape[1]
+    network = dense_stack(rows.shape[1], (outputs, _PAPER_UNITS, _PAPER_UNITS, outputs), seed, "enhancer")
+    falling = keras.optimizers.schedules.CosineDecay(_PAPER_RATE, epochs * -(-len(rows) // _BATCH_SIZE))
+    spread = float(np.std(wanted, dtype=np.float64)) or 1.0
+    fit_windows(network, rows, (wanted / spread).astype(np.float32), epochs, _BATCH_SIZE, seed, falling, verbose=0)
+    *layers, (kernel, bias) = (layer.get_weights() for layer in network.layers)
+    return [*layers, (kernel * spread, bias * spread)]
 
 
-def _random_features(
-    ridge: Enhancer, inputs: np.ndarray, targets: np.ndarray, held_out: np.ndarray, starts: np.ndarray, seed: int
-) -> np.ndarray:
-    """Predicts on held-out windows, by ridge regression on random rectified features, what the first regression leaves."""
+def _random_features(rows: np.ndarray, left: np.ndarray, starts: np.ndarray, channels: int, seed: int) -> Layers:
+    """Fits ridge regression on random rectified features to what the first regression leaves."""
     rng = np.random.default_rng([seed, 11])
-    scale = _deviations(inputs)
-    flat, other = (((each - ridge.centre) / scale).reshape(len(each), -1) for each in (inputs, held_out))
-    kernel = rng.standard_normal((flat.shape[1], _NUM_FEATURES)) / np.sqrt(flat.shape[1])
+    kernel = rng.standard_normal((rows.shape[1], _NUM_FEATURES)) / np.sqrt(rows.shape[1])
     shift = rng.uniform(-1, 1, _NUM_FEATURES)
-    left = targets - ridge.predict(inputs)
-    fitted = fit_ridge(np.maximum(flat @ kernel + shift, 0)[:, None, :], left.reshape(len(left), -1), starts, num_channels=targets.shape[2])
-    return fitted.predict(np.maximum(other @ kernel + shift, 0)[:, None, :]).reshape(len(held_out), *targets.shape[1:])
+    ridge = fit_ridge(np.maximum(rows @ kernel + shift, 0)[:, None, :], left, starts, num_channels=channels)
+    weights = ridge.weights if ridge.factors is None else ridge.factors[0] @ ridge.factors[1]
+    return [(kernel, shift), (weights, ridge.target_mean - ridge.input_mean.ravel() @ weights)]
 
 
 def _deviations(windows: np.ndarray) -> np.ndarray:

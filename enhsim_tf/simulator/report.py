@@ -199,7 +199,7 @@ def make_report(
         is_held_out,
         sum(map(len, series)),
         coarse,
-        tuple([*notes, choice.note] if choice.note else notes),
+        tuple(notes),
         tuple(
             {"name": each.name, "error": each.error, "standard_error": each.standard_error, "is_chosen": each.name == choice.enhancer.name}
             for each in choice.judged

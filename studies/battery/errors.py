@@ -7,7 +7,7 @@ import numpy as np
 
 from enhsim_tf.detection.metrics import threshold
 from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer
-from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_NETWORK
+from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.out_of_range import OutOfRange
 from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
 from studies.battery.faults import ALL, Fault
@@ -24,7 +24,7 @@ ENHANCERS = {
     "ridge, voltage": (RIDGE, 1),
     "ridge, voltage and current": (RIDGE, 2),
     "ridge, all columns": (RIDGE, 3),
-    "ridge and network": (RIDGE_AND_NETWORK, 3),
+    "ridge and random features": (RIDGE_AND_FEATURES, 3),
 }
 """For each enhancer its kind and how many of the coarse columns voltage, current and temperature it receives."""
 FLOOR = "fine itself"

@@ -7,7 +7,6 @@ import numpy as np
 
 from enhsim_tf.detection.registry import DETECTORS
 from studies.battery.detectors import NETWORKS, REAL_120, WITH_RESIDUALS
-from studies.battery.errors import ENHANCERS, FLOOR
 from studies.battery.run import TABLES
 from studies.common.statistics import mean_interval
 from studies.common.tables import KeptTables
@@ -23,13 +22,8 @@ KEPT = KeptTables(
     command="python -m studies.battery",
     digits_of={"speed": 9},
 )
-CHOSEN = {
-    "coarse": "coarse itself",
-    "level and gain": "level and gain",
-    "ridge": "ridge, all columns",
-    "ridge and network": "ridge and network",
-}
-"""For each candidate the enhancer of the table of errors."""
+CHOSEN = {"coarse": "coarse itself", "ridge": "ridge, all columns"}
+"""For each candidate the enhancer of the table of errors, if it has another name there."""
 LARGEST_SHARE = 0.5
 """On nominal orbits, the chosen enhancer has at most this share of the coarse simulator's error."""
 LARGEST_LAG = 1.0
@@ -61,7 +55,7 @@ def _regime(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     import pandas as pd
 
     errors, choice, runs = tables["errors"], tables["choice"], tables["runs"]
-    chosen = choice[choice["is_chosen"]].set_index("seed")["candidate"].map(CHOSEN)
+    chosen = choice[choice["is_chosen"]].set_index("seed")["candidate"].replace(CHOSEN)
     picked = errors[errors["enhancer"] == errors["seed"].map(chosen)]
     errors = pd.concat([errors, picked.assign(enhancer="chosen")], ignore_index=True)
     nominal = errors[errors["fault"] == "nominal"].pivot(index="seed", columns="enhancer", values="nrmse")
@@ -71,13 +65,12 @@ def _regime(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     alarms = tables["alarms"]
     detectors = _false_alarms(alarms)
     times = {str(name): int(number) for name, number in chosen.value_counts().items()}
-    names = (*ENHANCERS, "chosen", FLOOR)
     return {
         "num_seeds": len(chosen),
         "runs": {"number": int(runs["num_runs"].sum()), "reduced": int(runs["num_reduced"].sum())},
         "chosen": times,
-        "nominal": {name: {"mean": float(nominal[name].mean()), "standard_error": _standard_error(nominal[name])} for name in names},
-        "on_faults": {name: float(faulty[name].mean()) for name in names},
+        "nominal": {name: {"mean": float(nominal[name].mean()), "standard_error": _standard_error(nominal[name])} for name in nominal},
+        "on_faults": {name: float(faulty[name].mean()) for name in faulty},
         "seconds": seconds,
         "uses": {name: _use(rows) for name, rows in alarms.groupby("training", sort=False)},
         "false_alarms": detectors,

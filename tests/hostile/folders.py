@@ -31,7 +31,7 @@ def saved_model() -> dict[str, bytes]:
     kernels = [rng.standard_normal(size).astype(np.float32) / 5 for size in (*sizes, (24, 3), (3, 24))]
     layers = tuple((kernel, np.zeros(kernel.shape[1], np.float32)) for kernel in kernels[:3])
     zeros = np.zeros(24, np.float32)
-    enhancer = Enhancer("ridge and network", 24, 1, 1, np.zeros(1, np.float32), zeros, tuple(kernels[3:]), layers)
+    enhancer = Enhancer("ridge and random features", 24, 1, 1, np.zeros(1, np.float32), zeros, tuple(kernels[3:]), layers)
     coarse = SquareWaveSimulator([SquareWave(20.0, low=-1.0, high=1.0)])
     simulator = of_waves(
         [coarse],
