@@ -122,17 +122,23 @@ ridge = fit_ridge(inputs, targets, penalty)
 # %% [markdown]
 # The package solves the same equations by an eigendecomposition, once for all penalties. It must choose the same penalty, and predict the
 # same windows but for rounding in its 32-bit result. A third estimate needs no fit at all: the *mean of the nearest windows* looks for the
-# k training windows whose coarse side is nearest and takes the mean of their telemetry; k is chosen by cross-validation as well.
+# k training windows whose coarse side is nearest and takes the mean of their telemetry; scikit-learn chooses k on the same blocks.
 
 # %%
+from sklearn.model_selection import GridSearchCV
+from sklearn.neighbors import KNeighborsRegressor
+
 from enhsim_tf.enhancer import ridge as packaged
 
 reference = packaged.fit_ridge(inputs, targets, starts, penalties=penalties)
 assert reference.penalty == penalty
 np.testing.assert_allclose(ridge(coarse), reference.predict(coarse), atol=1e-4)
-nearest = packaged.nearest_windows(
-    inputs, targets, coarse, packaged.choose_num_neighbours(inputs, targets, starts)
-)
+blocks = packaged.time_blocks(starts, 5, 500)
+choices = {
+    "n_neighbors": [k for k in (1, 3, 10, 30, 100, 300) if k <= min(len(learnt) for learnt, _ in blocks)]
+}
+search = GridSearchCV(KNeighborsRegressor(), choices, cv=blocks, scoring="neg_mean_squared_error")
+nearest = search.fit(inputs, targets).predict(coarse)
 errors = {
     "coarse simulator": nrmse(coarse, truth),
     "network": nrmse(enhanced, truth),

@@ -1,11 +1,10 @@
-"""Ridge regression and the mean of the nearest training windows: the baselines of an enhancer (section 2.2).
+"""Ridge regression from coarse windows to telemetry windows: what a network has to beat as an enhancer (section 2.2).
 
-Both map coarse windows to telemetry windows without a network. Each has one setting, which is chosen by cross-validation over blocks of
-time, and neither result depends on the units of the windows.
+Its penalty is chosen by cross-validation over blocks of time, and the result does not depend on the units of the windows.
 """
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.windows import time_blocks
 
 PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))  # of standardised inputs, so they fit every unit
-NUM_NEIGHBOURS = (1, 3, 10, 30, 100, 300)
 _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest value is constant
-_ROWS = 256  # windows predicted at a time, which bounds the memory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,73 +133,6 @@ def _by_channel(squares: np.ndarray, num_channels: int) -> np.ndarray:
     return squares.sum(axis=0).reshape(-1, num_channels).sum(axis=0)
 
 
-def nearest_windows(train_inputs: np.ndarray, train_targets: np.ndarray, inputs: np.ndarray, num_neighbours: int = 30) -> np.ndarray:
-    """Predicts the targets of windows as the mean target of the nearest training windows.
-
-    The distance is the Euclidean one, with each column divided by its standard deviation in training.
-
-    Args:
-        train_inputs: Training windows of shape `(windows, samples)` or `(windows, samples, columns)`.
-        train_targets: Their targets, shape `(windows, outputs)`.
-        inputs: Windows to predict, shape as `train_inputs`.
-        num_neighbours: Number of training windows that are averaged; all of them if there are fewer.
-
-    Returns:
-        float32 array of shape `(windows, outputs)`.
-
-    Raises:
-        InputError: If shapes do not match, values are not finite, or the number of neighbours is below 1.
-    """
-    train, targets, _ = _checked(train_inputs, train_targets, None)
-    windows = _with_columns(inputs)
-    if windows.shape[1:] != train.shape[1:] or num_neighbours < 1:
-        raise InputError(
-            f"Expected windows of {train.shape[1:]} and at least 1 neighbour. Received: {windows.shape[1:]} and {num_neighbours}. "
-            "Cut windows as for training."
-        )
-    predicted = np.empty((len(windows), targets.shape[1]), np.float32)
-    for rows, nearest in _neighbours(train, windows, num_neighbours):
-        predicted[rows] = targets[nearest].mean(axis=1)
-    return predicted
-
-
-def choose_num_neighbours(
-    inputs: np.ndarray,
-    targets: np.ndarray,
-    starts: np.ndarray | None = None,
-    *,
-    candidates: Sequence[int] = NUM_NEIGHBOURS,
-    num_blocks: int = 5,
-) -> int:
-    """Chooses the number of neighbours for `nearest_windows` by the cross-validation of `fit_ridge`.
-
-    Args:
-        inputs: Training windows of shape `(windows, samples)` or `(windows, samples, columns)`.
-        targets: Their targets, shape `(windows, outputs)`.
-        starts: Position of each window in time, in samples; see `fit_ridge`.
-        candidates: Numbers to choose from. Those above the number of training windows are left out, except the smallest.
-        num_blocks: Number of blocks of time.
-
-    Returns:
-        The number with the smallest squared error; the smallest of those with the same error.
-
-    Raises:
-        InputError: If shapes do not match or values are not finite.
-    """
-    windows, targets, starts = _checked(inputs, targets, starts)
-    blocks = time_blocks(starts, num_blocks, windows.shape[1])
-    least = min((len(training) for training, _ in blocks), default=0)
-    tried = [number for number in sorted(candidates) if number <= least] or [min(candidates)]
-    squares = np.zeros(len(tried))
-    for training, held_out in blocks:
-        learnt = targets[training]
-        for rows, nearest in _neighbours(windows[training], windows[held_out], tried[-1]):
-            wanted = targets[held_out[rows]]
-            for position, number in enumerate(tried):
-                squares[position] += np.sum((learnt[nearest[:, :number]].mean(axis=1) - wanted) ** 2)
-    return tried[int(np.argmin(squares))]
-
-
 class _Solution:
     """Ridge regression at every penalty, from one eigendecomposition.
 
@@ -228,19 +158,6 @@ class _Solution:
 
     def coefficients(self, penalty: float | np.ndarray) -> np.ndarray:
         return self.moments / (np.maximum(self.values, 0.0)[:, None] + penalty)
-
-
-def _neighbours(train: np.ndarray, windows: np.ndarray, number: int) -> Iterator[tuple[slice, np.ndarray]]:
-    """Yields slices of windows with the indices of the nearest training windows of each, nearest first."""
-    middle = train.mean(axis=0)
-    scale = np.tile(_column_deviations(train), train.shape[1])
-    learnt, number = _flat(train - middle) / scale, min(number, len(train))
-    length = np.einsum("wi,wi->w", learnt, learnt)
-    for first in range(0, len(windows), _ROWS):
-        rows = slice(first, min(first + _ROWS, len(windows)))
-        distance = length - 2 * (_flat(windows[rows] - middle) / scale) @ learnt.T  # less the length of the window itself
-        nearest = np.argpartition(distance, number - 1, axis=1)[:, :number]
-        yield rows, np.take_along_axis(nearest, np.argsort(np.take_along_axis(distance, nearest, 1), axis=1, kind="stable"), 1)
 
 
 def _column_deviations(windows: np.ndarray) -> np.ndarray:

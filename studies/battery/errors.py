@@ -9,10 +9,10 @@ from enhsim_tf.detection.metrics import threshold
 from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer
 from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
 from studies.battery.faults import ALL, Fault
 from studies.battery.record import Recorded
 from studies.battery.windows import NUM_FAULT, NUM_TEST, PairWindows, coarse_windows, judged_windows
+from studies.common.nearest_windows import fit_nearest_windows
 
 Predict = Callable[[np.ndarray], np.ndarray]
 
@@ -56,8 +56,7 @@ def fit_enhancers(pairs: PairWindows, names: tuple[str, ...], seed: int, paper_e
     for name in names:
         kind, columns = ENHANCERS[name]
         if kind == "nearest":
-            number = choose_num_neighbours(pairs.coarse, pairs.telemetry, pairs.starts)
-            found[name] = lambda windows, number=number: nearest_windows(pairs.coarse, pairs.telemetry, windows, number)
+            found[name] = fit_nearest_windows(pairs.coarse, pairs.telemetry, pairs.starts)
         elif kind == COARSE:
             found[name] = lambda windows: windows[:, :, 0]
         else:

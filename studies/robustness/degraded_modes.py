@@ -13,7 +13,8 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
 from enhsim_tf.common import measures
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.enhancer.ridge import choose_num_neighbours, fit_ridge, nearest_windows
+from enhsim_tf.enhancer.ridge import fit_ridge
+from studies.common.nearest_windows import fit_nearest_windows
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
@@ -120,14 +121,10 @@ class DegradedModes:
     ) -> dict[str, Estimate]:
         from scipy.ndimage import uniform_filter1d
 
-        from enhsim_tf.enhancer.network import enhance
+        from enhsim_tf.common.training import predict_windows
 
         def smooth(width: int) -> Estimate:
             return functools.partial(uniform_filter1d, size=width, axis=1, mode="nearest")
-
-        def nearest(coarse: np.ndarray, target: np.ndarray, start: np.ndarray | None = None) -> Estimate:
-            number = choose_num_neighbours(coarse, target, start)
-            return lambda windows: nearest_windows(coarse, target, windows, number)
 
         width = min(WIDTHS, key=lambda each: measures.nrmse(smooth(each)(nominal[0][:1_000]), nominal[1][:1_000]))
         return {
@@ -135,21 +132,21 @@ class DegradedModes:
             "moving average": smooth(width),
             "ridge": fit_ridge(*nominal).predict,
             "ridge, randomised": fit_ridge(*randomised).predict,
-            "nearest windows": nearest(*nominal),
-            "nearest windows, randomised": nearest(*randomised),
+            "nearest windows": fit_nearest_windows(*nominal),
+            "nearest windows, randomised": fit_nearest_windows(*randomised),
             "paper": self.example.enhance,
             "more windows": self.replicate.second.simulator.enhance,
-            "randomised": functools.partial(enhance, self._train(*randomised)),
+            "randomised": functools.partial(predict_windows, self._train(*randomised), batch_size=1_024),
         }
 
     def _train(self, coarse: np.ndarray, target: np.ndarray) -> "keras.Model":
         """Trains the enhancer of the residual pipeline on other windows."""
         from enhsim_tf.common.backend import keras
-        from enhsim_tf.common.training import EpochProgress, fit_windows
-        from enhsim_tf.enhancer.network import build_enhancer
+        from enhsim_tf.common.training import EpochProgress, dense_stack, fit_windows
 
         seed, epochs, batch_size = self.settings.seed, self.settings.second.epochs, self.settings.paper.batch_size
-        network = build_enhancer(self.settings.paper.window, seed=seed)
+        window, units = self.settings.paper.window, self.settings.paper.hidden_units
+        network = dense_stack(window, (window, units, units, window), seed, "enhancer")
         rate = keras.optimizers.schedules.CosineDecay(0.001, epochs * -(-len(coarse) // batch_size))
         callbacks = [EpochProgress(self.stages.progress.loop("enhancer, epoch", epochs))]
         fit_windows(network, coarse, target, epochs, batch_size, seed, rate, callbacks=callbacks, verbose=0)

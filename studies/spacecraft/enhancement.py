@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enhsim_tf.enhancer.ridge import choose_num_neighbours, nearest_windows
 from enhsim_tf.simulator.alignment import Waves
 from enhsim_tf.telemetry.windows import cut_windows, disjoint_starts, evenly_spaced_starts
+from studies.common.nearest_windows import fit_nearest_windows
 from studies.spacecraft.judging import windows_that_meet
 from studies.spacecraft.telemanom import LabelledChannel
 
@@ -69,5 +69,4 @@ def _nearest(ridge: "EnhancedSimulator", train: np.ndarray, num_windows: int, co
     learnt, shift, gain = waves.align(windows)
     kept = ~waves.is_flat(gain).any(axis=1)
     inputs, targets = learnt[kept], ((windows - shift[:, None])[kept] / gain[kept][:, None])[:, :, 0].astype(np.float32)
-    number = choose_num_neighbours(inputs, targets, starts[kept])
-    return nearest_windows(inputs, targets, coarse, number)[:, :, None]
+    return fit_nearest_windows(inputs, targets, starts[kept])(coarse)[:, :, None]

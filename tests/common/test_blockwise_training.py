@@ -7,9 +7,12 @@ import pytest
 from enhsim_tf.common import blockwise_training
 from enhsim_tf.common.blockwise_training import BlockwiseTraining, is_wide_dense_stack
 from enhsim_tf.common.training import dense_stack, fit_windows
-from enhsim_tf.enhancer.network import build_enhancer
 
 WINDOW, UNITS = 12, 20
+
+
+def build_enhancer(window=500, units=3_200, seed=0):
+    return dense_stack(window, (window, units, units, window), seed, name="enhancer")
 
 
 def windows(number=80):

@@ -98,11 +98,11 @@ def test_silent_progress_prints_nothing(at_once, capsys):
 
 
 def test_the_enhancer_reports_finished_epochs():
-    from enhsim_tf.common.training import EpochProgress, fit_windows
-    from enhsim_tf.enhancer.network import build_enhancer
+    from enhsim_tf.common.training import EpochProgress, dense_stack, fit_windows
 
     windows, done = np.random.default_rng(0).standard_normal((5, 8)).astype(np.float32), []
-    fit_windows(build_enhancer(8, 4), windows, windows, 2, batch_size=2, seed=0, callbacks=[EpochProgress(done.append)], verbose=0)
+    network = dense_stack(8, (4, 8), seed=0, name="narrow")
+    fit_windows(network, windows, windows, 2, batch_size=2, seed=0, callbacks=[EpochProgress(done.append)], verbose=0)
     assert done == pytest.approx([1 / 3, 2 / 3, 1, 4 / 3, 5 / 3, 2])
 
 

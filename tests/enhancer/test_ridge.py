@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from sklearn.linear_model import Ridge as SklearnRidge
-from sklearn.neighbors import KNeighborsRegressor
 
-from enhsim_tf.enhancer.ridge import PENALTIES, choose_num_neighbours, fit_ridge, nearest_windows
+from enhsim_tf.enhancer.ridge import PENALTIES, fit_ridge
 
 
 def _linear(num_windows, noise=0.1, seed=0, samples=12, outputs=7, columns=2):
@@ -147,41 +146,12 @@ def test_few_windows_give_two_factors_with_the_map_of_the_full_matrix(num_window
     np.testing.assert_allclose(found.predict(new), targets.mean(axis=0) + _standardised(new, inputs) @ full, rtol=1e-5, atol=1e-5)
 
 
-# -- nearest windows ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("number", [1, 5, 300, 999])
-def test_nearest_windows_are_scikit_learns(number):
-    inputs, targets, _ = _linear(600)
-    new, *_ = _linear(300, seed=1)
-    model = KNeighborsRegressor(min(number, 600)).fit(_standardised(inputs, inputs), targets)
-    np.testing.assert_allclose(nearest_windows(inputs, targets, new, number), model.predict(_standardised(new, inputs)), atol=1e-5)
-
-
-def test_nearest_windows_by_hand():
-    train, targets = np.array([[0.0], [1.0], [5.0]]), np.array([[10.0], [20.0], [60.0]])
-    np.testing.assert_array_equal(nearest_windows(train, targets, np.array([[0.2], [4.0]]), 2), [[15], [40]])
-
-
-def test_the_number_of_neighbours_grows_with_the_noise_and_does_not_depend_on_units():
-    rng = np.random.default_rng(0)
-    inputs = rng.uniform(size=(400, 1))
-    chosen = {}
-    for noise in (0.0, 0.5, 50.0):
-        targets = np.sin(20 * inputs) + noise * rng.standard_normal((400, 3))
-        chosen[noise] = choose_num_neighbours(inputs, targets)
-        assert chosen[noise] == choose_num_neighbours(1e6 * inputs - 3, 1e-6 * targets)
-    assert chosen[0.0] < chosen[0.5] < chosen[50.0]
-    assert choose_num_neighbours(inputs[:2], targets[:2]) == choose_num_neighbours(inputs[:1], targets[:1]) == 1
-
-
 def test_the_order_in_which_windows_are_given_does_not_matter():
     inputs, targets, _ = _linear(60, noise=10.0)
     starts, order = 5 * np.arange(60), np.random.default_rng(3).permutation(60)
     first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
     np.testing.assert_allclose(first.errors, second.errors, rtol=1e-9)
     assert np.abs(first.errors / fit_ridge(inputs, targets).errors - 1).max() > 1e-3, "without starts, no window is left out"
-    assert choose_num_neighbours(inputs, targets, starts) == choose_num_neighbours(inputs[order], targets[order], starts[order])
 
 
 # -- what cannot be used -----------------------------------------------------------------------------------------------------
@@ -191,13 +161,9 @@ def test_what_cannot_be_used_is_refused(refused):
     inputs, targets, _ = _linear(10)
     with refused("one start per window", "(10, 12, 2), (9, 7)"):
         fit_ridge(inputs, targets[:9])
-    with refused("one start per window"):
-        choose_num_neighbours(inputs, targets, np.arange(9))
     with refused("finite windows"):
         fit_ridge(np.where(inputs > 5, np.nan, inputs), targets)
     with refused("penalties above 0"):
         fit_ridge(inputs, targets, penalties=[0.0, 1.0])
     with refused("as in training", "(11, 2)"):
         fit_ridge(inputs, targets).predict(inputs[:, 1:])
-    with refused("at least 1 neighbour"):
-        nearest_windows(inputs, targets, inputs, 0)

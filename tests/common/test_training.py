@@ -1,11 +1,10 @@
-"""The enhancing network: the paper's architecture, learning of known maps to known errors, and reproducible random numbers."""
+"""Training of networks that map windows to windows: known maps to known errors, and reproducible random numbers."""
 
 import keras
 import numpy as np
 import pytest
 
-from enhsim_tf.common.training import dense_stack, fit_windows
-from enhsim_tf.enhancer.network import build_enhancer, enhance
+from enhsim_tf.common.training import dense_stack, fit_windows, predict_windows
 
 
 def windows(number, samples=20, seed=0):
@@ -13,7 +12,7 @@ def windows(number, samples=20, seed=0):
 
 
 def small(seed=0):
-    return build_enhancer(window=20, hidden_units=64, seed=seed)
+    return dense_stack(20, (20, 64, 64, 20), seed, "enhancer")
 
 
 def weights_of(model):
@@ -26,44 +25,18 @@ def fit_small(model, seed, inputs=None, **arguments):
     return fit_windows(model, inputs, np.cumsum(inputs, axis=1), seed=seed, **arguments)
 
 
-def test_layers_of_figure_3():
-    model = build_enhancer()
-    layers = [(layer.name, layer.output.shape, layer.count_params()) for layer in model.layers]
-    assert layers == [
-        ("Input", (None, 500), 500 * 500 + 500),
-        ("Hidden_1", (None, 3_200), 500 * 3_200 + 3_200),
-        ("Hidden_2", (None, 3_200), 3_200 * 3_200 + 3_200),
-        ("Output", (None, 500), 3_200 * 500 + 500),
-    ]
-    assert model.count_params() == 250_500 + 1_603_200 + 10_243_200 + 1_600_500 == 13_697_400
-    assert model.input_shape == (None, 500)
-    assert [layer.activation.__name__ for layer in model.layers] == ["relu", "relu", "relu", "linear"]
-    # He's uniform initialiser: limit sqrt(6 / inputs)
-    for layer, inputs in zip(model.layers, (500, 500, 3_200, 3_200), strict=True):
-        kernel, limit = np.asarray(layer.kernel), np.sqrt(6 / inputs)
-        assert 0.99 * limit < np.abs(kernel).max() <= limit
-        assert np.std(kernel) == pytest.approx(limit / np.sqrt(3), rel=0.01)
-        assert not np.asarray(layer.bias).any()
-
-
-def test_arguments_set_the_shape():
-    model = build_enhancer(window=20, hidden_units=7, num_hidden=3)
-    assert [layer.units for layer in model.layers] == [20, 7, 7, 7, 20]
-    assert [layer.units for layer in dense_stack(9, (4, 2, 9), seed=0, name="narrow").layers] == [4, 2, 9]
-
-
 def test_layers_of_one_seed_are_independent():
     first, second = dense_stack(50, (50, 50, 50), seed=0, name="equal").layers[:2]
     assert abs(np.corrcoef(np.ravel(first.kernel), np.ravel(second.kernel))[0, 1]) < 5 / 50
 
 
-def test_enhance_is_the_network_of_the_paper_in_numpy():
+def test_a_dense_stack_is_relu_layers_and_a_linear_one():
     model, coarse = small(), windows(300)
     expected = coarse.astype(np.float64)
     for number, layer in enumerate(model.layers):
         expected = expected @ np.asarray(layer.kernel) + np.asarray(layer.bias)
         expected = np.maximum(expected, 0) if number < 3 else expected
-    enhanced = enhance(model, coarse, batch_size=128)
+    enhanced = predict_windows(model, coarse, batch_size=128)
     assert enhanced.dtype == np.float32
     np.testing.assert_allclose(enhanced, expected, rtol=1e-4, atol=1e-4)
 
@@ -80,9 +53,9 @@ def test_known_linear_map_is_learnt_to_a_known_error():
     source, _, target = pairs(3_000, 2)
     held_out, clean, noisy = pairs(1_000, 3)
     model = small()
-    untrained = np.mean((enhance(model, held_out) - noisy) ** 2)
+    untrained = np.mean((predict_windows(model, held_out, 1_024) - noisy) ** 2)
     history = fit_windows(model, source, target, 15, 50, seed=0, validation=(held_out, noisy), verbose=0)
-    enhanced = enhance(model, held_out)
+    enhanced = predict_windows(model, held_out, 1_024)
     error = np.mean((enhanced - noisy) ** 2)
     assert untrained > np.var(clean) > 5 * noise_sd**2  # the untrained error is far above the noise
     assert error == pytest.approx(np.mean((noisy - clean) ** 2), rel=0.1)
