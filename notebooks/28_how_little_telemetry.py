@@ -6,7 +6,7 @@
 # - **After this lesson** you can set a threshold when the real windows must serve for training *and* for the threshold, fit a simulator to
 #   the same few windows, and read a learning curve with a rule that was fixed before the experiment.
 # - **You should know** ridge regression by blocks of time (notebook 04), the PCA residual and the conformal threshold (notebook 13), and
-#   residual windows (notebook 26).
+#   residual windows (notebook 25).
 # - **Terms:** [conformal threshold](../docs/glossary.md#conformal-threshold), [residual](../docs/glossary.md#residual); a *learning curve*
 #   is a result over the amount of data; *excess*: the false-alarm rate minus the one that the threshold was set for; *cross-fitting*: each
 #   window is scored by a model that was fitted to the other blocks of time; *recall at the real rate*: the share of anomalies found when
