@@ -54,7 +54,9 @@ np.testing.assert_allclose(nearest_mean(*small, 5), reference, atol=1e-9)
 def fit_nearest(inputs, targets, starts):
     """scikit-learn's version, with k chosen on blocks of time."""
     blocks = packaged.time_blocks(starts, 5, inputs.shape[1])
-    choices = {"n_neighbors": [k for k in (1, 3, 10, 30, 100) if k <= min(len(learnt) for learnt, _ in blocks)]}
+    choices = {
+        "n_neighbors": [k for k in (1, 3, 10, 30, 100) if k <= min(len(learnt) for learnt, _ in blocks)]
+    }
     return GridSearchCV(KNeighborsRegressor(), choices, cv=blocks, scoring="neg_mean_squared_error").fit(
         inputs, targets
     )
@@ -237,6 +239,7 @@ with drawing(alt, height=1.8, title=title) as panel:
 # and never trained: *random features*. Only its last layer is fitted, and that is a ridge regression again. A thousand random directions,
 # each cut off at zero:
 
+
 # %%
 def fit_random_features(inputs, targets, starts, number=1_000, seed=0):
     in_mean, in_scale = inputs.mean(), inputs.std()
@@ -351,7 +354,9 @@ with drawing(alt, height=2.4, title=title) as panel:
 for name, values in rows.items():
     print(f"{name:24}" + "".join(f"   share {share:g}: {value:.3f}" for share, value in zip(shares, values)))
 assert abs(rows["random features"][0] - rows["ridge regression"][0]) < 0.01  # nothing to find
-assert not is_full or rows["ridge regression"][-1] > 1.2 * max(rows["random features"][-1], rows["network"][-1])
+assert not is_full or rows["ridge regression"][-1] > 1.2 * max(
+    rows["random features"][-1], rows["network"][-1]
+)
 
 # %% [markdown]
 # ## What published runs say

@@ -39,7 +39,7 @@ def run_score(options: argparse.Namespace) -> int:
     detector = None if options.detector is None else named[options.detector]
     chosen = ScoreOptions(detector, options.num_windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)
-    from enhsim_tf.simulator.model_folder import models_of
+    from enhsim_tf.simulator.model_folder import models_of, spoken
     from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
     from enhsim_tf.telemetry.sources import read_source
 
@@ -60,7 +60,7 @@ def run_score(options: argparse.Namespace) -> int:
         if options.figure:
             from enhsim_tf.simulator.score_figure import score_figure
 
-            score_figure(frame, simulator, source_names[model]).savefig(paths[model].with_suffix(".png"), dpi=200, format="png")
+            score_figure(frame, simulator, spoken(simulator.channels)).savefig(paths[model].with_suffix(".png"), dpi=200, format="png")
         found[source_names[model]] = {
             "scores": str(paths[model]),
             "detector": frame.attrs["detector"],
@@ -72,7 +72,7 @@ def run_score(options: argparse.Namespace) -> int:
         if not options.json:
             notes = [f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())]
             lines = [line for each in cleaned.values() for line in each.report.lines()]
-            tell("\n".join([*lines, *notes, *_said(frame, simulator, source_names[model], paths[model])]))
+            tell("\n".join([*lines, *notes, *_said(frame, simulator, paths[model])]))
 
     code = for_each(channels, write)
     if options.json:
@@ -80,8 +80,10 @@ def run_score(options: argparse.Namespace) -> int:
     return code
 
 
-def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", name: str, path: Path) -> list[str]:
-    name, trained, lines = printable(name), simulator.trained, []
+def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", path: Path) -> list[str]:
+    from enhsim_tf.simulator.model_folder import spoken
+
+    name, trained, lines = spoken(simulator.channels), simulator.trained, []
     if not trained.get("keeps_promise", True):
         lines.append(
             f"{name}: WARNING: on held-out nominal time {trained['false_alarms']:.0%} were flagged at 1 % set, so do not trust these alarms"

@@ -19,7 +19,7 @@ from enhsim_tf.common.console import SILENT, Progress, tell
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.simulator.model_folder import folder_of, name_of_channels, refuse_foreign
+from enhsim_tf.simulator.model_folder import folder_of, name_of_channels, refuse_foreign, spoken
 from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.simulator.saving import MANIFEST
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
@@ -257,7 +257,7 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
     from enhsim_tf.simulator.report_figure import report_figure
 
     name = name_of_channels(list(telemetry.columns))
-    progress = Progress(_tell_if_heard, f"{printable(name)}: ") if job.speaks else SILENT
+    progress = Progress(_tell_if_heard, f"{spoken(telemetry.columns)}: ") if job.speaks else SILENT
     commands = job.commands if len(job.series) == 1 else None
     simulator, report = fit(telemetry, _run_of(job, telemetry), job.options, progress, commands)
     folder = folder_of(job.out, name)

@@ -12,6 +12,7 @@ from enhsim_tf.enhancer.candidates import Choice
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
 from enhsim_tf.simulator.joint import cut
+from enhsim_tf.simulator.model_folder import spoken
 from enhsim_tf.simulator.noise_choice import TOLD_APART
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange
@@ -71,7 +72,7 @@ class Report:
 
     def lines(self) -> list[str]:
         """Returns the report as lines of text: the warning, if there is one, comes first."""
-        name = ", ".join(self.channels)
+        name = spoken(self.channels)
         where = "held-out time" if self.is_held_out else "the telemetry of the fit (none was held out)"
         chosen = next(each for each in self.detectors if each["name"] == self.detector)
         rates = "; ".join(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}{_relation(each)}" for each in self.detectors)
@@ -88,7 +89,7 @@ class Report:
         ]
         if self.outside is not None:
             found.append(f"range: {self.outside:.1%} of that time are outside the training range of the coarse columns")
-        return [printable(f"{name}: {line}") for line in found if line]
+        return [f"{name}: {printable(line)}" for line in found if line]
 
     def _warnings(self, chosen: Mapping[str, Any]) -> list[str]:
         found = []

@@ -188,6 +188,12 @@ def test_the_comparison_hand_worked():
     assert second.behind == 0 and second.is_within and not first.is_within
 
 
+@pytest.mark.parametrize(("squared", "is_within"), [(0.0407, True), (0.0409, False)])  # 2 % above 0.04 is 0.0408
+def test_an_error_that_is_one_per_cent_larger_is_as_good(squared, is_within):
+    first, _ = judge({"simple": np.full(3, squared), "best": np.full(3, 0.04)})
+    assert first.is_within == is_within
+
+
 def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monkeypatch):
     seen = []
     monkeypatch.setattr(
