@@ -1,0 +1,250 @@
+# %% [markdown]
+# # Several channels
+#
+# **Question:** how is a fault found that no single channel shows?
+#
+# - **After this lesson** you can generate noise for several channels that keeps how they move together, and build a detector that sees it.
+# - **You should know** ridge regression (notebook 04), the conformal threshold (notebook 13) and residual windows (notebook 25).
+# - **Terms:** [residual](../docs/glossary.md#residual): telemetry minus enhanced run; *marginal*: the distribution of one channel alone;
+#   *cross-correlation*: the correlation of two channels at the same time.
+#
+# **What the paper says:** its telemetry has one channel. Real vehicles have hundreds.
+
+# %%
+import numpy as np
+from lesson_tools import check_answer, drawing, say
+from scipy.signal import lfilter
+
+from enhsim_tf.common.plot_style import COARSE, ENHANCED, REAL
+from enhsim_tf.enhancer.ridge import fit_ridge, time_blocks
+
+window, num_samples = 100, 60_000
+
+
+def lagged(values, memory):
+    """A slow version of a series, with a standard deviation of 1."""
+    values = lfilter([1.0], [1.0, -memory], values, axis=0)
+    return values / values[1_000:].std(axis=0)
+
+
+rng = np.random.default_rng(0)
+current = lagged(rng.standard_normal(num_samples), 0.97)  # what the simulator knows
+sunlight = lagged(rng.standard_normal(num_samples), 0.99)  # what it does not know, and both channels feel
+own = 0.1 * rng.standard_normal((num_samples, 2))
+signal = lagged(np.stack([current, current], axis=1), 0.9) * [1.0, 0.6]
+telemetry = signal + sunlight[:, None] * [0.3, 0.25] + own
+
+# %% [markdown]
+# Two temperatures of one panel follow a current that the simulator knows, and sunlight that it does not know. Cut windows, and map the
+# simulator's windows to both channels at once. What is left of a window is a residual of two channels:
+
+
+# %%
+def cut(values, starts):
+    return np.stack([values[start : start + window] for start in starts])
+
+
+starts = np.arange(1_000, num_samples - window + 1, 50)
+known, later = starts[starts < 40_000], starts[starts >= 40_000 + window]
+inputs, targets = cut(current, known), cut(telemetry, known)
+ridge = fit_ridge(inputs, targets.reshape(len(known), -1), known, num_channels=2)
+residuals = np.empty_like(targets)
+for learnt, held_out in time_blocks(known, 5, window):
+    fitted = fit_ridge(
+        inputs[learnt], targets[learnt].reshape(len(learnt), -1), known[learnt], num_channels=2
+    )
+    residuals[held_out] = targets[held_out] - fitted.predict(inputs[held_out]).reshape(-1, window, 2)
+new_residuals = cut(telemetry, later) - ridge.predict(cut(current, later)).reshape(-1, window, 2)
+
+# %% [markdown]
+# ## Drawing noise for two channels
+#
+# A residual window is drawn at random. Draw it *for both channels at once*, or *separately*, each channel from a time of its own:
+
+
+# %%
+def draw_jointly(number, rng):
+    return residuals[rng.integers(0, len(residuals), number)]
+
+
+def draw_separately(number, rng):
+    return np.stack(
+        [residuals[rng.integers(0, len(residuals), number), :, channel] for channel in range(2)], axis=2
+    )
+
+
+def cross_correlation(windows):
+    return np.corrcoef(windows[:, :, 0].ravel(), windows[:, :, 1].ravel())[0, 1]
+
+
+noise = {
+    "drawn jointly": draw_jointly(2_000, np.random.default_rng(1)),
+    "drawn separately": draw_separately(2_000, np.random.default_rng(1)),
+}
+correlations = {"real": cross_correlation(new_residuals)} | {
+    name: cross_correlation(windows) for name, windows in noise.items()
+}
+say(
+    "Cross-correlation: " + ", ".join(f"{name} **{value:.2f}**" for name, value in correlations.items()) + "."
+)
+assert abs(correlations["drawn jointly"] - correlations["real"]) < 0.1
+assert abs(correlations["drawn separately"]) < 0.1
+
+# %%
+title = f"Drawn separately, the channels lose their correlation of {correlations['real']:.2f}; drawn jointly, they keep it"
+alt = "Scatter of the residuals of two channels: real, drawn jointly, drawn separately"
+with drawing(alt, columns=3, height=2.4, title=title, sharex=True, sharey=True) as panels:
+    shown = ({"real": new_residuals} | noise).items()
+    for panel, (name, windows), color in zip(panels, shown, (REAL, ENHANCED, COARSE)):
+        points = windows[:200, ::10].reshape(-1, 2)
+        panel.plot(points[:, 0], points[:, 1], ".", color=color, markersize=2)
+        panel.set(xlabel="first channel", title=name)
+    panels[0].set_ylabel("second channel")
+
+# %% [markdown]
+# Each channel alone looks the same in all three panels: the marginals are equal.
+#
+# ## A detector that sees both
+#
+# Describe a residual window by the means of its four quarters, for one channel or for both. The score is the *Mahalanobis distance* of
+# these numbers: their size, measured against the covariance in training. It is the covariance that knows about the other channel.
+
+
+# %%
+def quarters(windows):
+    return windows.reshape(len(windows), 4, window // 4, -1).mean(axis=2).reshape(len(windows), -1)
+
+
+def fit_distance(windows):
+    features = quarters(windows)
+    mean, precision = features.mean(axis=0), np.linalg.inv(np.cov(features, rowvar=False))
+    return lambda others: np.einsum(
+        "wi,ij,wj->w", quarters(others) - mean, precision, quarters(others) - mean
+    )
+
+
+def conformal(scores, rate=0.01):
+    return np.sort(scores)[int(np.ceil((len(scores) + 1) * (1 - rate))) - 1]
+
+
+alone = [fit_distance(residuals[:, :, [channel]]) for channel in range(2)]
+detectors = {
+    "each channel alone": lambda windows: np.maximum(*(alone[n](windows[:, :, [n]]) for n in range(2))),
+    "both, noise drawn separately": fit_distance(noise["drawn separately"]),
+    "both, noise drawn jointly": fit_distance(noise["drawn jointly"]),
+}
+
+# %% [markdown]
+# The fault: the second channel comes from another time, as if its cable were plugged in wrongly. Every value, every spectrum and every
+# marginal stays as it was.
+
+# %%
+other = np.random.default_rng(2).permutation(len(new_residuals))
+wrong_time = np.stack([new_residuals[:, :, 0], new_residuals[other][:, :, 1]], axis=2)
+rates = {}
+for name, score in detectors.items():
+    limit = conformal(score(residuals))
+    rates[name] = np.mean(score(wrong_time) > limit), np.mean(score(new_residuals) > limit)
+title = (
+    f"Noise drawn jointly lets the detector find {rates['both, noise drawn jointly'][0]:.0%} of the windows"
+)
+alt = "Share of windows found with one channel from another time, for three detectors"
+with drawing(alt, height=1.5, title=title) as panel:
+    bars = panel.barh(list(rates), [found for found, _ in rates.values()], color=[COARSE, COARSE, ENHANCED])
+    panel.bar_label(bars, [f"{found:.0%}" for found, _ in rates.values()], padding=2, fontsize=7)
+    panel.invert_yaxis()
+    panel.set(xlabel="windows found (thresholds set for 1 %)", xlim=(0, 1.05))
+
+# %% [markdown]
+# *What to see:* looking at each channel alone finds about as little as chance. Looking at both is not enough either: a detector that has
+# learnt noise without a correlation cannot miss it. Only with noise that was drawn jointly does the fault stand out.
+
+# %%
+for name, (found, alarms) in rates.items():
+    print(f"{name:30} found {found:5.1%}   false alarms {alarms:5.1%}")
+assert rates["both, noise drawn jointly"][0] > 0.5 > 0.1 > rates["both, noise drawn separately"][0]
+assert rates["each channel alone"][0] < 0.05
+
+# %% [markdown]
+# ## The same with the package
+#
+# `fit` learns all columns of a file together: one enhancer, residual windows drawn for all channels at once, and a detector of all
+# channels. Its report compares the cross-correlation of the noise with that of two halves of real noise.
+
+# %%
+import pandas as pd
+
+from enhsim_tf import FitOptions, clean, fit, read_recording, read_source
+
+clock = pd.Index(np.arange(20_000.0), name="time")
+measured = read_source(pd.DataFrame(telemetry[1_000:21_000], clock, ["sunny side", "back"]))
+simulated = read_recording(pd.DataFrame({"current": current[1_000:21_000]}, clock))
+options = FitOptions(window=window, num_windows=600, enhancer="ridge", noise="residual windows")
+model, report = fit({name: clean(series).parts for name, series in measured.items()}, simulated, options)
+print("\n".join(line for line in report.lines() if "correlation of the noise" in line or "detectors" in line))
+
+# %% [markdown]
+# **Answer.** By a detector that sees all channels and has learnt how they move together. Simulated training data must keep that, too, and
+# the cheapest way is to draw residual windows for all channels at once.
+#
+# ## Exercises
+#
+# **1.** Another fault without a mark in any channel: the second channel is *late* by half a window: it shows what was there 50 samples
+# earlier. The next cell makes these residuals, `delayed`. Give the share of them that the last detector finds.
+
+# %%
+earlier = cut(telemetry, later - 50) - ridge.predict(cut(current, later - 50)).reshape(-1, window, 2)
+delayed = np.stack([new_residuals[:, :, 0], earlier[:, :, 1]], axis=2)
+share_late = None  # your answer
+
+# %%
+score = detectors["both, noise drawn jointly"]
+check_answer(
+    share_late,
+    lambda share: np.isclose(share, np.mean(score(delayed) > conformal(score(residuals)))),
+    "Score `delayed` with the detector of both channels and the threshold of the known residuals.",
+)
+
+# %% [markdown]
+# **2.** How much do the quarters' means of the two channels share? Give the correlation of the first quarter of the first channel with the
+# first quarter of the second, over the known residuals.
+
+# %%
+correlation = None  # your answer
+
+# %%
+features = quarters(residuals)
+check_answer(
+    correlation,
+    lambda value: np.isclose(value, np.corrcoef(features[:, 0], features[:, 1])[0, 1]),
+    "quarters gives the channels of a quarter side by side: columns 0 and 1 belong to the first quarter.",
+)
+
+# %% [markdown]
+# ## Solution
+#
+# <details><summary>1. A late channel</summary>
+#
+# ```python
+# score = detectors["both, noise drawn jointly"]
+# share_late = np.mean(score(delayed) > conformal(score(residuals)))
+# print(f"{share_late:.0%}")
+# ```
+#
+# It finds nearly as many windows as with a channel from another time: half a window is enough.
+#
+# </details>
+
+# %% [markdown]
+# <details><summary>2. Shared quarters</summary>
+#
+# ```python
+# features = quarters(residuals)
+# correlation = np.corrcoef(features[:, 0], features[:, 1])[0, 1]
+# print(f"{correlation:.3f}, and over single samples {cross_correlation(residuals):.3f}")
+# ```
+#
+# It is higher than over single samples, because the noise that each channel has for itself is averaged away. That is why the detector looks
+# at means.
+#
+# </details>
