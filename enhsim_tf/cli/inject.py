@@ -80,6 +80,7 @@ def _inject_joint(options: argparse.Namespace, kinds: tuple[str, ...], severity:
     """Injects anomalies of several channels into one table."""
     from enhsim_tf.datasets.inject_joint import inject_joint
     from enhsim_tf.datasets.label_columns import write_table, write_timeeval
+    from enhsim_tf.telemetry.cleaning.report import lines_of
     from enhsim_tf.telemetry.sources import read_source
 
     if options.at or options.noise_sd is not None:
@@ -95,7 +96,7 @@ def _inject_joint(options: argparse.Namespace, kinds: tuple[str, ...], severity:
         write_timeeval(path, {name: frame[[name, "mask"]].rename(columns={name: "value"}) for name in telemetry.columns})
     else:
         write_table(path, frame)
-    lines = [line for each in cleaned.values() for line in each.report.lines()]
+    lines = lines_of([each.report for each in cleaned.values()])
     lines += [
         f"{kind} of {printable(channel)} from sample {begin:,} to {end:,}" for kind, _, begin, end, channel in frame.attrs["anomalies"]
     ]

@@ -18,7 +18,7 @@ from enhsim_tf.cli.options import (
     run_for,
 )
 from enhsim_tf.common.console import tell
-from enhsim_tf.common.errors import printable
+from enhsim_tf.common.errors import printable, spoken
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,8 +39,9 @@ def run_score(options: argparse.Namespace) -> int:
     detector = None if options.detector is None else named[options.detector]
     chosen = ScoreOptions(detector, options.num_windows, options.false_alarm_rate, options.seed)
     cleaning = cleaning_options(options, 2)
-    from enhsim_tf.simulator.model_folder import models_of, spoken
+    from enhsim_tf.simulator.model_folder import models_of
     from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
+    from enhsim_tf.telemetry.cleaning.report import lines_of
     from enhsim_tf.telemetry.sources import read_source
 
     models = models_of(options.models)
@@ -71,7 +72,7 @@ def run_score(options: argparse.Namespace) -> int:
         }
         if not options.json:
             notes = [f"{printable(model)}: {note}" for note in (run.notes if run is not None else ())]
-            lines = [line for each in cleaned.values() for line in each.report.lines()]
+            lines = lines_of([each.report for each in cleaned.values()])
             tell("\n".join([*lines, *notes, *_said(frame, simulator, paths[model])]))
 
     code = for_each(channels, write)
@@ -81,8 +82,6 @@ def run_score(options: argparse.Namespace) -> int:
 
 
 def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", path: Path) -> list[str]:
-    from enhsim_tf.simulator.model_folder import spoken
-
     name, trained, lines = spoken(simulator.channels), simulator.trained, []
     if not trained.get("keeps_promise", True):
         lines.append(

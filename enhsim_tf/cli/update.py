@@ -24,6 +24,7 @@ def run_update(options: argparse.Namespace) -> int:
     models = models_of(options.models)
     out = Path(os.path.abspath(options.out or f"{os.path.abspath(options.models)}-updated"))
     cleaning = cleaning_options(options, 2, "missing")
+    from enhsim_tf.telemetry.cleaning.report import lines_of
     from enhsim_tf.telemetry.sources import read_source
 
     series = read_source(options.source, options.column, options.time, cleaning)
@@ -53,7 +54,7 @@ def run_update(options: argparse.Namespace) -> int:
             write_json(temporary / "report.json", kept)
         found[model] = kept
         if not options.json:
-            lines = [line for each in cleaned.values() for line in each.report.lines()]
+            lines = lines_of([each.report for each in cleaned.values()])
             tell("\n".join([*lines, *report.lines(), f"updated simulator and report.json in {folders[model]}/"]))
 
     code = for_each(channels, write)

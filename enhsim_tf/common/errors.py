@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Sequence
 
 _MAX_CHARACTERS, _END = 600, 150  # a longer message loses its middle; its last 150 characters, which say what to do, stay
 _PASSWORD = re.compile(r"(?<=//)[^/@\s]*:(?!\d+/)[^@]{0,200}@|(?<![^\s'\"(=])[^@/:\s'\"(=]+:[^@/\s]+@(?=[^\s@]*:\d)")
@@ -33,3 +34,12 @@ class InputError(ValueError):
 def printable(text: str) -> str:
     """Replaces every character that cannot be printed, such as a line break, by a question mark."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def spoken(channels: Sequence[str]) -> str:
+    """Returns the channels as a line of a report names them: up to three by their names, more by their number.
+
+    Args:
+        channels: Names of the channels.
+    """
+    return printable(", ".join(channels) if len(channels) <= 3 else f"{len(channels)} channels")

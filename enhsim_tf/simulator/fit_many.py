@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING
 
 from enhsim_tf.common.atomic_files import make_folder, remove_leftovers, replace_folder, write_json
 from enhsim_tf.common.console import SILENT, Progress, tell
-from enhsim_tf.common.errors import InputError, printable
+from enhsim_tf.common.errors import InputError, printable, spoken
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from enhsim_tf.simulator.model_folder import folder_of, name_of_channels, refuse_foreign, spoken
+from enhsim_tf.simulator.model_folder import folder_of, name_of_channels, refuse_foreign
 from enhsim_tf.simulator.options import FitOptions
 from enhsim_tf.simulator.saving import MANIFEST
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
+from enhsim_tf.telemetry.cleaning.report import lines_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -206,7 +207,7 @@ def fit_or_say(job: Job) -> Outcome:
     for name, series in job.series.items():
         reason = _reason_of(name, lambda name=name, series=series: cleaned.update({name: _cleaned(name, series, job.cleaning)}))
         failed |= {name: reason} if reason else {}
-    lines = [line for each in cleaned.values() for line in each.report.lines()]
+    lines = lines_of([each.report for each in cleaned.values()])
     reports: dict[str, dict] = {}
     for telemetry in _on_one_clock(cleaned):
         names = name_of_channels(list(telemetry.columns))

@@ -35,15 +35,6 @@ def name_of_channels(channels: Sequence[str]) -> str:
     return joined if len(channels) == 1 or len(joined.encode()) <= _MOST_BYTES else f"{channels[0]}~{len(channels) - 1} more"
 
 
-def spoken(channels: Sequence[str]) -> str:
-    """Returns the channels as a line of a report names them: up to three by their names, more by their number.
-
-    Args:
-        channels: Names of the channels.
-    """
-    return printable(", ".join(channels) if len(channels) <= 3 else f"{len(channels)} channels")
-
-
 def channels_of(folder: Path) -> tuple[str, ...]:
     """Returns the names of the channels of a saved simulator without loading it.
 

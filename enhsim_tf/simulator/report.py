@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
-from enhsim_tf.common.errors import printable
+from enhsim_tf.common.errors import printable, spoken
 from enhsim_tf.enhancer.candidates import Choice
 from enhsim_tf.enhancer.names import COARSE
 from enhsim_tf.simulator.detector_choice import RATE, RELATIONS, JudgedDetector
 from enhsim_tf.simulator.joint import cut
-from enhsim_tf.simulator.model_folder import spoken
 from enhsim_tf.simulator.noise_choice import TOLD_APART
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.simulator.trusted_range import TrustedRange

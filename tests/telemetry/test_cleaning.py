@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
-from enhsim_tf.telemetry.cleaning.report import KINDS, finding_from_dict
+from enhsim_tf.telemetry.cleaning.report import KINDS, finding_from_dict, lines_of
 
 ROOT = Path(__file__).parents[2]
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
@@ -548,3 +548,18 @@ def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, ma
     for part, wanted, run in zip(cleaned.parts, expected, runs, strict=True):
         np.testing.assert_allclose(part.values, wanted, atol=1e-5)
         assert begin + part.offset_s == pytest.approx(run[0], abs=max(1e-5, 1.5 * jitter))
+
+
+def test_what_channels_share_is_said_once():
+    times = pd.date_range("2024-01-01", periods=602, freq="s", tz="UTC").delete([20, 21])
+    reports = []
+    for name, step in (("volts", 0), ("amperes", 1.0)):
+        values = np.random.default_rng(0).standard_normal(600)
+        values = np.round(values / step) * step if step else values
+        reports.append(clean(pd.Series(values, times, name=name)).report)
+    first, *rest = lines_of(reports)
+    assert first.startswith("volts, amperes: 600 rows, 600 used")
+    shared = [finding.line() for finding in reports[0].findings]
+    assert shared and [line for line in rest if line.startswith("volts, amperes: ")] == [f"volts, amperes: {line}" for line in shared]
+    assert [line for line in rest if line.startswith("amperes: ")] and not [line for line in rest if line.startswith("volts: ")]
+    assert lines_of(reports[:1]) == reports[0].lines() == [f"volts: {reports[0].summary}", *shared]

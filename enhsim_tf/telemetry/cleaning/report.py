@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.common.errors import printable
+from enhsim_tf.common.errors import printable, spoken
 
 _ACTIONS = {
     "accepted": "files, header lines, encoding, clock, further clocks, labels, quality flags, row numbers, own columns, series, "
@@ -139,19 +139,38 @@ class Report:
         """The first finding of a kind, or None."""
         return next((finding for finding in self.findings if finding.kind == kind), None)
 
-    def lines(self) -> list[str]:
-        """The report as text: a summary, then one line for each finding."""
+    @property
+    def summary(self) -> str:
+        """The counts of rows and samples."""
         parts = "1 part" if self.num_parts == 1 else f"{self.num_parts} parts"
         filled = f", {self.samples_filled:,} of them filled in" if self.samples_filled else ""
-        head = f"{self.channel}: {self.rows_in:,} rows, {self.rows_used:,} used, {self.rows_left_out:,} left out; "
-        lines = [f"{head}{self.samples:,} samples in {parts}{filled}", *(finding.line() for finding in self.findings)]
-        return [printable(line) for line in lines]  # names of channels and columns may contain control characters
+        rows = f"{self.rows_in:,} rows, {self.rows_used:,} used, {self.rows_left_out:,} left out"
+        return f"{rows}; {self.samples:,} samples in {parts}{filled}"
+
+    def lines(self) -> list[str]:
+        """The report as text: a summary, then one line for each finding."""
+        return lines_of([self])
 
     def to_dict(self) -> dict[str, Any]:
         """The report in plain JSON types."""
         counted = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         sums = {"rows_left_out": self.rows_left_out, "samples_filled": self.samples_filled}
         return counted | sums | {"findings": [finding.to_dict() for finding in self.findings]}
+
+
+def lines_of(reports: Sequence[Report]) -> list[str]:
+    """The reports of one or several channels as text; what several channels share is said once.
+
+    Args:
+        reports: The reports.
+    """
+    owners: dict[str, list[str]] = {}
+    for report in reports:
+        for text in (report.summary, *(finding.line() for finding in report.findings)):
+            owners.setdefault(text, []).append(report.channel)
+    is_named = [len(reports) > 1 or text == reports[0].summary for text in owners]
+    lines = [f"{spoken(names)}: {text}" if named else text for (text, names), named in zip(owners.items(), is_named, strict=True)]
+    return [printable(line) for line in lines]  # names of channels and columns may contain control characters
 
 
 class CleaningLog:
