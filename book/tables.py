@@ -89,11 +89,43 @@ def _marked(name: str) -> re.Pattern:
 
 
 def verdicts(root: Path) -> str:
-    """The box of the README: for each claim the published verdict, that of the run in `figures/`, and what decides it."""
-    from enhsim_tf.paper.report import as_markdown, box, read_published  # with the networks, TensorFlow
+    """The claims of the README, each with its published verdict and the runs that agree."""
+    published = json.loads((root / "enhsim_tf" / "paper" / "published.json").read_text(encoding="utf-8"))["claims"]
+    short = {claim["id"]: claim["short"] for claim in json.loads((root / "figures" / "results.json").read_text(encoding="utf-8"))["claims"]}
+    rows = [(f"{id} {short[id]}", each["verdict"], f"{each['agreeing']} of {each['of']}") for id, each in published.items()]
+    return markdown(("claim", "verdict", "runs that agree"), rows)
 
-    found = json.loads((root / "figures" / "results.json").read_text(encoding="utf-8"))
-    return as_markdown(box(found["claims"], read_published()))
+
+def measurements(root: Path) -> str:
+    """What each limit of the claims asks for, and what the reference measured over seeds and roundings."""
+    import pandas as pd
+
+    from enhsim_tf.paper.claims import CLAIMS, OURS, WHOLE  # with the networks, TensorFlow
+    from enhsim_tf.paper.report import needed, short
+
+    table = pd.read_parquet(root / "studies" / "readings" / "results" / "measurements.parquet")
+    reference = table[table["reading"] == "reference"]
+    rows = []
+    for claim in CLAIMS:
+        runs = reference[reference["claim"] == claim.id].pivot(index=["rounding", "seed"], columns="name", values="value")
+        for limit in claim.limits:
+            values, measured = runs[limit.name], runs.to_dict("records")
+            middle = {"low": limit.low, "high": limit.upper(runs.median())}
+            asked = needed({end: None if math.isinf(value) else value for end, value in middle.items()})
+            found = f"{short(values.median())} ({short(values.min())} to {short(values.max())})"
+            kind = {OURS: "no", WHOLE: "for *reproduced*"}.get(limit.decides, "yes")
+            rows.append((claim.id, limit.words, found, asked, kind, f"{sum(map(limit.holds, measured))} of {len(measured)}"))
+    return markdown(("claim", "measured", "median (range)", "needed", "decides", "holds in"), rows)
+
+
+def readings(root: Path) -> str:
+    """The most common verdict of each reading on each claim that it touches."""
+    import pandas as pd
+
+    from studies.readings.summary import most_common, verdicts  # with the networks, TensorFlow
+
+    table = pd.read_parquet(root / "studies" / "readings" / "results" / "measurements.parquet")
+    return markdown(*most_common(verdicts(table)))
 
 
 def settings_table(root: Path) -> str:
@@ -117,6 +149,8 @@ def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 TABLES: dict[str, tuple[str, Callable[[Path], str]]] = {
     "verdicts": ("README.md", verdicts),
+    "measurements": ("docs/report.md", measurements),
+    "readings": ("studies/readings/README.md", readings),
     "settings": ("docs/decisions.md", settings_table),
     "speed": ("docs/speed.md", speed),
 }

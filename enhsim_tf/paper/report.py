@@ -76,12 +76,6 @@ def as_text(rows: Sequence[Mapping[str, str]]) -> str:
     return "\n".join("  ".join(line).rstrip() for line in lines)
 
 
-def as_markdown(rows: Sequence[Mapping[str, str]]) -> str:
-    """A table for the README."""
-    lines = [list(rows[0]), ["---"] * len(rows[0]), *(list(row.values()) for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def results(
     records: Sequence[Mapping[str, Any]], title: str, settings: Settings, published: Mapping[str, Any] | None, **about: Any
 ) -> dict[str, Any]:

@@ -98,6 +98,27 @@ def publish(table: pd.DataFrame) -> dict[str, Any]:
     return {"title": sign, "basis": f"{seeds} seeds of the reference with two roundings; readings: {readings}", "claims": claims}
 
 
+def most_common(found: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """The table of the README: for each reading its number of runs, and on each claim the most common verdict with its share of the runs.
+
+    Args:
+        found: The result of `verdicts`.
+
+    Returns:
+        Header and rows.
+    """
+    claims = [claim.id for claim in CLAIMS]
+    rows = []
+    for reading, runs in found.groupby("reading", sort=False):
+        row = [reading, str(len(runs[["rounding", "seed"]].drop_duplicates()))]
+        for claim in claims:
+            given = collections.Counter(runs.loc[runs["claim"] == claim, "verdict"])
+            verdict, number = given.most_common(1)[0] if given else ("", 0)
+            row.append(f"{verdict} {number}/{given.total()}" if given and touches(reading, claim) else "")
+        rows.append(row)
+    return ["reading", "runs", *claims], rows
+
+
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """The share of runs with each verdict, by reading, claim and verdict, for the figure and the table of the README."""
     is_touched = np.array([touches(reading, claim) for reading, claim in zip(found["reading"], found["claim"], strict=True)], bool)
