@@ -269,7 +269,13 @@ def _fit_group(telemetry: "Recording", cleaned: "Mapping[str, Cleaned]", job: Jo
         write_json(temporary / "report.json", found)
         report_figure(report).savefig(temporary / "report.png", dpi=200, format="png")
     reports[name] = found | {"folder": str(folder)}
-    lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {os.path.relpath(folder)}/"]
+    lines += [*report.lines(), f"{printable(name)}: simulator, report.json and report.png in {_shown(folder)}/"]
+
+
+def _shown(folder: Path) -> str:
+    """The folder as seen from here; its full path if it is elsewhere."""
+    here = os.path.relpath(folder)
+    return str(folder) if here.startswith("..") else here
 
 
 def _run_of(job: Job, telemetry: "Recording") -> "Recording | None":

@@ -93,8 +93,8 @@ def find_departure(
     return Departure(
         begin,
         what,
-        f"since {since} the telemetry has left what was learnt and stays there ({', '.join(what)}): one event. If this is the new normal, "
-        "go on with `update`; score_after are scores against the new operating point.",
+        f"since {since} the telemetry has left what was learnt and stays there ({', '.join(what)}): one event. It is a lasting fault, or the "
+        "new normal: then go on with `update`. score_after are scores against the new operating point.",
         after,
     )
 

@@ -5,7 +5,7 @@ The files need no JSBSim to be read. Times count seconds; nominal flights of 20 
     telemetry.csv        the fine simulator through noisy sensors: what the aircraft's recorder would keep
     simulator.csv        the point mass over the same flights: its channels, and the commands that drive it
     telemetry_fault.csv  another flight, whose left engine answers its throttle 5 % too little after five minutes
-    simulator_fault.csv  the point mass over that flight as planned: an operator does not know of the fault
+    simulator_planned.csv  the point mass over that flight as planned: an operator does not know of the fault
 """
 
 import functools

@@ -493,12 +493,16 @@ def test_the_files_of_this_tool_are_read_back(tmp_path, form):
 
 
 def test_scores_of_this_tool_are_no_channels(tmp_path):
-    pd.DataFrame({"time": TIMES, "value": VALUES, "score": VALUES / 30, "flag": VALUES > 24}).to_csv(tmp_path / "a.csv", index=False)
+    pd.DataFrame({"time": TIMES, "value": VALUES, "score": VALUES / 30, "flag": VALUES > 24, "score_after": VALUES / 40}).to_csv(
+        tmp_path / "a.csv", index=False
+    )
     assert list(read_source(tmp_path / "a.csv")) == ["value"]
 
 
 def test_copies_of_a_run_are_series(tmp_path):
-    long(copy=(0, 1)).rename(columns={"v": "value"}).assign(out_of_range=0.5).to_parquet(tmp_path / "a.parquet")
+    long(copy=(0, 1)).rename(columns={"v": "value"}).assign(out_of_range=0.5, scenario="worn", severity=0.5, mask=1).to_parquet(
+        tmp_path / "a.parquet"
+    )
     channels = read_source(tmp_path / "a.parquet")
     assert list(channels) == ["copy 0", "copy 1"]
     check(channels["copy 1"], VALUES + 9)

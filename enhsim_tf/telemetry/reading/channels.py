@@ -20,7 +20,7 @@ from enhsim_tf.telemetry.reading.table import Table
 
 _SAID = {
     "row numbers": "columns that number the rows, not taken as channels",
-    "quality flags": "columns of quality flags, not taken as channels; name them with columns (--column) if they are telemetry",
+    "quality flags": "columns of quality flags, not taken as channels unless they are named",
     "further clocks": "further columns of times, not taken as channels",
     "own columns": "columns that this tool wrote beside the values, not taken as channels",
     "columns left out": "columns without numbers",

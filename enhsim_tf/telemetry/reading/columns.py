@@ -21,8 +21,8 @@ _NORMAL = set("0 false no normal nominal ok none good benign healthy regular inl
 _ANOMALOUS = set("1 true yes anomaly anomalous attack fault faulty abnormal outlier".split())
 _OWN = {  # what the commands write beside the values: the columns that give it away, all columns, and the label among them
     "labelled series": (("severity", "onset", "end", "mask"), ("scenario", "severity", "onset", "end", "mask"), "mask"),
-    "scores": (("value", "score", "flag"), ("enhanced", "score", "flag", "out_of_range"), None),
-    "copies of a run": (("copy", "value", "out_of_range"), ("out_of_range",), None),
+    "scores": (("value", "score", "flag"), ("enhanced", "score", "score_after", "flag", "out_of_range"), None),
+    "copies of a run": (("copy", "value", "out_of_range"), ("scenario", "severity", "onset", "end", "mask", "out_of_range"), None),
 }
 _MAX_STATES = 10  # a label or flag has at most this many different values
 _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
