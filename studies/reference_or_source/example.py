@@ -42,7 +42,7 @@ def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS
     import pandas as pd
 
     folder, aircraft = make_folder(folder), Aircraft()
-    for part, (number, fault, suffix) in enumerate(((num_flights, None, ""), (1, FAULT, "_fault"))):
+    for part, (number, fault) in enumerate(((num_flights, None), (1, FAULT))):
         rng = np.random.default_rng([seed, part])
         commands = aircraft.draw_commands(number, rng)
         telemetry = aircraft.measure(aircraft.run_real(commands, [fault], rng)[0], rng)
@@ -50,15 +50,15 @@ def write_example(folder: Path, seed: int = SEED, num_flights: int = NUM_FLIGHTS
         samples = np.arange(len(commands))
         times = samples // aircraft.unit_samples * _PERIOD_S + samples % aircraft.unit_samples
         for name, columns, digits, values in (
-            ("telemetry", aircraft.channels, _TELEMETRY_DIGITS, telemetry),
-            ("simulator", aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
+            ("telemetry" if fault is None else "telemetry_fault", aircraft.channels, _TELEMETRY_DIGITS, telemetry),
+            ("simulator" if fault is None else "simulator_planned", aircraft.coarse_columns, _SIMULATOR_DIGITS, simulator),
         ):
             cells = zip(columns, digits, values.T, strict=True)
             table = pd.DataFrame(
                 {column: [f"{value + 0.0:.{places}f}" for value in np.round(series, places)] for column, places, series in cells}
             )
             table.insert(0, "time", times)
-            with replace_file(folder / f"{name}{suffix}.csv") as temporary:
+            with replace_file(folder / f"{name}.csv") as temporary:
                 table.to_csv(temporary, index=False, lineterminator="\n")
 
 

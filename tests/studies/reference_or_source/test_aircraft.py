@@ -203,11 +203,11 @@ def test_errors_are_one_line(monkeypatch, jsbsim, level):
 
 
 def test_the_recorded_pair_is_small_and_its_fault_parts_the_engines():
-    tables = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("telemetry", "simulator", "telemetry_fault", "simulator_fault")}
+    tables = {name: pd.read_csv(FOLDER / f"{name}.csv") for name in ("telemetry", "simulator", "telemetry_fault", "simulator_planned")}
     assert sum((FOLDER / f"{name}.csv").stat().st_size for name in tables) < 1_000_000
     assert tuple(read_source(FOLDER / "telemetry.csv")) == AIRCRAFT.channels
-    for suffix, flights in (("", example.NUM_FLIGHTS), ("_fault", 1)):
-        telemetry, simulator = tables[f"telemetry{suffix}"], tables[f"simulator{suffix}"]
+    for recorded, run, flights in (("telemetry", "simulator", example.NUM_FLIGHTS), ("telemetry_fault", "simulator_planned", 1)):
+        telemetry, simulator = tables[recorded], tables[run]
         assert len(telemetry) == flights * UNIT_SAMPLES and not telemetry.isna().any().any()
         assert telemetry["time"].equals(simulator["time"]) and simulator["N1 left"].equals(simulator["N1 right"])
     difference = tables["telemetry_fault"]["N1 right"] - tables["telemetry_fault"]["N1 left"]
@@ -218,7 +218,7 @@ def test_the_recorded_pair_is_small_and_its_fault_parts_the_engines():
 
 def test_the_example_is_written_again_as_it_is(jsbsim, tmp_path):
     example.write_example(tmp_path, num_flights=1)
-    for name in ("simulator", "telemetry_fault", "simulator_fault"):
+    for name in ("simulator", "telemetry_fault", "simulator_planned"):
         table, shipped = pd.read_csv(tmp_path / f"{name}.csv"), pd.read_csv(FOLDER / f"{name}.csv")[:UNIT_SAMPLES]
         assert list(table) == list(shipped)
         assert np.mean(table.to_numpy() == shipped.to_numpy()) > 0.99  # another processor may round a few values to the next step
