@@ -155,29 +155,22 @@ class OneClassSVMOnFeatures:
 
 
 class JointSize:
-    """Mahalanobis distance of the means of all channels in quarters of a window, with the covariance of Ledoit and Wolf (2004).
+    """Mahalanobis distance of the means of all channels of a window.
 
-    A small change of one channel against the others is large where the channels hardly move apart otherwise.
+    A small change of one channel against the others is large where the channels hardly move apart otherwise. The covariance is not
+    shrunk: shrinkage hides just these small differences.
     """
 
     def fit(self, windows: np.ndarray) -> "JointSize":
         """Estimates mean and covariance from nominal windows."""
-        from sklearn.covariance import LedoitWolf
-
-        with threadpool_limits(1):
-            self._law = LedoitWolf().fit(self._means(windows))
+        means = _with_channels(windows).mean(axis=1, dtype=np.float64)
+        self._mean, self._precision = means.mean(axis=0), np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the squared distance of each window, divided by the number of means: about 1 for nominal windows."""
-        means = self._means(windows)
-        with threadpool_limits(1):
-            return self._law.mahalanobis(means) / means.shape[1]
-
-    @staticmethod
-    def _means(windows: np.ndarray) -> np.ndarray:
-        values = _with_channels(windows)
-        return np.concatenate([part.mean(axis=1) for part in np.array_split(values, min(4, values.shape[1]), axis=1)], axis=1)
+        """Returns the squared distance of each window, divided by the number of channels: about 1 for nominal windows."""
+        apart = _with_channels(windows).mean(axis=1, dtype=np.float64) - self._mean
+        return np.einsum("wi,ij,wj->w", apart, self._precision, apart) / apart.shape[1]
 
 
 class RandomScore:

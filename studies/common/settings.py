@@ -157,9 +157,9 @@ class ReferenceOrSourceSettings:
     num_seeds: int = setting(10, "seeds", f"{OUR_CHOICE}: as in the other studies", smoke=1)
     first_seed: int = setting(5_000, "seed", f"{OUR_CHOICE}: designs were chosen on seed 900")
     known_windows: tuple[int, ...] = setting(
-        (10, 30, 100, 300, 1_000), "windows", f"{OUR_CHOICE}: that share no sample, of whole flights or orbits", smoke=(10, 20)
+        (30, 100, 300, 1_000), "windows", f"{OUR_CHOICE}: that share no sample, of at least three flights or orbits", smoke=(30, 40)
     )
-    middle: int = setting(100, "windows", f"{OUR_CHOICE}: known windows where the other axes are tried", smoke=20)
+    middle: int = setting(100, "windows", f"{OUR_CHOICE}: known windows where the other axes are tried", smoke=30)
     test_windows: int = setting(300, "windows", f"{OUR_CHOICE}: nominal time on which false alarms are counted", smoke=20)
     source_windows: int = setting(300, "windows", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=20)
     parameter_windows: int = setting(20, "windows", f"{OUR_CHOICE}: telemetry to which parameters of the simulator are fitted", smoke=5)

@@ -55,8 +55,6 @@ ONE_CLASS: Mapping[str, Callable[[int], Any]] = {
     "joint size": lambda seed: detectors.JointSize(),
     "PCA residual": lambda seed: detectors.PCAResidual(seed=seed),
     "nearest neighbours": lambda seed: detectors.NearestNeighbours(),
-    "isolation forest": lambda seed: detectors.IsolationForestOnFeatures(100, seed),
-    "one-class SVM": lambda seed: detectors.OneClassSVMOnFeatures(),
     "vector autoregression": lambda seed: detectors.Innovation(),
 }
 ONE_LINERS: Mapping[str, Callable[[int], Any]] = {

@@ -74,6 +74,7 @@ class Cell:
         self.alone = {} if alone is None else alone
         self.windows, self.seed, self.enhancer, self.draws, self.is_unknown = windows, seed, enhancer, draws, is_unknown
         known = windows.known
+        self._maps: dict[bytes, Map] = {}
         self.planned = self._nearest(known.telemetry) if is_unknown else known.coarse
         self.residuals = by_fold(
             known.folds, lambda learnt, held_out: self._less(known.telemetry[held_out], self.planned[held_out], self._map(learnt))
@@ -87,6 +88,14 @@ class Cell:
     def enhance(self) -> Map:
         """The enhancer that has learnt from all known windows."""
         return self._map(slice(None))
+
+    def _learnt(self, rows: np.ndarray | None) -> Map:
+        """The enhancer that has learnt from some known windows; None: from all."""
+        if rows is None:
+            return self.enhance
+        if rows.tobytes() not in self._maps:
+            self._maps[rows.tobytes()] = self._map(rows)
+        return self._maps[rows.tobytes()]
 
     def _nearest(self, telemetry: np.ndarray) -> np.ndarray:
         """Coarse windows of the source that are most similar to telemetry, the channels at mean 0 and deviation 1."""
@@ -152,18 +161,18 @@ class Cell:
                 pair = [_standard(alone[use][name]) for use in (REFERENCE, NO_SIMULATOR)]
                 yield Scores(BOTH, name, *(np.maximum(*each) for each in zip(*pair, strict=True)))
         if SOURCE in uses:
-            generated = self.enhance(self.windows.source)
-            generated = generated + self.noise(len(generated), 1)
             for name, make in ONE_CLASS.items():
-                fitted = make(self.seed).fit(generated)
-                yield Scores(SOURCE, name, fitted.score(known.telemetry), fitted.score(tested.telemetry))
+                scores = by_fold(
+                    known.folds, lambda rows, held_out, make=make: self._learn_generated(make, rows).score(known.telemetry[held_out])
+                )
+                yield Scores(SOURCE, name, scores, self._learn_generated(make).score(tested.telemetry))
         if self.windows.simulated and {SOURCE_FAULTS, REFERENCE_FAULTS} & set(uses):
             yield from self.classified(tuple(self.windows.simulated), uses)
 
     def classified(self, faults: Sequence[int], uses: tuple[str, ...] = USES) -> Iterator[Scores]:
         """Scores of classifiers that learn some simulated faults.
 
-        Known windows are scored by classifiers whose noise comes from other folds.
+        Known windows are scored by classifiers whose enhancer and noise come from other folds.
 
         Args:
             faults: Numbers of the faults.
@@ -171,23 +180,28 @@ class Cell:
         """
         known, tested = self.windows.known, self.windows.tested
         some = [tuple(_spread(each) for each in self.windows.simulated[number]) for number in faults]
-        broken, expected = (self.enhance(np.concatenate(each)) for each in zip(*some, strict=True))
-        nominal = self.enhance(self.windows.source)
-        signals = {
-            SOURCE_FAULTS: (nominal, broken, known.telemetry, tested.telemetry),
-            REFERENCE_FAULTS: (np.zeros_like(nominal), broken - expected, self.residuals, self.differences),
-        }
+        broken, expected = (np.concatenate(each) for each in zip(*some, strict=True))
+
+        def train(use: str, name: str, rows: np.ndarray | None = None) -> Map:
+            enhance = self._learnt(rows)
+            nominal, faulty = enhance(self.windows.source), enhance(broken)
+            if use == REFERENCE_FAULTS:
+                nominal, faulty = np.zeros_like(nominal), faulty - enhance(expected)
+            drawn = [each + self.noise(len(each), stream, rows) for stream, each in enumerate((nominal, faulty), 2)]
+            return classifier(name, *drawn, self.seed)
+
+        signals = {SOURCE_FAULTS: (known.telemetry, tested.telemetry), REFERENCE_FAULTS: (self.residuals, self.differences)}
         for use in (use for use in signals if use in uses):
-            normal, wrong, learnt, judged = signals[use]
+            learnt, judged = signals[use]
             for name in CLASSIFIERS:
-                make = functools.partial(self._classifier, name, normal, wrong)
+                make = functools.partial(train, use, name)
                 scores = by_fold(known.folds, lambda rows, held_out, make=make, learnt=learnt: make(rows)(learnt[held_out]))
                 yield Scores(use, name, scores, make()(judged))
 
-    def _classifier(self, name: str, nominal: np.ndarray, faulty: np.ndarray, rows: np.ndarray | None = None) -> Map:
-        """Trains a classifier of windows to which residuals of some known windows are added."""
-        drawn = [each + self.noise(len(each), stream, rows) for stream, each in enumerate((nominal, faulty), 2)]
-        return classifier(name, *drawn, self.seed)
+    def _learn_generated(self, make: Callable[[int], Any], rows: np.ndarray | None = None) -> Any:
+        """Fits a detector to windows that were generated from some known windows; None: from all."""
+        generated = self._learnt(rows)(self.windows.source)
+        return make(self.seed).fit(generated + self.noise(len(generated), 1, rows))
 
     def _one_class(self, use: str, name: str, make: Callable[[int], Any], learnt: np.ndarray, judged: np.ndarray) -> Scores:
         if use == NO_SIMULATOR and name in self.alone:

@@ -33,10 +33,8 @@ class Windows:
 
     @property
     def folds(self) -> np.ndarray:
-        """Fold of each window: those of one unit are in one fold; where there are few units, each fold is a third of the time."""
-        if self.units.max() + 1 >= NUM_FOLDS:
-            return self.units % NUM_FOLDS
-        return np.minimum(NUM_FOLDS * np.arange(len(self.units)) // len(self.units), NUM_FOLDS - 1)
+        """Fold of each window. Those of one unit are in one fold, so that windows of different folds share no sample."""
+        return self.units % NUM_FOLDS
 
 
 def unit_starts(system: Any, num_units: int, stride: int, first: int = 0) -> tuple[np.ndarray, np.ndarray]:
