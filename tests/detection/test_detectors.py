@@ -263,9 +263,12 @@ def test_autoencoder_scores_in_units_of_the_training_variance():
     assert DenseAutoencoder(64, 16, 40).fit(training).score(windows).mean() < 0.2 < plain.score(windows).mean()
 
 
-def test_the_joint_size_of_nominal_windows_is_one():
-    windows = np.random.default_rng(0).standard_normal((4_000, 40, 3))
-    assert np.mean(JointSize().fit(windows[:2_000]).score(windows[2_000:])) == pytest.approx(1, rel=0.03)  # chi-square of 4 x 3 means
+def test_the_joint_size_of_its_own_windows_is_one_in_any_unit_and_mixture():
+    windows = np.random.default_rng(0).standard_normal((200, 40, 3)) + [1.0, -2.0, 5.0]
+    scores = JointSize().fit(windows).score(windows)
+    assert scores.mean() == pytest.approx(199 / 200)  # the trace of a covariance times its inverse, of n - 1 in n
+    mixed = windows @ np.array([[1e3, 0.1, 0.0], [0.0, 1e-3, 2.0], [1.0, 0.0, 1.0]])
+    np.testing.assert_allclose(JointSize().fit(mixed).score(mixed), scores, rtol=1e-4)
 
 
 def test_a_channel_that_leaves_the_others_is_far_although_its_values_are_usual():
