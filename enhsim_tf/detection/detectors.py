@@ -154,23 +154,48 @@ class OneClassSVMOnFeatures:
             return -self._machine.decision_function(features(windows))
 
 
-class JointSize:
-    """Mahalanobis distance of the means of all channels of a window.
+class JointMeans:
+    """Mahalanobis distance of the means of all channels in equal parts of a window.
 
     A small change of one channel against the others is large where the channels hardly move apart otherwise. The covariance is not
     shrunk: shrinkage hides just these small differences.
+
+    Args:
+        num_parts: Number of parts of a window.
     """
 
-    def fit(self, windows: np.ndarray) -> "JointSize":
+    def __init__(self, num_parts: int = 1):
+        self.num_parts = num_parts
+
+    def fit(self, windows: np.ndarray) -> "JointMeans":
         """Estimates mean and covariance from nominal windows."""
-        means = _with_channels(windows).mean(axis=1, dtype=np.float64)
+        means = self._means(windows)
         self._mean, self._precision = means.mean(axis=0), np.linalg.pinv(np.atleast_2d(np.cov(means, rowvar=False)), hermitian=True)
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the squared distance of each window, divided by the number of channels: about 1 for nominal windows."""
-        apart = _with_channels(windows).mean(axis=1, dtype=np.float64) - self._mean
+        """Returns the squared distance of each window, divided by the number of means: about 1 for nominal windows."""
+        apart = self._means(windows) - self._mean
         return np.einsum("wi,ij,wj->w", apart, self._precision, apart) / apart.shape[1]
+
+    def _means(self, windows: np.ndarray) -> np.ndarray:
+        values = _with_channels(windows)
+        parts = np.array_split(values, min(self.num_parts, values.shape[1]), axis=1)
+        return np.concatenate([part.mean(axis=1, dtype=np.float64) for part in parts], axis=1)
+
+
+class JointSize:
+    """The larger of two `JointMeans`, of whole windows for faults that last and of quarters for short ones, each in units of its 99 % quantile."""
+
+    def fit(self, windows: np.ndarray) -> "JointSize":
+        """Learns nominal windows."""
+        self._scales = [JointMeans(number).fit(windows) for number in (1, 4)]
+        self._units = [np.quantile(scale.score(windows), 0.99) for scale in self._scales]
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the larger distance of each window."""
+        return np.maximum(*(scale.score(windows) / unit for scale, unit in zip(self._scales, self._units, strict=True)))
 
 
 class RandomScore:

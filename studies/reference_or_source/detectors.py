@@ -52,7 +52,7 @@ class Discord:
 
 ONE_CLASS: Mapping[str, Callable[[int], Any]] = {
     "size": lambda seed: Size(),
-    "joint size": lambda seed: detectors.JointSize(),
+    "joint size": lambda seed: detectors.JointMeans(),
     "PCA residual": lambda seed: detectors.PCAResidual(seed=seed),
     "nearest neighbours": lambda seed: detectors.NearestNeighbours(),
     "vector autoregression": lambda seed: detectors.Innovation(),

@@ -20,7 +20,7 @@ KEPT = KeptTables(
     command="python -m studies.reference_or_source",
 )
 DETECTOR = {use: "boosted trees" if use in (SOURCE_FAULTS, REFERENCE_FAULTS) else "joint size" for use in USES}
-"""The detector of each use that figure and sentences show, chosen on the seed of the design: one for all uses that learn nominal windows."""
+"""The detector of each use that figure and sentences show, one for all uses that learn nominal windows."""
 
 
 def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:

@@ -8,6 +8,7 @@ from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAuto
 from enhsim_tf.detection.detectors import (
     Innovation,
     IsolationForestOnFeatures,
+    JointMeans,
     JointSize,
     LargestStep,
     LimitCheck,
@@ -265,10 +266,10 @@ def test_autoencoder_scores_in_units_of_the_training_variance():
 
 def test_the_joint_size_of_its_own_windows_is_one_in_any_unit_and_mixture():
     windows = np.random.default_rng(0).standard_normal((200, 40, 3)) + [1.0, -2.0, 5.0]
-    scores = JointSize().fit(windows).score(windows)
+    scores = JointMeans().fit(windows).score(windows)
     assert scores.mean() == pytest.approx(199 / 200)  # the trace of a covariance times its inverse, of n - 1 in n
     mixed = windows @ np.array([[1e3, 0.1, 0.0], [0.0, 1e-3, 2.0], [1.0, 0.0, 1.0]])
-    np.testing.assert_allclose(JointSize().fit(mixed).score(mixed), scores, rtol=1e-4)
+    np.testing.assert_allclose(JointMeans().fit(mixed).score(mixed), scores, rtol=1e-4)
 
 
 def test_a_channel_that_leaves_the_others_is_far_although_its_values_are_usual():
@@ -277,4 +278,20 @@ def test_a_channel_that_leaves_the_others_is_far_although_its_values_are_usual()
     windows = common + 0.1 * rng.standard_normal((2_000, 20, 2))
     apart = windows[:1].copy()
     apart[:, :, 1] += 0.5  # half the deviation of the channel, twenty of the difference of two means
-    assert JointSize().fit(windows).score(apart)[0] > 10
+    assert JointMeans().fit(windows).score(apart)[0] > 10
+
+
+def test_both_a_short_change_and_a_lasting_one_are_far():
+    rng = np.random.default_rng(2)
+    windows = rng.standard_normal((4_000, 40, 2))
+    short, lasting = windows[:500].copy(), windows[:500].copy()
+    short[:, 10:20, 0] += 1.6  # 5 deviations of the mean of a quarter, 2.5 of the mean of the window
+    lasting[:, :, 0] += 0.8  # 2.5 deviations of the mean of each quarter, 5 of that of the window
+    limit = np.quantile(JointSize().fit(windows).score(windows), 0.99)
+    shares = {
+        parts: np.mean(JointMeans(parts).fit(windows).score(short) > np.quantile(JointMeans(parts).fit(windows).score(windows), 0.99))
+        for parts in (1, 4)
+    }
+    assert shares[4] > shares[1] + 0.2
+    for changed in (short, lasting):
+        assert np.mean(JointSize().fit(windows).score(changed) > limit) > 0.8
