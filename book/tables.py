@@ -92,8 +92,12 @@ def verdicts(root: Path) -> str:
     """The claims of the README, each with its published verdict and the runs that agree."""
     published = json.loads((root / "enhsim_tf" / "paper" / "published.json").read_text(encoding="utf-8"))["claims"]
     short = {claim["id"]: claim["short"] for claim in json.loads((root / "figures" / "results.json").read_text(encoding="utf-8"))["claims"]}
-    rows = [(f"{id} {short[id]}", each["verdict"], f"{each['agreeing']} of {each['of']}") for id, each in published.items()]
-    return markdown(("claim", "verdict", "runs that agree"), rows)
+    rows = []
+    for id, each in published.items():
+        first = (each["decided_by"] or "").split(",")[0]
+        verdict = f"{each['verdict']} ({first})" if first else each["verdict"]
+        rows.append((f"{id} {short[id]}", verdict, f"{each['agreeing']} of {each['of']}"))
+    return markdown(("claim", "verdict", "runs"), rows)
 
 
 def measurements(root: Path) -> str:

@@ -1,8 +1,9 @@
 import pandas as pd
 import pytest
 
-from enhsim_tf.paper.report import UNDECIDED
+from enhsim_tf.paper.report import UNDECIDED, read_published
 from enhsim_tf.paper.settings import make_settings
+from studies.common.command import PUBLISHED
 from studies.readings import run as runs_of
 from studies.readings.figure import FIGURES
 from studies.readings.run import READINGS, ROUNDINGS, Run, collect, runs
@@ -88,3 +89,8 @@ def test_the_figure_shows_a_share_for_each_reading_that_touches_a_claim():
     assert set(found["reading"]) == {reading for reading in READINGS if touches(reading, "C1")}
     assert found.groupby("reading")["share"].sum().tolist() == pytest.approx([1.0] * 4)
     assert FIGURES["verdicts"].draw({"shares": found}).axes
+
+
+def test_the_published_verdicts_come_from_the_published_table(near):
+    table = pd.read_parquet(PUBLISHED / "readings" / "results" / "measurements.parquet")
+    assert read_published() == near(publish(table))
