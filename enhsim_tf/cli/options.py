@@ -122,7 +122,7 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
     if out.suffix in suffixes and not is_folder:
         if len(names) > 1:
             raise InputError(
-                f"Expected a folder for {len(names)} channels ({printable(', '.join(names[:8]))}). Received: --out {out}. Give a folder, or choose one channel."
+                f"Expected a folder for {len(names)} files ({printable('; '.join(names[:8]))}). Received: --out {out}. Give a folder, or choose one (--channel, --column)."
             )
         make_folder(out.parent)
         return {names[0]: out}
