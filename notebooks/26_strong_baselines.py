@@ -347,8 +347,8 @@ with drawing(alt, height=2.4, title=title) as panel:
     panel.legend(frameon=False, loc="upper left")
 
 # %% [markdown]
-# *What to see:* without a square there is nothing to find, and all three have the same error. The more of the signal is nonlinear, the
-# further ridge regression falls behind. Compare the other two.
+# *What to see:* without a square there is nothing to find, and all three have nearly the same error. The more of the signal is nonlinear,
+# the further ridge regression falls behind. Compare the other two.
 
 # %%
 for name, values in rows.items():
