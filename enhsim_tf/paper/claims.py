@@ -554,7 +554,7 @@ def title(records: list[dict[str, Any]]) -> str:
 def outside(records: list[dict[str, Any]], published: Mapping[str, Any]) -> list[str]:
     """The measurements that lie outside the published ranges over seeds and processors.
 
-    Each range is widened on both sides by the claim's `margin` times its width, and by 5 % of its larger end, or by .02 if that is more.
+    Each range is widened on both sides by the claim's `margin` times its width, and by 5 % of its larger end, or by .005 if that is more.
 
     Args:
         records: Records of a run.
@@ -567,7 +567,7 @@ def outside(records: list[dict[str, Any]], published: Mapping[str, Any]) -> list
     for record in records:
         ranges = published["claims"].get(record["id"], {}).get("ranges", {})
         for name, (low, high) in ranges.items():
-            margin = margins[record["id"]] * (high - low) + max(0.05 * max(abs(low), abs(high)), 0.02)
+            margin = margins[record["id"]] * (high - low) + max(0.05 * max(abs(low), abs(high)), 0.005)
             value = record["measured"].get(name)
             if value is None or not low - margin <= value <= high + margin:
                 lines.append(f"{record['id']}: {name} is {value}, published {low:g} to {high:g}")

@@ -449,7 +449,7 @@ WRONG = {
     "models that are none": (["generate", "WORLD/empty", "--windows", "5", "--out", "x.parquet"], "empty"),
     "models that are damaged": (["generate", "WORLD/damaged", "--windows", "5", "--out", "x.parquet"], "arrays.npz"),
     "channel that was not fitted": ([*GENERATE, "--windows", "5", "--channel", "amps"], "'amps'"),
-    "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 channels"),
+    "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 files"),
     "training data as text": (["generate", "WORLD/single", "--windows", "5", "--out", "x.csv"], "x.csv"),
     "output below a file": (["generate", "WORLD/single", "--windows", "5", "--out", "WORLD/one.csv/x.parquet"], "one.csv"),
     "output of a name no file can have": (["generate", "WORLD/single", "--windows", "5", "--out", "x" * 300 + ".parquet"], "long"),
