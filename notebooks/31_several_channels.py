@@ -200,7 +200,8 @@ print("\n".join(line for line in report.lines() if "correlation of the noise" in
 # ## Exercises
 #
 # **1.** Another fault without a mark in any channel: the second channel is *late* by half a window: it shows what was there 50 samples
-# earlier. The next cell makes these residuals, `delayed`. Give the share of them that the last detector finds.
+# earlier. The next cell makes these residuals, `delayed`. Give the share that the detector of noise drawn jointly
+# finds.
 
 # %%
 earlier = cut(telemetry, later - 50) - ridge.predict(cut(current, later - 50)).reshape(-1, window, 2)
