@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.examples import Work, epoch_clock, example_windows
 from enhsim_tf import EnhancedSimulator, SquareWave, SquareWaveSimulator
-from enhsim_tf.common.backend import tf
+from enhsim_tf.common.backend import keras, tf
 from enhsim_tf.common.training import dense_stack, fit_windows
 from enhsim_tf.datasets.labelled_windows import Share, write_windows_labelled
 from enhsim_tf.enhancer.model import Enhancer
@@ -19,10 +19,14 @@ from enhsim_tf.paper.settings import Settings, make_settings
 from enhsim_tf.simulator.alignment import Waves
 
 
+def _network(window: int, hidden_units: int) -> keras.Model:
+    return dense_stack(window, (window, hidden_units, hidden_units, window), seed=0, name="enhancer")
+
+
 def enhancer_step(num_steps: int, window: int = 500, hidden_units: int = 3_200) -> Work:
     """Prepares training steps of 15 windows by `fit_windows`."""
     source, target = example_windows(15 * num_steps, window)
-    model = dense_stack(window, (window, hidden_units, hidden_units, window), seed=0, name="enhancer")
+    model = _network(window, hidden_units)
 
     def run() -> float:
         clock, seconds_of_last = epoch_clock()
@@ -54,10 +58,7 @@ def gan_iteration(num_iterations: int, dropout: float = 0.0, window: int = 500, 
 def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator:
     """Builds an untrained simulator of the paper's size, with residual windows. Its speed does not depend on its weights."""
     waves = [SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)]
-    layers = tuple(
-        tuple(layer.get_weights())
-        for layer in dense_stack(window, (window, hidden_units, hidden_units, window), seed=0, name="enhancer").layers
-    )
+    layers = tuple(tuple(layer.get_weights()) for layer in _network(window, hidden_units).layers)
     enhancer = Enhancer(NETWORK, window, 1, 1, np.zeros(1, np.float32), np.zeros(window, np.float32), layers=layers)
     residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
     alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, window)

@@ -8,11 +8,15 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.report import speed_table
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.paper.settings import decisions
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TOLERANCE = 0.25  # relative: another processor gives other numbers, and no other result
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?")
@@ -102,12 +106,10 @@ def verdicts(root: Path) -> str:
 
 def measurements(root: Path) -> str:
     """What each limit of the claims asks for, and what the reference measured over seeds and roundings."""
-    import pandas as pd
-
     from enhsim_tf.paper.claims import CLAIMS, OURS, WHOLE  # with the networks, TensorFlow
     from enhsim_tf.paper.report import needed, short
 
-    table = pd.read_parquet(root / "studies" / "readings" / "results" / "measurements.parquet")
+    table = _table_of_readings(root)
     reference = table[table["reading"] == "reference"]
     rows = []
     for claim in CLAIMS:
@@ -124,12 +126,15 @@ def measurements(root: Path) -> str:
 
 def readings(root: Path) -> str:
     """The most common verdict of each reading on each claim that it touches."""
-    import pandas as pd
-
     from studies.readings.summary import most_common, verdicts  # with the networks, TensorFlow
 
-    table = pd.read_parquet(root / "studies" / "readings" / "results" / "measurements.parquet")
-    return markdown(*most_common(verdicts(table)))
+    return markdown(*most_common(verdicts(_table_of_readings(root))))
+
+
+def _table_of_readings(root: Path) -> "pd.DataFrame":
+    import pandas as pd
+
+    return pd.read_parquet(root / "studies" / "readings" / "results" / "measurements.parquet")
 
 
 def settings_table(root: Path) -> str:

@@ -193,14 +193,13 @@ def fit_enhancer(
         for each in maps:
             moved = moved @ each
         linear = ridge.target_mean - moved
-        left = outputs - ridge.predict(rows)
         maps[0] = maps[0] / column_scale[:, None]
         maps[-1] = maps[-1] * output_unit
         factors = tuple(each.astype(np.float32) for each in maps)
-    if name == NETWORK:
+        if name == RIDGE_AND_FEATURES:
+            layers = _random_features(flat, outputs - ridge.predict(rows), starts, channels, seed)
+    else:
         layers = _train(flat, outputs, seed, epochs)
-    elif name == RIDGE_AND_FEATURES:
-        layers = _random_features(flat, left, starts, channels, seed)
     if layers:
         (kernel, bias), (*between, (last, last_bias)) = layers[0], layers[1:]
         layers = ((kernel / column_scale[:, None], bias), *between, (last * output_unit, last_bias * output_unit))
@@ -236,10 +235,8 @@ def _train(rows: np.ndarray, wanted: np.ndarray, seed: int, epochs: int) -> Laye
     outputs = wanted.shape[1]
     network = dense_stack(rows.shape[1], (outputs, _PAPER_UNITS, _PAPER_UNITS, outputs), seed, "enhancer")
     falling = keras.optimizers.schedules.CosineDecay(_PAPER_RATE, epochs * -(-len(rows) // _BATCH_SIZE))
-    spread = float(np.std(wanted, dtype=np.float64)) or 1.0
-    fit_windows(network, rows, (wanted / spread).astype(np.float32), epochs, _BATCH_SIZE, seed, falling, verbose=0)
-    *layers, (kernel, bias) = (layer.get_weights() for layer in network.layers)
-    return [*layers, (kernel * spread, bias * spread)]
+    fit_windows(network, rows, wanted, epochs, _BATCH_SIZE, seed, falling, verbose=0)
+    return [tuple(layer.get_weights()) for layer in network.layers]
 
 
 def _random_features(rows: np.ndarray, left: np.ndarray, starts: np.ndarray, channels: int, seed: int) -> Layers:

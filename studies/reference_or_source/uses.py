@@ -75,27 +75,33 @@ class Cell:
         self.windows, self.seed, self.enhancer, self.draws, self.is_unknown = windows, seed, enhancer, draws, is_unknown
         known = windows.known
         self._maps: dict[bytes, Map] = {}
+        self._nominal: dict[bytes, np.ndarray] = {}
         self.planned = self._nearest(known.telemetry) if is_unknown else known.coarse
         self.residuals = by_fold(
-            known.folds, lambda learnt, held_out: self._less(known.telemetry[held_out], self.planned[held_out], self._map(learnt))
+            known.folds, lambda learnt, held_out: self._less(known.telemetry[held_out], self.planned[held_out], self._learnt(learnt))
         )
 
-    def _map(self, rows: Any) -> Map:
-        known = self.windows.known
-        return fit_map(self.enhancer, self.planned[rows], known.telemetry[rows], known.starts[rows], known.folds[rows], self.seed)
-
-    @functools.cached_property
+    @property
     def enhance(self) -> Map:
         """The enhancer that has learnt from all known windows."""
-        return self._map(slice(None))
+        return self._learnt(None)
 
     def _learnt(self, rows: np.ndarray | None) -> Map:
-        """The enhancer that has learnt from some known windows; None: from all."""
-        if rows is None:
-            return self.enhance
-        if rows.tobytes() not in self._maps:
-            self._maps[rows.tobytes()] = self._map(rows)
-        return self._maps[rows.tobytes()]
+        """The enhancer that has learnt from some known windows, fitted once; None: from all."""
+        key, known = b"" if rows is None else rows.tobytes(), self.windows.known
+        if key not in self._maps:
+            some = slice(None) if rows is None else rows
+            self._maps[key] = fit_map(
+                self.enhancer, self.planned[some], known.telemetry[some], known.starts[some], known.folds[some], self.seed
+            )
+        return self._maps[key]
+
+    def _enhanced_source(self, rows: np.ndarray | None) -> np.ndarray:
+        """The source, enhanced by what some known windows teach; None: all."""
+        key = b"" if rows is None else rows.tobytes()
+        if key not in self._nominal:
+            self._nominal[key] = self._learnt(rows)(self.windows.source)
+        return self._nominal[key]
 
     def _nearest(self, telemetry: np.ndarray) -> np.ndarray:
         """Coarse windows of the source that are most similar to telemetry, the channels at mean 0 and deviation 1."""
@@ -184,7 +190,7 @@ class Cell:
 
         def train(use: str, name: str, rows: np.ndarray | None = None) -> Map:
             enhance = self._learnt(rows)
-            nominal, faulty = enhance(self.windows.source), enhance(broken)
+            nominal, faulty = self._enhanced_source(rows), enhance(broken)
             if use == REFERENCE_FAULTS:
                 nominal, faulty = np.zeros_like(nominal), faulty - enhance(expected)
             drawn = [each + self.noise(len(each), stream, rows) for stream, each in enumerate((nominal, faulty), 2)]
@@ -200,7 +206,7 @@ class Cell:
 
     def _learn_generated(self, make: Callable[[int], Any], rows: np.ndarray | None = None) -> Any:
         """Fits a detector to windows that were generated from some known windows; None: from all."""
-        generated = self._learnt(rows)(self.windows.source)
+        generated = self._enhanced_source(rows)
         return make(self.seed).fit(generated + self.noise(len(generated), 1, rows))
 
     def _one_class(self, use: str, name: str, make: Callable[[int], Any], learnt: np.ndarray, judged: np.ndarray) -> Scores:
