@@ -57,7 +57,9 @@ class Example(Pipeline):
 
     @functools.cached_property
     def telemetry(self) -> of_example.Telemetry:
-        """The telemetry."""
+        """The telemetry; with white noise it is the paper's."""
+        if self.noise == "white":
+            return super().telemetry
         depends = self.settings.of("telemetry") | {"noise": self.noise}
         folder = self.stages.run("telemetry", self._make_telemetry, depends, version=VERSION["telemetry"])
         return of_example.ParquetStore(folder / "telemetry.parquet").read()

@@ -26,8 +26,8 @@ from studies.factorial.cells import (
     Cell,
     cells_by_source,
 )
+from studies.factorial.second_pipeline import SecondPipeline, paired_windows
 from studies.robustness.replicate import Replicate
-from studies.robustness.second_pipeline import paired_windows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,19 +37,20 @@ if TYPE_CHECKING:
 
 Enhance = Callable[[np.ndarray], np.ndarray]
 TRAINING, THRESHOLD = "arms, training", "arms, threshold"
-"""Purposes of windows: to train a detector, and to set its threshold. They draw the same windows as in the study of robustness."""
+"""Purposes of windows: to train a detector, and to set its threshold."""
 
 
 class Pipelines:
     """All cells of one environment and seed. Networks are trained when they are first needed.
 
     Args:
-        replicate: The replicate of the study of robustness that provides the data and both networks.
+        replicate: The replicate of the study of robustness that provides the data and the paper's networks.
     """
 
     def __init__(self, replicate: Replicate):
         self.replicate, self.settings, self.stages = replicate, replicate.settings, replicate.stages
         self.example = replicate.example
+        self.second = SecondPipeline(self.example, self.settings, self.stages)
         self.window, self.seed = self.settings.paper.window, self.settings.seed
         self.enhancer = functools.cache(self._enhancer)
         self.extracted = functools.lru_cache(maxsize=1)(self._extracted)
@@ -61,7 +62,7 @@ class Pipelines:
 
         _, chosen = self.example.telemetry, self.settings
         depends = (chosen.paper.of("windows", "enhancer", "noise", "noise GAN"), chosen.second)
-        depends += (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.robustness.max_order)
+        depends += (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.factorial.max_order)
         parts = {"references": list(REFERENCES)} | {" ".join(filter(None, source)): cells for source, cells in cells_by_source().items()}
         found = []
         for name, cells in parts.items():
@@ -133,7 +134,7 @@ class Pipelines:
         if enhancer == RIDGE:
             starts = self.training_starts(windows)
             return fit_ridge(*self.pairs(starts), starts).predict
-        return self.example.enhance if windows == FEW else self.replicate.second.simulator.enhance
+        return self.example.enhance if windows == FEW else self.second.simulator.enhance
 
     def _extracted(self, windows: str, extraction: str, enhancer: str) -> np.ndarray:
         """Windows of the noise that a generator learns, of shape `(windows, samples)`; the arguments are `Cell.source`."""
@@ -158,7 +159,7 @@ class Pipelines:
         return self._model[1]
 
     def _autoregression(self, noise: np.ndarray) -> GaussianAutoregression:
-        return GaussianAutoregression.fit(noise, min(self.settings.robustness.max_order, self.window - 1))
+        return GaussianAutoregression.fit(noise, min(self.settings.factorial.max_order, self.window - 1))
 
     def _convolutional_gan(self, noise: np.ndarray) -> "ConvolutionalGAN":
         from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan

@@ -18,7 +18,7 @@ def run(
     """Runs the study and writes its results; finished parts of replicates are read from the cache.
 
     Args:
-        settings: All settings; `factorial.num_seeds` says how many seeds, which are the first of the study of robustness.
+        settings: All settings; `factorial.num_seeds` says how many seeds.
         cache: Folder of cached stages.
         out: An existing folder for the table, the findings and the figure.
         environments: Kinds of noise.
@@ -36,7 +36,7 @@ def run(
     def tables_of(environment: str, seed: int, stages: Stages) -> "dict[str, pd.DataFrame]":
         return Pipelines(Replicate(settings.of(environment, seed), stages)).tables()
 
-    first = settings.robustness.first_seed
+    first = settings.factorial.first_seed
     replicates = seed_by_seed(tables_of, environments, range(first, first + settings.factorial.num_seeds))
     tables = collect("replicate", replicates, cache, fresh, tell)
     return write_results(tables, KEPT, summarise, FIGURES, out, {"budget": settings.budget})

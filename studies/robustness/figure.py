@@ -12,14 +12,12 @@ from enhsim_tf.common.plot_style import COARSE, DOUBLE, ENHANCED, GENERATED, GRE
 from studies.robustness.degraded_modes import LARGEST_TRAINED
 
 Findings = Mapping[str, Any]
-_ROWS = {  # colour and marker of each arm that is shown
+_ROWS = {  # colour and marker of each arm
     "coarse": (COARSE, "s"),
     "truth": (COARSE, "s"),
+    "enhanced": (GENERATED, "D"),
     "enhanced + GAN": (GENERATED, "D"),
-    "enhanced + bootstrap": (GENERATED, "D"),
-    "residual + AR": (ENHANCED, "o"),
-    "residual + convolutional GAN": (ENHANCED, "o"),
-    "residual + bootstrap": (ENHANCED, "o"),
+    "ridge + residual windows": (ENHANCED, "o"),
     "real": (REAL, "o"),
 }
 _LEAST = 2e-4  # smaller rates are drawn here, because the axis is logarithmic
@@ -31,9 +29,8 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
         DOUBLE,
         4.6,
         "False alarms on real nominal windows, by training data",
-        "Training data without noise (grey), from the paper's pipeline (orange), from the residual "
-        "pipeline (blue), real (black). Large mark and bar: mean over seven detectors with its 95 % interval over seeds and blocks of time. "
-        "Small marks: single detectors; rates below 0.02 % are drawn at 0.02 %.",
+        "Simulators without noise (grey), the paper's pipeline (orange), ridge and residual windows (blue), real telemetry (black). Large "
+        "mark and bar: mean of seven detectors, 95 % interval. Small marks: single detectors, at least 0.02 %.",
     )
     environments = found["environments"]
     columns = min(2, len(environments))
@@ -66,10 +63,10 @@ def _row(axes: Axes, height: float, about: Mapping[str, Any], colour: str, marke
 
 
 _METHODS = {
-    "identity": (COARSE, "-.", "coarse"),
+    "coarse": (COARSE, "-.", "coarse"),
     "paper": (GENERATED, "--", "paper's network"),
-    "ridge, randomised": (REAL, ":", "ridge on faults"),
-    "randomised": (ENHANCED, "-", "network on faults"),
+    "ridge, faults": (REAL, ":", "ridge on faults"),
+    "random features, faults": (ENHANCED, "-", "features on faults"),
 }
 
 
@@ -106,7 +103,7 @@ FIGURES: dict[str, Figure] = {
     "false_alarms": Figure(
         1,
         "False alarms by training data",
-        "Four panels, one for each kind of noise. Eight kinds of training data from top to bottom, the false-alarm rate on a logarithmic "
+        "A panel for each kind of noise. Six kinds of training data from top to bottom, the false-alarm rate on a logarithmic "
         "axis: a mark with an interval for the mean over detectors, a small mark for each detector, and a line at one per cent.",
         false_alarms,
     ),
@@ -114,7 +111,7 @@ FIGURES: dict[str, Figure] = {
         2,
         "Error in degraded modes",
         "Six panels, one for each degraded mode: error against severity for the coarse signal, the paper's enhancer, and ridge regression "
-        "and a network that were trained on faults; the severities of training are shaded.",
+        "without and with random features, trained on faults; the severities of training are shaded.",
         degraded_modes,
     ),
 }

@@ -2,22 +2,19 @@
 
 import dataclasses
 import functools
-import types
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
-from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
+from enhsim_tf.enhancer.ridge import Ridge, fit_ridge
+from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from studies.common import evaluation
-from studies.common.block_bootstrap import BlockBootstrap
 from studies.common.example import Example
 from studies.common.settings import Settings
 from studies.robustness import real_floor
-from studies.robustness.second_pipeline import SecondPipeline
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,20 +22,12 @@ if TYPE_CHECKING:
 ARMS = {
     "coarse": "the coarse simulator",
     "truth": "the noiseless signal, as from a perfect simulator without environmental noise",
-    "enhanced": "the enhanced signal of the paper's pipeline, without noise",
+    "enhanced": "the signal of the paper's enhancer, without noise",
     "enhanced + GAN": "plus noise of the paper's GAN",
-    "enhanced + Gaussian": "plus Gaussian noise of the same standard deviation",
-    "enhanced + AR": "plus a fitted autoregression",
-    "enhanced + bootstrap": "plus blocks of the extracted noise itself",
-    "residual, no noise": "the enhanced signal of the residual pipeline, without noise",
-    "residual + convolutional GAN": "plus noise of the convolutional GAN",
-    "residual + Gaussian": "plus Gaussian noise of the same standard deviation",
-    "residual + AR": "plus an autoregression fitted to the same noise",
-    "residual + bootstrap": "plus blocks of the same noise",
+    "ridge + residual windows": "ridge regression on the same windows, plus whole windows of what it leaves of the telemetry",
     "real": "real nominal telemetry",
 }
-"""Training windows of detectors. *Enhanced* arms extract the noise with a moving average, as the paper does; *residual* arms use
-the residual of an enhancer that is trained on more windows."""
+"""Training windows of detectors."""
 TABLES = {
     "alarms": ["arm", "detector", "block", "alarms", "windows"],
     "recall": ["arm", "detector", "kind", "severity", "recall", "recall_at_real_rate"],
@@ -59,20 +48,15 @@ class Replicate:
         self.example = Example(settings, stages)
 
     @functools.cached_property
-    def second(self) -> SecondPipeline:
-        """The residual pipeline."""
-        return SecondPipeline(self.example, self.settings, self.stages)
-
-    @functools.cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The tables `alarms` and `recall`."""
         import pandas as pd
 
-        _ = self.example.enhancer_folder, self.example.gan_folder, self.second.simulator
-        after = ("telemetry", "enhancer", "noise GAN", "second network")
+        _ = self.example.enhancer_folder, self.example.gan_folder
         # the number of replicates does not affect a replicate
         which = dataclasses.replace(self.settings.robustness, num_seeds=0, first_seed=0)
-        folder = self.stages.run("arms", self._make_arms, (self.settings.paper.of("windows"), which), after)
+        depends = (self.settings.paper.of("windows"), which)
+        folder = self.stages.run("arms", self._make_arms, depends, ("telemetry", "enhancer", "noise GAN"), version=2)
         return {name: pd.read_parquet(folder / f"{name}.parquet") for name in TABLES}
 
     def _make_arms(self, folder: Path) -> None:
@@ -120,27 +104,6 @@ class Replicate:
         floor = real_floor.RealFloor(real[:number], again[:number], self.settings.robustness.num_resplits, seed=self.settings.seed)
         return floor, held_out[:number]
 
-    @functools.cached_property
-    def noises(self) -> "Mapping[str, Mapping[str, Any]]":
-        """The fitted noise models of both pipelines by name; each learns the noise that its pipeline extracts."""
-        from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
-
-        chosen, residual = self.settings, self.second.residuals()
-        averaged = self.example.noise_windows("train", chosen.paper.num_windows, "noise windows")
-        gan = fit_convolutional_gan(residual, chosen.paper.iterations, chosen.seed)
-        return {
-            "enhanced": {"GAN": types.SimpleNamespace(generate=self.example.generate_noise), **self._fitted(averaged)},
-            "residual": {"convolutional GAN": gan, **self._fitted(residual)},
-        }
-
-    def _fitted(self, noise: np.ndarray) -> dict[str, Any]:
-        chosen = self.settings.robustness
-        return {
-            "Gaussian": GaussianNoise.fit(noise),
-            "AR": GaussianAutoregression.fit(noise, min(chosen.max_order, noise.shape[1] - 1)),
-            "bootstrap": BlockBootstrap.fit(noise, chosen.block),
-        }
-
     def arms(self, purpose: str) -> dict[str, np.ndarray]:
         """Windows of every arm.
 
@@ -149,17 +112,22 @@ class Replicate:
         """
         example, number = self.example, self.settings.robustness.num_windows
         simulated = example.windows("train", number, purpose)
-        coarse = simulated["coarse"]
+        coarse, rng = simulated["coarse"], example.draw(f"{purpose}, noise")
+        enhanced, (ridge, residuals) = example.enhance(coarse), self._without_network
         part = "train" if purpose == "arms, training" else "calibration"
-        arms = {
+        return {
             "coarse": coarse,
             "truth": simulated["truth"],
-            "enhanced": example.enhance(coarse),
-            "residual, no noise": self.second.simulator.enhance(coarse),
+            "enhanced": enhanced,
+            "enhanced + GAN": enhanced + example.generate_noise(number, rng),
+            "ridge + residual windows": ridge.predict(coarse) + residuals.generate(number, rng),
             "real": example.windows(part, number, f"{purpose}, real")["target"],
         }
-        seed = int(example.draw(purpose).integers(2**31))
-        for pipeline, clean in (("enhanced", "enhanced"), ("residual", "residual, no noise")):
-            for noise, model in self.noises[pipeline].items():
-                arms[f"{pipeline} + {noise}"] = arms[clean] + model.generate(number, np.random.default_rng(seed))
-        return {arm: arms[arm] for arm in ARMS}
+
+    @functools.cached_property
+    def _without_network(self) -> tuple[Ridge, WindowBootstrap]:
+        """Ridge regression on the windows from which the paper's enhancer learns, and as many windows of what it leaves."""
+        number = self.settings.paper.num_windows
+        learnt, others = (self.example.windows("train", number, each) for each in ("training windows", "residual windows"))
+        ridge = fit_ridge(learnt["coarse"], learnt["target"], learnt["start"])
+        return ridge, WindowBootstrap.fit(others["target"] - ridge.predict(others["coarse"]))

@@ -10,7 +10,7 @@ from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
 from enhsim_tf.coarse_simulator.period_search import fit_box
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, level_offset_and_scale
 from enhsim_tf.telemetry.series import Telemetry
-from studies.robustness.second_pipeline import paired_windows
+from studies.factorial.second_pipeline import paired_windows
 
 TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
 TIMES = 10.0 + np.arange(400.0) + np.array([[0.0], [37.0], [1_000.0]])

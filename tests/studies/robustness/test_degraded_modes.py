@@ -23,7 +23,7 @@ def test_the_error_of_the_coarse_signal_is_that_of_square_waves(modes):
 
 
 def test_randomised_windows_have_the_noise_of_the_telemetry(modes):
-    number = modes.settings.second.num_windows
+    number = modes.settings.modes.num_learnt
     coarse, target = modes._randomised_pairs()
     assert coarse.shape == target.shape == (number - number % modes.settings.modes.windows_per_configuration, 500)
     second_difference = np.diff(target, 2)  # of white noise: variance times 1 + 4 + 1

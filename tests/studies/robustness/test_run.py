@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 SMALL = {
     "paper__num_windows": 40,
-    "second__num_windows": 90,
+    "modes__num_learnt": 90,
     "robustness__num_windows": 120,
     "robustness__num_seeds": 1,
     "paper__iterations": 1,

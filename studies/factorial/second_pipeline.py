@@ -53,14 +53,6 @@ class SecondPipeline:
         pairs = paired_windows(learnt, self.example.coarse, starts, window)
         np.savez(folder / "enhancer.npz", **fit_enhancer(NETWORK, *pairs, starts, seed, chosen.epochs).arrays)
 
-    def residuals(self) -> np.ndarray:
-        """Windows of telemetry minus the enhanced signal, of shape `(windows, samples)`."""
-        draws = np.random.default_rng([self.settings.seed, 1])
-        train, window = self.example.train, self.settings.paper.window
-        starts = random_window_starts([train], window, self.settings.second.num_windows, draws)
-        coarse, target = paired_windows(train, self.example.coarse, starts, window)
-        return target - self.simulator.enhance(coarse)
-
 
 def paired_windows(telemetry: Telemetry, coarse: SquareWaveSimulator, starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
     """Returns the coarse windows and the telemetry windows of the same times (steps 3 and 4 of the paper's pipeline).
