@@ -265,16 +265,16 @@ assert not is_full or (found["coarse"] < 0.02 and limits["enhanced + GAN"] < 0.0
 #
 # ## All of it at once
 #
-# A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with KINDS and five seeds. Nothing is
-# computed here.
+# A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, on the same telemetry with five seeds.
+# Nothing is computed here.
 #
-# ![False alarms by training data, a panel for each kind of noise](../studies/robustness/results/false_alarms.png)
+# ![False alarms by training data](../studies/robustness/results/false_alarms.png)
 
 # %%
 published, _ = open_study("robustness")
 mean = {name: about["false_alarms"]["mean"] for name, about in published["arms"].items()}
 for name, rate in mean.items():
-    print(f"{name:26} false alarms {rate:6.1%}, mean over detectors and kinds of noise")
+    print(f"{name:26} false alarms {rate:6.1%}, mean over detectors")
 
 # %% [markdown]
 # *What to see:* the marks of the perfect simulator are far on the right: the best signal does not help without noise. Those of the paper's

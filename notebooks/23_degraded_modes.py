@@ -256,7 +256,11 @@ for method in errors:
         f"{method:24}"
         + "".join(f"   {where} {errors[method][where]:.3f}" for where in ("nominal", "inside", "outside"))
     )
-assert errors["random features, faults"]["inside"] < errors["ridge, faults"]["inside"] < errors["paper"]["inside"]
+assert (
+    errors["random features, faults"]["inside"]
+    < errors["ridge, faults"]["inside"]
+    < errors["paper"]["inside"]
+)
 assert errors["random features, faults"]["inside"] < errors["random features, faults"]["outside"]
 assert errors["paper"]["outside"] > errors["coarse"]["outside"]
 

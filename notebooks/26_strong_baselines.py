@@ -402,9 +402,9 @@ for regime, found in battery["regimes"].items():
 
 # %% [markdown]
 # **Answer.** A network can pay only where the map has a part that no matrix has. Even there, ask first what the physics suggests, such as a
-# square, and whether random features find it in a second: `fit` uses them for what ridge regression leaves, and trains the paper's network only on request. To be fair, give every method
-# the same data, choose every setting on training time, and judge on blocks of time. Then the smaller error is worth believing, whichever
-# method has it.
+# square, and whether random features find it in a second: `fit` uses them for what ridge regression leaves, and trains the paper's network
+# only on request. To be fair, give every method the same data, choose every setting on training time, and judge on blocks of time. Then
+# the smaller error is worth believing, whichever method has it.
 #
 # ## Exercises
 #

@@ -28,9 +28,9 @@ def false_alarms(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         4.6,
-        "False alarms on real nominal windows, by training data",
-        "Simulators without noise (grey), the paper's pipeline (orange), ridge and residual windows (blue), real telemetry (black). Large "
-        "mark and bar: mean of seven detectors, 95 % interval. Small marks: single detectors, at least 0.02 %.",
+        "Only noise that is drawn from telemetry keeps false alarms low",
+        "False alarms on real nominal windows. Simulators without noise (grey), the paper's pipeline (orange), ridge and residual windows (blue), "
+        "real telemetry (black). Large mark, bar: mean of seven detectors, 95 % interval. Small marks: detectors, at least 0.02 %.",
     )
     environments = found["environments"]
     columns = min(2, len(environments))
@@ -75,7 +75,7 @@ def degraded_modes(found: Findings) -> matplotlib.figure.Figure:
     figure, down = new_sheet(
         DOUBLE,
         3.9,
-        "Error of enhancers in degraded modes, by severity",
+        "Enhancers follow faults only if they have learnt from faults",
         "Root-mean-square error with respect to the true degraded signal, in standard deviations of the nominal signal; means over seeds. "
         "“On faults”: trained on random configurations of all modes, with severities in the grey area.",
     )

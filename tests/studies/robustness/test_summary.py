@@ -1,5 +1,8 @@
 """The findings of the study of robustness: with hand-made tables, and from the published ones."""
 
+import json
+from pathlib import Path
+
 import pandas as pd
 import pytest
 
@@ -11,6 +14,7 @@ from studies.robustness import summary
 from studies.robustness.degraded_modes import METHODS
 from studies.robustness.replicate import ARMS
 
+PUBLISHED = Path(summary.__file__).parent / "results"
 SEEDS = (1000, 1001, 1002)
 # false alarms of 100 windows in each of two blocks, by arm: what every number below is worked out from
 ALARMS = dict.fromkeys(ARMS, 50) | {"enhanced": 90, "enhanced + GAN": 60, "ridge + residual windows": 3, "real": 2}
@@ -93,3 +97,17 @@ def test_blocks_of_unequal_length_add_up_to_the_rate():
 def test_errors_inside_and_outside_the_severities_of_training(found):
     assert found["modes"]["nrmse"]["paper"] == pytest.approx({"nominal": 0.1, "inside": 0.4, "outside": 0.8})
     assert found["modes"]["by_mode"]["ridge"]["stuck"] == [[0.5, pytest.approx(0.4)], [1.0, pytest.approx(0.8)]]
+
+
+def test_published_findings_come_from_the_published_tables(near):
+    kept = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8"))
+    again = summary.summarise(summary.KEPT.read(PUBLISHED))
+    assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again})
+
+
+def test_the_readme_has_the_numbers_of_the_findings(numbers_of):
+    found, rows = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8")), numbers_of("robustness")
+    for arm in ARMS:
+        about = found["arms"][arm]
+        values = [*about["false_alarms"].values(), about["recall_at_real_rate"]]
+        assert rows[arm] == pytest.approx([*(100 * value for value in values), *about["criterion"].values()], abs=0.051), arm
