@@ -23,9 +23,20 @@ _, budget = open_pipeline()  # of the paper's example, only the budget is used h
 is_full = budget == "full"
 
 # %% [markdown]
+# ## A real channel
+#
+# This is a channel of NASA's SMAP satellite, in three stretches of the same telemetry: when the simulator learnt it, much later, and when
+# its operators labelled it as anomalous ([study](../studies/spacecraft/README.md)).
+#
+# ![Telemetry of a spacecraft and the enhanced signal, in three stretches of time](../studies/spacecraft/results/channel.png)
+#
+# *What to see:* the shape stays, but the level falls and the amplitude shrinks to about a third; a simulator that did not follow them would be wrong all the
+# time. In the right panel, the telemetry holds one value for most of a cycle while the aligned simulator goes on. The limits of the channel
+# would not show it: the value is an ordinary one.
+#
 # ## A channel that drifts
 #
-# The data of the spacecraft are not part of this project, so the lesson first makes a channel whose truth is known. A heater rises and
+# The data of the spacecraft are not part of this project, so the lesson makes a channel whose truth is known. A heater rises and
 # falls in cycles of about 97 samples, with a dip in each cycle. Slowly, the period wanders, the level moves, and the amplitude grows.
 
 # %%
