@@ -1,20 +1,20 @@
 # %% [markdown]
 # # How little telemetry is enough?
 #
-# **Question:** with how many real windows is a simulator not needed any more?
+# **Question:** from how many real windows on is a simulator no longer needed?
 #
-# - **After this lesson** you can set a threshold when the real windows must serve for training *and* for the threshold, fit a simulator to
-#   the same few windows, and read a learning curve with a rule that was fixed before the experiment.
+# - **After this lesson** you can set a threshold when the real windows must serve for training *and* for the threshold, fit a simulator
+#   to the same few windows, and read a learning curve with a rule that was fixed before the experiment.
 # - **You should know** ridge regression by blocks of time (notebook 04), the PCA residual and the conformal threshold (notebook 13), and
 #   residual windows (notebook 25).
-# - **Terms:** [conformal threshold](../docs/glossary.md#conformal-threshold), [residual](../docs/glossary.md#residual); a *learning curve*
-#   is a result over the amount of data; *excess*: the false-alarm rate minus the one that the threshold was set for; *cross-fitting*: each
-#   window is scored by a model that was fitted to the other blocks of time; *recall at the real rate*: the share of anomalies found when
-#   the threshold is set on further real windows, so that only the separation counts.
+# - **Terms:** [conformal threshold](../docs/glossary.md#conformal-threshold), [residual](../docs/glossary.md#residual); a *learning
+#   curve* is a result over the amount of data; *excess*: the false-alarm rate minus the one that the threshold was set for;
+#   *cross-fitting*: each window is scored by a model that was fitted to the other blocks of time; *recall at the real rate*: the share of
+#   anomalies found when the threshold is set on further real windows.
 #
 # **What the paper says** (section 1): often the data to train on "does not exist in sufficient quantity, and would be expensive to
-# produce", and simulations supply it. But the enhancer and its noise are fitted to real telemetry, too. How much of it is needed, and is
-# it not simpler to train the detector on that?
+# produce", and simulations supply it. But the enhancer and its noise are fitted to real telemetry, too. Is it not simpler to train the
+# detector on that?
 
 # %%
 import numpy as np
@@ -34,9 +34,9 @@ is_full = budget == "full"
 # %% [markdown]
 # ## The data
 #
-# The waves are those of the paper's example, but neighbouring samples of the noise are correlated. All that is known is one contiguous
-# *record* of $k$ windows of 500 samples, and the square waves. Both methods may cut overlapping windows from the record. Everything is
-# judged on later windows, half of them nominal, and on windows with injected anomalies.
+# The waves are those of the paper's example, but neighbouring samples of the noise are correlated. Known are the square waves and one
+# contiguous *record* of $k$ windows of 500 samples, from which both methods may cut overlapping windows. Later nominal windows count
+# false alarms, others of them set the threshold for the recall at the real rate, and windows with injected anomalies count what is found.
 
 # %%
 NUM_REAL = (5, 20, 100) if is_full else (5, 20)
@@ -56,9 +56,9 @@ for k, record in records.items():
 # %% [markdown]
 # ## Real windows alone
 #
-# Train the PCA residual on the windows of the record. Where should the threshold come from? No further real windows exist. Scores of the
-# training windows themselves are too small: the detector has memorised their noise. *Cross-fitting* repairs this. Cut the time into five
-# blocks, train on four of them, without the windows that reach into the fifth, and score the fifth; and so on.
+# Train the PCA residual on the windows of the record. Where should the threshold come from? No further real windows exist, and the
+# detector has learnt the noise of its training windows. *Cross-fitting* helps: cut the time into five blocks, train on four of them,
+# without the windows that reach into the fifth, and score the fifth; and so on.
 
 
 # %%
@@ -128,10 +128,8 @@ with drawing(alt, height=2.1, title=title) as panel:
     panel.legend(frameon=False)
 
 # %% [markdown]
-# *What to see:* the naive threshold is useless. The twenty components describe a part of the noise of the very windows that set it, and of
-# no other window. Cross-fitting comes much nearer to the rate that was asked for, but with five windows it is still above it. Two reasons
-# are likely, and not tested here: each of the five detectors has seen fewer windows than the final one, and many overlapping windows hold
-# few independent scores.
+# *What to see:* the threshold from the training windows is useless. The twenty components describe a part of the noise of these very
+# windows, and of no others. Cross-fitting comes much nearer to the 1 % that was asked for, but with five windows it is still above it.
 
 # %%
 for name, values in rates.items():
@@ -141,10 +139,10 @@ assert rates["threshold from the training windows"][0] > rates["threshold by cro
 # %% [markdown]
 # ## A simulator that is fitted to the same windows
 #
-# The simulator uses the same record: ridge regression from square waves to the record, and noise fitted to what it leaves. The residuals
-# must be cross-fitted for the same reason as the scores. The noise is a Gaussian *autoregression*: each sample is a weighted sum of the
-# samples before it, plus a random number. (Notebook 25 writes it out.) Its few parameters can be learned from few windows, and the
-# simulator then generates as many windows as wanted: some to train the detector on, and others to set its threshold.
+# The simulator uses the same record: ridge regression from square waves to the record, and noise fitted to its residuals. These must be
+# cross-fitted for the same reason as the scores. The noise is a Gaussian *autoregression*: each sample is a weighted sum of the samples
+# before it, plus a random number (notebook 25). It has few parameters, and then generates as many windows as wanted: some to train the
+# detector on, and others to set its threshold.
 
 
 # %%
@@ -205,8 +203,8 @@ with drawing(alt, 2, 2.4, title) as (left, right):
         panel.minorticks_off()
 
 # %% [markdown]
-# *What to see:* with five windows, the simulator gives fewer false alarms: it can generate as many windows as a threshold needs. On the
-# right, it finds somewhat fewer anomalies. Whether such an exchange *pays* needs a rule, which the section on the published curve has.
+# *What to see:* with five windows, the simulator gives fewer false alarms; with more, neither exceeds 1 %. On the right, it always finds
+# somewhat fewer anomalies. Whether such an exchange *pays* needs a rule.
 
 # %%
 for position, k in enumerate(NUM_REAL):
@@ -222,7 +220,7 @@ if is_full:
     assert np.all(recall["simulator fitted to them"] < recall["real windows alone"] + 0.03)
 
 # %% [markdown]
-# This is one seed, one detector and one kind of noise. The slider shows the scores behind it.
+# This is one seed, one detector and one kind of noise. The slider shows the scores.
 
 
 # %%
@@ -254,11 +252,13 @@ slider(draw, "number of real windows", NUM_REAL, shown=NUM_REAL[:2])
 # %% [markdown]
 # ## The published curve
 #
-# The full experiment has four detectors, more methods, and four kinds of noise: white, autoregressive (neighbours are correlated),
-# heteroscedastic (its loudness changes slowly) and shot (rare pulses). Its rule was fixed before the first run: a simulator *pays*
-# where its excess is at most half of that of the real windows, if these have an excess of more than half a point, and its recall at the
-# real rate is at most 3 points lower. Real windows *suffice* from the number on from which their excess stays at most half a point. The
-# [study](../studies/few_windows/README.md) describes the methods.
+# The [study](../studies/few_windows/README.md) has ten seeds, four detectors, more methods, and four kinds of noise: white,
+# autoregressive (neighbours are correlated), heteroscedastic (its loudness changes slowly) and shot (rare pulses). Its rule was fixed
+# before the first run:
+#
+# - A simulator *pays* where the excess of the real windows is more than half a point, its own is at most half of that, and its recall at
+#   the real rate is at most 3 points lower.
+# - Real windows *suffice* from a number on if their excess is at most half a point there and at all larger numbers.
 
 # %%
 from studies.few_windows.summary import MAX_RECALL_LOSS, PAYS_SHARE, RATE, SUFFICES
@@ -311,9 +311,9 @@ with drawing(alt, len(environments), 2.6, title, sharex=True, sharey=True) as pa
     panels[-1].legend(frameon=False, fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
 
 # %% [markdown]
-# *What to see:* where the noise model describes the noise, the simulator's triangles lie at zero from five windows on, below the real
-# windows (dashed: half a point, which the rule allows). Where it does not, no number of windows brings them down. From the number on at
-# which real windows suffice, a simulator cannot pay by the rule.
+# *What to see:* where the noise model describes the noise, the simulator stays within half a point (dashed) from five windows on, and the
+# real windows from 50 on. Where it does not, no number of windows brings it down. The means of the study pay where the one seed above did
+# not.
 
 # %%
 for environment, about in environments.items():
@@ -326,10 +326,8 @@ assert paying == ["white", "autoregressive"]
 
 # %% [markdown]
 # **Answer.** It depends on the noise: from 50 windows on where it is white or autoregressive, from 100 on with shot noise, and from 1,000
-# on where it is heteroscedastic. Below that, a simulator paid with 5 to 20 windows, and only with a noise model that describes the noise:
-# Gaussian noise for white noise, and an autoregression for white and autoregressive noise. The rule has a gap: it asks for few false alarms
-# and for separation, so a threshold that is far too high would pass as well. Notebooks 21 and 25 show how to find out whether a noise model
-# describes the noise.
+# on where it is heteroscedastic. Below that, a simulator paid with 5 to 20 windows, and only with a noise model that describes the noise.
+# (A gap in the rule: a threshold that is far too high passes as well.)
 
 # %% [markdown]
 # ## Exercises
@@ -351,8 +349,8 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** The rule asks for an excess of at most half a point before real windows *suffice*. How does the answer change with the tolerance?
-# Complete the function: the smallest number of real windows from which on the excess of the arm `real` stays at most `limit`, or `None`.
+# **2.** How does the number that *suffices* change with the tolerance of half a point? Complete the function: the smallest number of real
+# windows from which on the excess of the arm `real` stays at most `limit`, or `None`.
 
 
 # %%
@@ -392,9 +390,8 @@ check_answer(
 # print(smallest)
 # ```
 #
-# It is 99. With fewer, the largest score is the best that one can take, and the rate that it stands for is $1/(n+1)$. Overlapping windows
-# do not help: a hundred scores from five disjoint windows are not a hundred independent scores. The simulator can generate 99 windows at
-# once.
+# It is 99. With fewer, even the largest score stands for a rate of $1/(n+1)$, above 1 %. Overlapping windows do not help: a hundred
+# scores from five disjoint windows are not independent.
 #
 # </details>
 
@@ -415,7 +412,6 @@ check_answer(
 #     print(f"{environment}, excess at most {limit:.1%}: from {suffices_from(environment, limit)}")
 # ```
 #
-# Where the answer jumps with a small change of the tolerance, the curve is flat there or noisy, and more seeds are worth more than a finer
-# rule.
+# Where the answer jumps with a small change of the tolerance, the curve is flat or noisy there.
 #
 # </details>

@@ -3,12 +3,12 @@
 #
 # **Question:** is an enhanced simulator worth more as a *source* of training data or as a *reference* that telemetry is compared with?
 #
-# - **After this lesson** you can use one simulator in both ways, with equal data and thresholds set alike, and say when neither pays.
+# - **After this lesson** you can use one simulator in both ways, with the same data, and say when neither pays.
 # - **You should know** ridge regression by blocks of time (notebook 04), the conformal threshold (notebook 13), and residual windows
 #   (notebook 25).
 # - **Terms:** a *source* generates windows that detectors learn from; a *reference* is a run that telemetry is compared with;
-#   [residual](../docs/glossary.md#residual): telemetry minus enhanced run; *known* windows: nominal telemetry that may be used for learning
-#   and for thresholds.
+#   [residual](../docs/glossary.md#residual): telemetry minus enhanced run; *known* windows: nominal telemetry that may be used for
+#   learning and for thresholds.
 #
 # **What the paper says** (title): enhanced simulations are for *training* detectors. It does not try the other use.
 
@@ -41,9 +41,9 @@ faulty, planned = volts("telemetry_fault.csv"), columns("simulator_planned.csv")
 is_fault = pd.read_csv(folder / "simulator_fault.csv")["mask"].to_numpy() > 0
 
 # %% [markdown]
-# A satellite's battery, its coarse simulator, and a run in which the resistance of the battery rises. The first 70 % of the nominal
-# telemetry are *known*; the last 30 % count false alarms. Windows of the fault count what is found. The simulator gets the commands of
-# every run, and does not know the fault.
+# A satellite's battery has a coarse simulator. In a second run, its resistance rises. The first 70 % of the nominal telemetry are
+# *known*, the rest shows false alarms, and the windows of the fault show what is found. The simulator gets the commands of every run, but
+# does not know the fault.
 
 # %%
 border = int(0.7 * len(telemetry))
@@ -57,8 +57,9 @@ say(f"**{len(known)}** known windows, **{len(later)}** later ones, **{len(fault)
 # %% [markdown]
 # ## The same detector for every use
 #
-# A *reference* says what telemetry should be, and a detector learns the usual difference from it. A *source* generates windows, and the
-# same detector learns those. The detector is the plainest one: how far is a window from the mean of the windows that it has learnt?
+# As a *reference*, the simulator is subtracted from the telemetry, and the detector learns the differences. As a *source*, it generates
+# windows, and the same detector learns those. The score of a window is its distance from the mean of the windows that the detector has
+# learnt.
 
 
 # %%
@@ -73,7 +74,7 @@ def conformal(scores, rate=0.01):
 
 # %% [markdown]
 # Thresholds need scores of known windows that nothing has learnt from. So the known time is cut into five blocks; enhancer, noise and
-# detector learn four of them, and score the fifth. The enhancer is ridge regression from some columns of the simulator.
+# detector learn four, and score the fifth. The enhancer is ridge regression from some columns of the simulator.
 
 
 # %%
@@ -148,9 +149,9 @@ with drawing(alt, height=2.2, title=title) as panel:
     panel.legend(frameon=False, loc="lower right")
 
 # %% [markdown]
-# *What to see:* as a reference, the simulator finds most of the fault; as a source, hardly anything, as without a simulator. A detector
-# that looks at a window alone must accept every voltage that some nominal window has. The reference is told what was commanded, and the
-# current alone is not enough to say which voltage follows from it.
+# *What to see:* as a reference, the simulator finds most of the fault; as a source, as little as no simulator, and no more than its false
+# alarms. A detector that looks at a window alone must accept every voltage that some nominal window has. The reference is told what was
+# commanded; the current alone does not say which voltage follows. No use keeps to the 1 % that its threshold was set for.
 
 # %%
 for name, found in results.items():
@@ -160,12 +161,11 @@ assert results["reference, enhanced run"]["found"] > results["reference, coarse 
 assert results["reference, enhanced run"]["found"] > 3 * results["reference, current alone"]["found"]
 
 # %% [markdown]
-#
 # ## What the study found
 #
-# One fault proves little. The [study](../studies/reference_or_source/README.md) has two systems, eleven kinds of faults at five
-# severities, six simulators, and one detector for all uses (the distance of the channels' means). Here is the battery with a simulator of
-# wrong physics:
+# The [study](../studies/reference_or_source/README.md) has two systems, eleven kinds of faults, and one detector for all uses (the
+# distance of the channels' means). Its intervals are wide. Here are means for the battery, with a simulator of *wrong physics* (a simpler
+# model):
 
 # %%
 systems = open_study("reference_or_source")[0]["systems"]
@@ -212,13 +212,13 @@ assert min(recall["reference"]) > max(recall["source"])
 assert of_aircraft["reference"] - of_aircraft["no simulator"] < 0.1
 
 # %% [markdown]
-# **Answer.** As a reference, if its physics is near enough and the commands are known. As a source it adds little to the telemetry that it
-# was enhanced with. Where the simulator is too crude, as on the aircraft, the telemetry alone finds nearly as much.
+# **Answer.** As a reference, where the simulator is near enough to the vehicle, as on the battery. As a source it adds little to what the
+# telemetry alone finds. On the aircraft, whose simulator is too crude, neither helps much.
 #
 # ## Exercises
 #
-# **1.** The reference needs to know *when*. Judge the enhanced run again with a planned run that is 50 samples late
-# (`np.roll(simulated, 50, axis=0)`), in nominal time as well. Give the share of false alarms.
+# **1.** A reference must know *when*. Judge the enhanced run again with a simulator that is 50 samples late in all judged time, nominal
+# and faulty (`np.roll(simulated, 50, axis=0)`). Give the share of false alarms.
 
 # %%
 false_alarms_late = None  # your answer
@@ -231,8 +231,8 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** A factor for the threshold changes both shares. By which factor would the threshold of *no simulator* have to be smaller to find as
-# many windows as the reference, and what would that cost in false alarms? Give the false alarms.
+# **2.** With a lower threshold, *no simulator* would find as many windows as the enhanced run does as a reference. What share of false
+# alarms would that cost?
 
 # %%
 cost = None  # your answer
@@ -260,7 +260,7 @@ check_answer(
 # print(f"found {found['found']:.0%}, false alarms {false_alarms_late:.0%}")
 # ```
 #
-# Everything is flagged, with a fault and without. The delay has to be estimated first (notebook 27).
+# Nearly every nominal window is flagged. The delay has to be estimated first (notebook 27).
 #
 # </details>
 
@@ -275,6 +275,6 @@ check_answer(
 # print(f"{cost:.0%}")
 # ```
 #
-# A detector of single windows ranks the fault's windows hardly above nominal ones, so no threshold helps.
+# The detector ranks the fault's windows hardly above nominal ones, so no threshold helps.
 #
 # </details>

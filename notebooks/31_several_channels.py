@@ -3,13 +3,13 @@
 #
 # **Question:** how is a fault found that no single channel shows?
 #
-# - **After this lesson** you can generate noise for several channels that keeps how they move together, and build a detector that sees it.
+# - **After this lesson** you can generate noise for several channels that keeps their correlation, and build a detector that uses it.
 # - **You should know** ridge regression (notebook 04), the conformal threshold (notebook 13) and residual windows (notebook 25).
 # - **Terms:** [residual](../docs/glossary.md#residual): telemetry minus enhanced run; *marginal*: the distribution of one channel alone;
 #   *cross-correlation*: here the correlation of two channels at the same time; *Mahalanobis distance*: a distance in units of the spread
 #   that is usual in that direction.
 #
-# **What the paper says:** its telemetry has one channel. Real vehicles have hundreds.
+# **What the paper says:** its telemetry has one channel.
 
 # %%
 import numpy as np
@@ -37,7 +37,7 @@ telemetry = signal + sunlight[:, None] * [0.3, 0.25] + own
 
 # %% [markdown]
 # Two temperatures of one panel follow a current that the simulator knows, and sunlight that it does not know. Cut windows, and map the
-# simulator's windows to both channels at once. What is left of a window is a residual of two channels:
+# simulator's windows to both channels at once. What this leaves of a window is a residual of two channels:
 
 
 # %%
@@ -103,12 +103,13 @@ with drawing(alt, columns=3, height=2.4, title=title, sharex=True, sharey=True) 
     panels[0].set_ylabel("second channel")
 
 # %% [markdown]
-# Each channel alone looks the same in all three panels: the marginals are equal.
+# Each channel alone keeps its marginal: the points fill the same range in all three panels.
 #
 # ## A detector that sees both
 #
-# Describe a residual window by the means of its four quarters, for one channel or for both. The score is the *Mahalanobis distance* of
-# these numbers: their size, measured against the covariance in training. It is the covariance that knows about the other channel.
+# Describe a residual window by the means $f$ of its four quarters, of one channel or of both. The score is the square of the *Mahalanobis
+# distance*, $(f-m)^\top C^{-1}(f-m)$, with the mean $m$ and the covariance $C$ of the training windows. With both channels, $C$ holds how
+# they move together.
 
 
 # %%
@@ -136,8 +137,8 @@ detectors = {
 }
 
 # %% [markdown]
-# The fault: the second sensor feels the sunlight of another time, as if it sat elsewhere. Every value, every frequency and every marginal
-# stays as it was. The last row asks whether the simulator is needed at all: its detector learns the telemetry itself.
+# The fault: the second sensor feels the sunlight of another time, as if it sat elsewhere. The residual windows of each channel stay as
+# they were; only their pairs change. The last row asks whether the simulator is needed at all: its detector learns the telemetry itself.
 
 # %%
 other = np.random.default_rng(2).permutation(len(new_residuals))
@@ -164,9 +165,9 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.set(xlabel="windows found (thresholds set for 1 %)", xlim=(0, 1.05))
 
 # %% [markdown]
-# *What to see:* looking at each channel alone finds about as little as chance. Looking at both is not enough either: a detector that has
-# learnt noise without a correlation cannot miss it. With noise that was drawn jointly, the fault stands out. Enough real telemetry shows
-# it as well, without any simulator; generated windows are for those who have little.
+# *What to see:* the detector of each channel alone finds little more than its false alarms. Looking at both is not enough: after noise
+# without correlation, a detector does not notice that the correlation is gone. After noise drawn jointly, it finds nearly every window.
+# Without a simulator it finds nearly as many: here there is enough telemetry.
 
 # %%
 for name, (found, alarms) in rates.items():
@@ -177,9 +178,9 @@ assert rates["each channel alone"][0] < 0.05 and rates["both, without a simulato
 # %% [markdown]
 # ## The same with the package
 #
-# `fit` learns all columns of a file together: one enhancer, residual windows drawn for all channels at once, and a detector of all
-# channels. Its report compares the cross-correlation of the noise with that of two halves of real noise, and says for each detector how
-# many anomalies it finds that are put into held-out time, of one channel and of their relation.
+# `fit` learns all columns of a file together: one enhancer, residual windows drawn for all channels at once, and detectors of all
+# channels. Its report compares the cross-correlation of the noise with that of two halves of real noise, and says how many injected
+# anomalies each detector finds, of one channel and of the *relation* between channels. Two of the five find no such relation.
 
 # %%
 import pandas as pd
@@ -194,14 +195,13 @@ model, report = fit({name: clean(series).parts for name, series in measured.item
 print("\n".join(line for line in report.lines() if "correlation of the noise" in line or "detectors" in line))
 
 # %% [markdown]
-# **Answer.** By a detector that sees all channels and has learnt how they move together. If it learns from generated windows, they must
-# keep that, and the cheapest way is to draw residual windows for all channels at once.
+# **Answer.** By a detector that sees all channels and has learnt how they move together. If it learns from generated windows, these must
+# keep that, as residual windows do that are drawn for all channels at once.
 #
 # ## Exercises
 #
-# **1.** Another fault without a mark in any channel: the second channel is *late* by half a window: it shows what was there 50 samples
-# earlier. The next cell makes these residuals, `delayed`. Give the share that the detector of noise drawn jointly
-# finds.
+# **1.** Another fault that no channel shows alone: the second channel is *late* by half a window. The next cell makes these residuals,
+# `delayed`. Give the share that the detector of noise drawn jointly finds.
 
 # %%
 earlier = cut(telemetry, later - 50) - ridge.predict(cut(current, later - 50)).reshape(-1, window, 2)
@@ -216,8 +216,8 @@ check_answer(
 )
 
 # %% [markdown]
-# **2.** How much do the quarters' means of the two channels share? Give the correlation of the first quarter of the first channel with the
-# first quarter of the second, over the known residuals.
+# **2.** How closely do the means of the quarters agree between the channels? Give the correlation of the first quarter of the first
+# channel with the first quarter of the second, over the known residuals.
 
 # %%
 correlation = None  # your answer
