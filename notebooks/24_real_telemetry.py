@@ -1,17 +1,16 @@
 # %% [markdown]
 # # Real telemetry
 #
-# **Question:** what does the pipeline find on a real spacecraft channel, and what does a one-line score find?
+# **Question:** on telemetry that drifts, does an enhanced simulator find more than scores of one line?
 #
-# - **After this lesson** you can align a simulator with a window in clock, level and gain, use what is left as a detector, and compare
-#   detectors fairly with scores of one line.
+# - **After this lesson** you can align a simulator with a window in clock, level and gain, use what is left as a detector, and compare it
+#   fairly with simple scores.
 # - **You should know** ridge regression (notebook 04), the PCA residual and the conformal threshold (notebooks 13 and 22).
 # - **Terms:** [residual](../docs/glossary.md#residual), [false-alarm rate](../docs/glossary.md#false-alarm-rate),
 #   [NRMSE](../docs/glossary.md#nrmse), [AUC-PR](../docs/glossary.md#auc-pr); *own threshold*: set without knowing the time that is
 #   judged; *matched threshold*: set such that all detectors have the same false alarms there.
 #
-# **What the paper says** (section 3): the method is meant for a real vehicle. All of its examples are sines. A real channel does two
-# things that a sine does not: its clock, level and amplitude drift, and now and then it fails.
+# **What the paper says** (section 3): the method is meant for a real vehicle. All of its examples are sines.
 
 # %%
 import numpy as np
@@ -25,19 +24,18 @@ is_full = budget == "full"
 # %% [markdown]
 # ## A real channel
 #
-# This is a channel of NASA's SMAP satellite, in three stretches of the same telemetry: when the simulator learnt it, much later, and when
-# its operators labelled it as anomalous ([study](../studies/spacecraft/README.md)).
+# This is a channel of NASA's SMAP satellite ([study](../studies/spacecraft/README.md)): when the simulator learnt it, much later, and
+# while its operators labelled it as anomalous.
 #
 # ![Telemetry of a spacecraft and the enhanced signal, in three stretches of time](../studies/spacecraft/results/channel.png)
 #
-# *What to see:* the shape stays, but the level falls and the amplitude shrinks to about a third; a simulator that did not follow them would be wrong all the
-# time. In the right panel, the telemetry holds one value for most of a cycle while the aligned simulator goes on. The limits of the channel
-# would not show it: the value is an ordinary one.
+# The level falls, and the amplitude shrinks to about a third; a simulator that did not follow them would be wrong all the time. On the
+# right, the telemetry holds one value for most of a cycle. Limits of the channel would not show it: the value is an ordinary one.
 #
 # ## A channel that drifts
 #
-# The data of the spacecraft are not part of this project, so the lesson makes a channel whose truth is known. A heater rises and
-# falls in cycles of about 97 samples, with a dip in each cycle. Slowly, the period wanders, the level moves, and the amplitude grows.
+# The data of the spacecraft are not part of this project, so the lesson makes a channel whose truth is known. A heater rises and falls in
+# cycles of about 97 samples, with a dip in each cycle. Slowly, the period wanders, the level moves, and the amplitude grows.
 
 # %%
 rng = np.random.default_rng(24)
@@ -137,9 +135,8 @@ with drawing(alt, 2, 2.2, title) as (left, right):
     right.legend(frameon=False, ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
 
 # %% [markdown]
-# The pipeline learns from the first 2,000 samples: ten windows that share no sample, about as few as the spacecraft's channels have. The
-# coarse simulator is a square wave. It is aligned with each window before the enhancer learns, so that only the *shape* is learned. The
-# enhancer is ridge regression; no network is used.
+# The pipeline learns from the first 2,000 samples, which hold ten windows without overlap. The coarse simulator is a square wave. It is
+# aligned with each window before the enhancer learns, so that only the *shape* is learned. The enhancer is ridge regression.
 
 # %%
 from enhsim_tf import FitOptions, Telemetry, fit
@@ -163,7 +160,7 @@ simulator, _ = fit(telemetry, options=options)
 #
 # $$b=\frac{\sum_t(g_{pt}-\bar g_p)(x_t-\bar x)}{\sum_t(g_{pt}-\bar g_p)^2},\qquad a=\bar x-b\,\bar g_p$$
 #
-# The best phase is the one with the smallest rest $\sum_t(x_t-a-b\,g_{pt})^2$ and $b>0$. That is all: a search over the clock, and a line.
+# The best phase is the one with $b>0$ and the smallest sum of squares of the *rest*, $x_t-a-b\,g_{pt}$: the residual after alignment.
 
 # %%
 (square_wave,) = simulator.alignment.simulators
@@ -208,10 +205,8 @@ say(
 assert rest[nominal].std() < (1.5 if is_full else 4) * noise.std()
 
 # %% [markdown]
-# The package does nearly the same. It looks for the largest correlation instead of the smallest rest, which is the same phase, but with the
-# shapes that its enhancer had before the last alignment; so it is off by a few of the 400 phases in some windows. Besides, it limits the
-# gain and, when it scores, the level, so that a dead channel is not explained by a gain of nearly zero. The slider moves the clock of one
-# window by hand; level and gain follow by least squares.
+# The package does nearly the same. Besides, it limits the gain and, when it scores, the level, so that a dead channel is not explained by
+# a gain of nearly zero. The slider moves the clock of one window by hand; level and gain follow by least squares.
 
 # %%
 example = int(np.flatnonzero(nominal)[-1])
@@ -237,13 +232,12 @@ slider(draw, "clock shift", [-40, -30, -20, -10, -5, 0, 5, 10, 20, 30, 40], show
 #
 # The *residual detector* scores a window by the root mean square (rms) of its rest. It is compared with
 #
-# - the *PCA residual* of notebook 22, trained on the same past: it knows shapes, but no alignment;
+# - the *PCA residual* of notebook 22, which knows shapes, but no alignment;
 # - *moving deviation*, one line: the largest standard deviation of 25 neighbouring samples;
 # - *largest step*, one line: the largest change from one sample to the next;
 # - a *random score*, which shows what chance finds.
 #
-# Nobody is told more than the others: each learns from the same past, if it learns at all, and each threshold is set on the same held-out
-# windows.
+# Those that learn have the same past, and all thresholds are set on the same held-out windows.
 
 # %%
 from numpy.lib.stride_tricks import sliding_window_view
@@ -306,7 +300,7 @@ assert not is_full or alarms["residual"] < min(
 
 # %% [markdown]
 # Is the PCA residual as bad as that? Ten windows show it few of the phases, levels and amplitudes that come. Give it a past four times as
-# long, which the spacecraft does not have:
+# long:
 
 # %%
 earlier = np.arange(-6_000, learned_until)
@@ -323,11 +317,11 @@ say(
 assert informed_alarms < alarms["PCA residual"]
 
 # %% [markdown]
-# A detector that alarms all the time finds everything. For a fair count of finds, each threshold is now *matched*: 1 % of the nominal
-# windows of the judged time lie above it. (A user cannot do this; it is for comparison.) An anomaly counts as found if a window that
-# touches it raises an alarm. The last column is the area under the precision-recall curve: go down the list of windows from the highest
-# score; *precision* $P_k$ is the share of anomalous windows among the first $k$, and the area is the mean of $P_k$ over all places $k$ of
-# anomalous windows. A random score reaches the share of anomalous windows.
+# A detector that alarms all the time finds everything. For a fair count, each threshold is now *matched*: 1 % of the nominal windows of
+# the judged time lie above it. (A user cannot do this.) An anomaly counts as found if a window that touches it raises an alarm. The last
+# column is the area under the precision-recall curve: go down the list of windows from the highest score; *precision* $P_k$ is the share
+# of anomalous windows among the first $k$, and the area is the mean of $P_k$ over all places $k$ of anomalous windows. A random score
+# reaches the share of anomalous windows.
 
 
 # %%
@@ -379,12 +373,11 @@ with drawing(alt, 5, 1.9, title, sharey=True) as panels:
     panels[0].set_ylabel("value (dimensionless)")
 
 # %% [markdown]
-# *What to see:* black is telemetry, dashed blue the aligned simulator, and grey the anomaly. Wrong shapes and clocks leave a large rest. A
-# spike is one sample of 194, whose square counts little in the mean over the window; the largest step misses none. A swell is seen mostly
-# at its edges: between them, the gain takes it up, which is what the gain is for, and the moving deviation sees it. No score sees
-# everything, and where a score of one line wins, it costs nothing. With a long past, the PCA residual is as good as the aligned simulator:
-# what the simulator brings here is that ten windows are enough. All of this is one draw of noise and anomalies: a difference of one find
-# means nothing.
+# *What to see:* black is telemetry, dashed blue the aligned simulator, and grey the anomaly. Wrong shapes and clocks leave a large rest.
+# A spike is one sample of 194, whose square counts little in the mean over the window; the largest step misses none. Between the edges of
+# a swell, the gain takes it up, which is what the gain is for; the moving deviation sees it. No score sees everything. With a long past,
+# the PCA residual is as good as the aligned simulator: what the simulator brings here is that ten windows are enough. All of this is one
+# draw of noise and anomalies: a difference of one find means nothing.
 
 # %%
 plateau = np.zeros(len(starts), bool)  # windows that lie within the swollen cycles, apart from the edges
@@ -413,9 +406,8 @@ if is_full:
 # %% [markdown]
 # ## A real spacecraft
 #
-# The study used six channels of NASA's SMAP satellite, published with the anomalies that its operators labelled
-# ([study](../studies/spacecraft/README.md)). Nothing is computed here; what was found is kept. First: is the enhanced signal nearer to
-# the telemetry than the square wave? All are aligned with each window, as above.
+# The study used six channels of SMAP, published with the anomalies that its operators labelled. Nothing is computed here. First: is the
+# enhanced signal nearer to the telemetry than the square wave, if all are aligned as above?
 #
 # ![Median error of the coarse, ridge and enhanced signal on each channel](../studies/spacecraft/results/errors.png)
 #
@@ -430,18 +422,19 @@ for name, about in found["channels"].items():
     assert error["enhanced"] < error["coarse"] and abs(error["enhanced"] - error["ridge"]) < 0.01
 
 # %% [markdown]
-# Then: what do detectors find? A simulator can be used in two ways. As a *source*, it makes the windows that seven detectors are trained
-# on (circles). As a *reference*, it says what the telemetry should be, and what is left is watched (squares): the *ridge residual* is the
-# detector of this lesson, and the *residual* the same with the paper's network as its enhancer. With *scale followed*, the threshold
-# follows slow growth of the residual. Diamonds use no simulator; the *left discord* is the distance of a window to the most similar
-# earlier one. One reservation: two bounds of the residual detector were set after the results of one seed on the judged time had been
-# seen.
+# Then: what do detectors find? As a *source*, a simulator makes the windows that seven detectors are trained on (circles). As a
+# *reference*, it says what the telemetry should be, and the rest is watched (squares): the *ridge residual* is the detector of this
+# lesson, and the *residual* the same with the paper's network. With *scale followed*, the threshold follows slow growth of the residual.
+# Diamonds use no simulator; the *left discord* is the distance of a window to the most similar earlier one. Two reservations: bounds of
+# the residual detector were set after results of one seed on the judged time had been seen, and the two one-line scores were named with
+# the labels known.
 #
 # ![AUC-PR and false alarms by use of the simulator](../studies/spacecraft/results/reference_or_source.png)
 #
-# *What to see:* whatever windows the seven detectors were trained on, they alarm on a third of the nominal time or more, and their AUC-PR
-# hardly depends on the kind of noise. Three scores that use no simulator at all are better. Best is the simulator as a reference. With
-# eight labelled sequences, the intervals are wide, and differences of a few hundredths mean nothing.
+# *What to see:* whatever the seven detectors were trained on, they alarm on a third of the nominal time or more, and their AUC-PR hardly
+# depends on the kind of noise. Three scores without a simulator have a higher mean, and the references the highest. But the intervals of
+# references and of these scores overlap: there are only eight labelled sequences. At its own threshold, the detector of this lesson
+# alarms on more than a quarter of the nominal time, the moving deviation on less than 1 %.
 
 # %%
 area = {
@@ -460,8 +453,8 @@ assert max(area["sources"].values()) < min(without) < max(without) < min(area["r
 assert found["num_sequences"] == 8
 
 # %% [markdown]
-# **Answer.** On the spacecraft, the simulator is worth most as a reference: what is left of the telemetry beside it ranks anomalies better
-# than any one-line score does. As a source of training windows, it does worse than the one-line scores.
+# **Answer.** On the channel made here, yes, as a reference. On the spacecraft, references have the highest means, but six channels do not
+# establish an advantage over simple scores. As a source of training windows, the simulator does worse than these.
 #
 # ## Exercises
 #
@@ -489,7 +482,7 @@ check_answer(
 
 # %% [markdown]
 # **2.** Between its edges, a swell hides in the gain. Fix the gain at its median in the past, and fit the level alone, with the phase as
-# it was found (`clock`). Return the rms of the rest of each of `windows`. What does it find, and what does it cost?
+# it was found (`clock`). Return the rms of the rest of each of `windows`.
 
 # %%
 usual_gain = np.median(align(past)[2])
@@ -524,8 +517,7 @@ check_answer(
 # num_found = sum(together.values())
 # ```
 #
-# Here, the combination finds at least as much as either score alone, at the same 1 % of false alarms in total. A cheap score beside a
-# model costs nothing, and sees what the model does not.
+# A cheap score beside a model sees what the model does not.
 #
 # </details>
 
@@ -544,7 +536,7 @@ check_answer(
 # print("free gain: ", table["residual"], f"within swells {inside['residual']:.0%}, AUC-PR {areas['residual']:.2f}")
 # ```
 #
-# The nominal rest now grows with the amplitude, which raises the matched threshold for everything else. What an alignment may take up is a
-# decision about what counts as drift and what counts as a fault. It cannot be read off the data.
+# The nominal rest now grows with the amplitude, which raises the matched threshold. What an alignment may take up decides what counts as
+# drift and what as a fault. It cannot be read off the data.
 #
 # </details>
