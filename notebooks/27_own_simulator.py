@@ -3,17 +3,16 @@
 #
 # **Question:** how do two CSV files, one of a coarse simulator and one of the real thing, become a detector that finds faults?
 #
-# - **After this lesson** you can pair a simulator with telemetry, judge enhancers on held-out time, and see what the difference from the
-#   enhanced run shows of a fault, and what it does not.
+# - **After this lesson** you can pair a simulator with telemetry, judge enhancers on held-out time, and find a fault in the difference
+#   from the enhanced run.
 # - **You should know** ridge regression (notebook 04) and the conformal threshold (notebook 13).
-# - **Terms:** [window](../docs/glossary.md#window), [NRMSE](../docs/glossary.md#nrmse),
-#   [residual](../docs/glossary.md#residual): telemetry minus enhanced run. A *block of time* is a contiguous stretch: neighbouring windows
-#   overlap, so that only blocks of time can be held out honestly.
+# - **Terms:** [window](../docs/glossary.md#window), [NRMSE](../docs/glossary.md#nrmse), [residual](../docs/glossary.md#residual):
+#   telemetry minus enhanced run. A *block of time* is a contiguous stretch; because neighbouring windows overlap, only such blocks can be
+#   held out.
 #
 # **What the paper says** (section 1): the enhanced simulator should "perform similarly to much more sophisticated simulators". The
-# paper's example has a square wave as its simulator. Here the pair is real: a satellite's battery over low orbits, with a coarse
-# single-particle model as the simulator and a Doyle-Fuller-Newman model with sensor noise in the place of the vehicle
-# ([battery study](../studies/battery/README.md)).
+# paper's example has a square wave as its simulator. Here, a simple physical model of a satellite's battery is the simulator, and a
+# detailed one with sensor noise stands for the vehicle ([battery study](../studies/battery/README.md)).
 
 # %%
 import numpy as np
@@ -48,14 +47,14 @@ with drawing(
     panel.legend(frameon=False, ncols=2)
 
 # %% [markdown]
-# *What to see:* both curves rise in the sun and fall in eclipse, and payload passes draw them down at the same moments. The simulator does
-# not know this vehicle: its cell is warmer, its contacts are worse, and the difference depends on the current.
+# *What to see:* both curves rise and fall at the same moments, by different amounts. The battery is charged in the sun and drained in
+# eclipse and by payload passes.
 #
 # ## From cheap to dear
 #
-# The cheapest repair is a level and a gain for the voltage. Next comes ridge regression from *all* columns of a window to the telemetry of
-# the window. Both are fitted to the first 60 % of the time and judged on the last 30 %. A window lies between them, so that no window
-# reaches from one part into the other.
+# The cheapest repair is a level and a gain for the voltage. Next comes ridge regression from *all* columns of a window to the telemetry
+# of the window. Both are fitted to the first 60 % of the time and judged on the last 30 %. The gap between them is longer than a window,
+# so that no window reaches from one part into the other.
 
 # %%
 window = 500
@@ -109,13 +108,13 @@ assert (
 )
 
 # %% [markdown]
-# The other columns nearly halve what the best model of the voltage leaves. Exercise 2 asks which of the two does.
+# The other columns nearly halve the error of the best model of the voltage. Exercise 2 asks which of the two does.
 #
 # ## The same with the package
 #
 # `fit` pairs the two files on one clock, estimates a delay, chooses the penalty by blocks of time, learns noise from residuals that the
-# enhancer has not seen, and reports on the last fifth. Ridge regression is asked for here, and noise that is drawn from whole residual
-# windows; neither needs a network.
+# enhancer has not seen, and reports on the last fifth. (Its errors are of other stretches of time than those above.) Ridge regression and
+# noise that is drawn from residual windows need no network.
 
 # %%
 from enhsim_tf import FitOptions, fit
@@ -142,8 +141,9 @@ say(
 # %% [markdown]
 # ## A run with a fault
 #
-# The simulator's user can simulate what the vehicle has not yet suffered. `simulator_fault.csv` is a run of the coarse simulator with a
-# fault; its column `mask` says where. `telemetry_fault.csv` is what the vehicle would measure. The model turns the run into telemetry:
+# `simulator_fault.csv` is a run of the coarse simulator with a fault; its column `mask` says where. `telemetry_fault.csv` is what the
+# vehicle would measure. The model turns the run into telemetry, and its *trust score* says where the run leaves the [range of the
+# training runs](../docs/glossary.md#trusted-range):
 
 # %%
 from enhsim_tf import TrustedRange
@@ -168,16 +168,16 @@ beside = np.convolve(labels, np.ones(2 * window - 1), mode="same") > 0  # shares
 assert not outside[~beside].any()
 
 # %% [markdown]
-# The enhanced run is nearer to the truth than the coarse one also under a fault that training never saw. The trust score says before
-# anyone measures that this is an extrapolation; but it also marks half of the run outside the fault, all of it less than a window away
-# from the fault: a sample gets the mean score of all windows that contain it.
+# The enhanced run is nearer to the truth than the coarse one also under a fault that training never saw. The trust score warns of this
+# extrapolation before anyone measures. It also marks half of the rest, all of it less than a window away from the fault: a sample gets
+# the mean score of all windows that contain it.
 #
 # ## A detector that knows what should happen
 #
 # Without a fault, telemetry minus enhanced run should be noise. So the detector looks at this residual only: its root mean square in
 # short windows, with a conformal threshold. Which residuals should set the threshold? Those of time on which ridge regression was fitted
-# are a little too small. *Cross-fitting* repairs this: cut the time into five blocks, fit the enhancer to four of them, without the windows
-# that reach into the fifth, and take the residual of the fifth; and so on.
+# are a little too small. *Cross-fitting* repairs this: cut the time into five blocks, fit the enhancer to four of them, without the
+# windows that reach into the fifth, and take the residual of the fifth; and so on.
 
 # %%
 from enhsim_tf.enhancer.ridge import time_blocks
@@ -216,8 +216,8 @@ assert np.mean(later > threshold) <= np.mean(later > fitted_threshold)
 # %% [markdown]
 # Only the threshold by cross-fitting keeps about the rate that it was set for.
 #
-# What does the detector see of the fault? The vehicle has it, and the simulator does not know: `simulator_planned.csv` is the coarse run of
-# the same commands without the fault.
+# What does the detector see of a fault that the simulator does not know? `simulator_planned.csv` is the coarse run of the same commands
+# without the fault.
 
 # %%
 plan = read_recording(folder / "simulator_planned.csv", model.alignment.columns, interval_s=model.interval_s)
@@ -268,8 +268,9 @@ assert alarms["enhanced run"][1] > alarms["coarse run"][1]
 # %% [markdown]
 # ## What the study found
 #
-# This is one fault at its full severity, in one run. The [battery study](../studies/battery/README.md) has five faults at five severities,
-# with ten seeds. It uses the same simulator in two ways: as a *reference*, as here, and as a *source* of windows that detectors learn from.
+# This is one fault at its full severity, in one run. The [battery study](../studies/battery/README.md) has five faults at five
+# severities, with ten seeds. It uses the same simulator in two ways: as a *reference*, as here, and as a *source* of windows that
+# detectors learn from (third row). In the last row, the detectors learn from telemetry of 120 orbits.
 
 # %%
 uses = open_study("battery")[0]["regimes"]["gentle"]["uses"]
@@ -289,9 +290,9 @@ assert (
 )
 
 # %% [markdown]
-# **Answer.** Pair the files, let the enhancer learn the difference on nominal time, run the simulator beside the telemetry, and watch what
-# is left. As a reference, the enhanced simulator finds several times as many fault windows as detectors do that learn from what it
-# generates.
+# **Answer.** Pair the files, let the enhancer learn the difference on nominal time, run the simulator beside the telemetry, and watch
+# what is left. In the study, this finds several times as many fault windows as detectors that learn from generated windows or from
+# telemetry.
 #
 # ## Exercises
 #
@@ -339,8 +340,8 @@ check_answer(
 # delay_s = estimate_delay([shifted], simulator, window).seconds
 # ```
 #
-# It is minus 70 seconds: seven samples of 10 s, and the telemetry is early. Cross-correlation finds it because payload passes
-# come at random times; a purely periodic signal would leave several delays equally likely.
+# It is minus 70 seconds: seven samples of 10 s, and the telemetry is early. Cross-correlation can find it because payload passes come at
+# random times; a purely periodic signal would leave several delays equally likely.
 #
 # </details>
 
@@ -351,7 +352,6 @@ check_answer(
 # ratio = nrmse(fit_ridge_by_hand(["volts", "amperes"], 10.0)(last), cut(target, last)) / errors["ridge, all columns"]
 # ```
 #
-# A ratio near 1 means that the temperature adds little, and the current is what helps. In the study, over ten seeds, both regimes say the
-# same: 0.042 and 0.039 in the gentle one, 0.073 and 0.070 in the hard one.
+# A ratio near 1 means that the temperature adds little, and the current is what helps.
 #
 # </details>
