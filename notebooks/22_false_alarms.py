@@ -3,16 +3,15 @@
 #
 # **Question:** a detector is trained on a simulation. What decides how often it raises a false alarm on real telemetry?
 #
-# - **After this lesson** you can explain why a perfect simulator without noise gives a useless alarm, say which noise helps and which does
-#   not, and repair a threshold with a few real windows.
+# - **After this lesson** you can explain why a perfect simulator without noise gives a useless alarm, say which noise helps, and repair a
+#   threshold with a few real windows.
 # - **You should know** the PCA residual and the threshold of notebook 13, and ridge regression (notebook 04).
-# - **Terms:** [nominal](../docs/glossary.md#nominal): without a fault; [arm](../docs/glossary.md#arm): one kind of training windows;
-#   [PCA residual](../docs/glossary.md#pca-residual), [conformal threshold](../docs/glossary.md#conformal-threshold);
-#   [false-alarm rate](../docs/glossary.md#false-alarm-rate): the share of real nominal windows that raise an alarm.
+# - **Terms:** [nominal](../docs/glossary.md#nominal): without a fault; [arm](../docs/glossary.md#arm): one kind of training windows; [PCA
+#   residual](../docs/glossary.md#pca-residual), [conformal threshold](../docs/glossary.md#conformal-threshold); [false-alarm
+#   rate](../docs/glossary.md#false-alarm-rate): the share of real nominal windows that raise an alarm.
 #
 # **What the paper says** (title): "Training robust anomaly detection". The paper trains no detector. This lesson trains one in six ways
-# and counts its alarms on real nominal windows. The paper's waves with noise stand in for *real* telemetry here, so that the truth is
-# known. Notebook 24 goes to a spacecraft.
+# and counts its alarms on real nominal windows. The paper's waves with noise stand in for *real* telemetry, so that the truth is known.
 
 # %%
 import numpy as np
@@ -57,8 +56,8 @@ def threshold_for(scores, rate=0.01):
 
 
 # %% [markdown]
-# The package has the same detector and the same threshold. Its faster solver finds the four directions of the two waves exactly. Of
-# directions that describe noise it finds slightly different ones, so the second comparison allows a tenth.
+# The package has the same detector and the same threshold. Its faster solver finds slightly different directions of noise, so the second
+# comparison allows a tenth.
 
 # %%
 from enhsim_tf.detection.detectors import PCAResidual
@@ -85,8 +84,7 @@ assert threshold_for(by_hand) == finite_threshold(by_hand, 0.01)[0]
 # | ridge + residual windows | ridge regression in the place of the network; as noise, whole windows of what it leaves of the telemetry |
 # | real | real windows |
 #
-# In each arm, half of the windows train the detector, and the other half set its threshold. Somebody who has only a simulation can do no
-# more.
+# In each arm, half of the windows train the detector, and the other half set its threshold. (For *real*, later windows set it.)
 
 # %%
 from enhsim_tf.enhancer.ridge import fit_ridge
@@ -143,10 +141,10 @@ with drawing(alt, height=2.2, title=title) as panel:
     )
 
 # %% [markdown]
-# *What to see:* the black bars are at nearly the same place in all rows: they show the real noise, of which 20 directions describe hardly
-# anything. The tick moves. Where it lies left of the bar, every window raises an alarm; where it lies at the right end of the bar, one in
-# a hundred does; where it lies beyond, none. So one ratio decides: the threshold that the arm sets, divided by the one that real
-# windows would set for the same detector. Below 1 there are too many alarms, above 1 too few.
+# *What to see:* the black bars, the scores of real windows, are at nearly the same place in all rows. The tick moves. Where it lies left
+# of the bar, every window raises an alarm; at the right end of the bar, one in a hundred does; beyond it, none. So one ratio decides: the
+# threshold that the arm sets, divided by the one that real windows would set for the same detector. Below 1 there are too many alarms,
+# above 1 too few.
 
 # %%
 right = {name: threshold_for(scores_of(detector, calibration)) for name, detector in detectors.items()}
@@ -160,9 +158,9 @@ if is_full:
     assert alarms["coarse"] < 0.01 and ratio["coarse"] > 1.2
 
 # %% [markdown]
-# A simulator without noise, however perfect, sets the threshold at nothing. The paper's noise has the right standard deviation, but few
-# directions (notebook 09): the detector learns them, and its threshold describes what is left. Gaussian noise and residual windows leave
-# as much as real noise does.
+# A simulator without noise, however perfect, sets the threshold at nearly nothing. The paper's noise has the right standard deviation,
+# but few directions (notebook 09): the detector learns them, and its threshold describes what is left. Gaussian noise and residual
+# windows leave as much as real noise does.
 #
 # ## The scale of the noise
 #
@@ -185,7 +183,7 @@ with drawing("False alarms over the scale of the training noise", height=2.0, ti
     panel.set(xlabel="factor of the noise's standard deviation", ylabel="false alarms (%), set for 1 %")
 
 # %% [markdown]
-# *What to see:* the curve falls from everything to nothing within a few tenths. Each score is a mean over 500 samples, so the scores of
+# *What to see:* the curve falls from everything to nothing between 0.8 and 1.05. Each score is a mean over 500 samples, so the scores of
 # nominal windows differ little from each other, and a small error of the scale moves the threshold past most of them.
 
 # %%
@@ -225,14 +223,14 @@ for name, noise in {
 assert not is_full or shot_alarms["Gaussian"] > 0.1 > 0.03 > shot_alarms["noise windows drawn again"]
 
 # %% [markdown]
-# It is not enough: two noises of the same standard deviation set different thresholds. Noise that is drawn from real windows sets the right
-# one.
+# It is not enough: with the same standard deviation, Gaussian noise sets a threshold that is too low for shot noise. Noise drawn from
+# real windows sets the right one.
 #
 # ## Few false alarms are not the aim
 #
-# The arm *coarse* raises no alarm at all. That is no success: it raises none on anomalies either. Add a *ramp* to each test window: within
-# 100 samples, the value drifts off by two standard deviations of the noise. And give another detector the same arms, the *limit check* of
-# every ground station. Its score is how far a window leaves the range of the training values (quantiles 0.1 % and 99.9 %).
+# The arm *coarse* raises no false alarm. Does it find anomalies? Add a *ramp* to each test window: within 100 samples, the value drifts
+# off by two standard deviations of the noise. And give another detector the same arms, the *limit check* of every ground station. Its
+# score is how far a window leaves the range of the training values (quantiles 0.1 % and 99.9 %).
 
 
 # %%
@@ -259,14 +257,13 @@ assert found["truth"] == 1 and limits["coarse"] > 0.9
 assert not is_full or (found["coarse"] < 0.02 and limits["enhanced + GAN"] < 0.05)
 
 # %% [markdown]
-# The limit check judges the arms otherwise. Square waves never leave their levels, and real noise always does: the coarse arm alarms on
-# every window. With the GAN's noise, whose values are nearly right (notebook 21), it hardly alarms. So the false alarms of one detector say
-# little about a simulation.
+# It does not: *coarse* finds no ramp. The limit check judges the arms otherwise. Square waves never leave their levels, and real noise
+# always does: the coarse arm alarms on every window. With the GAN's noise, whose values are nearly right (notebook 21), it hardly alarms.
+# So the false alarms of one detector say little about a simulation.
 #
 # ## All of it at once
 #
-# A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, on the same telemetry with five seeds.
-# Nothing is computed here.
+# A [study](../studies/robustness/README.md) of the project trains seven detectors on such arms, with five seeds.
 #
 # ![False alarms by training data](../studies/robustness/results/false_alarms.png)
 
@@ -277,9 +274,9 @@ for name, rate in mean.items():
     print(f"{name:26} false alarms {rate:6.1%}, mean over detectors")
 
 # %% [markdown]
-# *What to see:* the marks of the perfect simulator are far on the right: the best signal does not help without noise. Those of the paper's
-# GAN are scattered over the whole axis: which detector is used decides. Those of *ridge + residual windows* are near those of real
-# telemetry, whatever the detector.
+# *What to see:* the marks of the perfect simulator (*truth*) are far on the right: the best signal does not help without noise. Those of
+# the paper's GAN are scattered over the whole axis: it depends on the detector. Those of *ridge + residual windows* are near those of
+# real telemetry, whatever the detector.
 
 # %%
 assert min(mean["truth"], mean["enhanced"]) > 0.8 and mean["enhanced + GAN"] > 5 * mean["real"]
@@ -299,9 +296,9 @@ for about in published["arms"]["ridge + residual windows"]["by_environment"].val
 _ = verdict(pipeline, "C8")
 
 # %% [markdown]
-# The noise of the training windows decides the false alarms. Its scale must be right to a few per cent, but that is not enough: with the
-# same scale, noise of few directions or of another kind sets another threshold. Noise that is drawn from real residuals sets a threshold
-# that is right in all of these cases; but its detector finds fewer ramps than the one that was trained on real windows.
+# **Answer.** The noise of the training windows, and the detector. For the PCA residual, the scale of the noise must be right to a few per
+# cent, and noise of few directions or of another kind sets a wrong threshold even then. Noise that is drawn from real residuals set a
+# right one in all of these cases; but its detector found fewer ramps than the one that was trained on real windows.
 #
 # ## Exercises
 #
@@ -356,7 +353,7 @@ check_answer(
 # print("false alarms {:.1%}, recall {:.0%}; trained on real windows {:.0%}".format(*repaired(), found["real"]))
 # ```
 #
-# A good signal needs no model of the noise if a few real windows set the threshold. Notebook 28 asks how few are enough.
+# Here, a good signal needs no model of the noise if a few real windows set the threshold. Notebook 28 asks how few are enough.
 #
 # </details>
 
