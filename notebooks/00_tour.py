@@ -1,15 +1,16 @@
 # %% [markdown]
 # # The whole idea in ten minutes
 #
-# **Question:** can data from a crude simulator, made realistic by two neural networks, train a detector that guards the real thing?
+# **Question:** can data from a crude simulator, made realistic by two neural networks, train a detector?
 #
 # - **After this lesson** you can explain each step of the paper, and say where the method fails.
 # - **You should know** what a Dense layer is.
 #
-# - **Terms:** *telemetry*: the measurements that a vehicle sends. *Nominal*: without a fault. A *detector* learns from nominal data, scores
-#   new windows, and raises an alarm above a threshold. All terms: [glossary](../docs/glossary.md).
+# - **Terms:** *telemetry*: the measurements that a vehicle sends. *Window*: here 500 samples in a row. *Nominal*: without a fault. A
+#   *detector* learns from nominal data, scores new windows, and raises an alarm above a threshold. All terms:
+#   [glossary](../docs/glossary.md).
 #
-# Detectors could learn from *simulations*, but these are too clean: ordinary noise then passes for an anomaly. Feldman ([arXiv
+# Detectors could learn from *simulations*, but these are too clean: noise then passes for an anomaly. Feldman ([arXiv
 # 2008.12082](https://arxiv.org/abs/2008.12082)) keeps the simulator crude, and lets two networks make its output realistic.
 
 # %%
@@ -32,8 +33,8 @@ pipeline, budget = open_pipeline()
 show(pipeline, "fig01_pipeline")
 
 # %% [markdown]
-# *What to see:* waveform and noise meet only in their sum. A healthy and a stuck satellite therefore get the same noise from the same seed
-# ([01](01_pipeline.ipynb)):
+# *What to see:* waveform and noise meet only in their sum. A healthy and a stuck satellite therefore get the same noise from the same
+# random numbers ([01](01_pipeline.ipynb)):
 
 # %%
 added = {}
@@ -47,9 +48,8 @@ assert difference < 1e-5
 # %% [markdown]
 # ## Steps 1, 2 and 4: a crude simulator
 #
-# A synthetic satellite turns once in two minutes  on an orbit of eight. Its telemetry, here called *real*, is two sines with white noise,
-# so that the truth is known ([24](24_real_telemetry.ipynb) has a real spacecraft). The simulator knows the periods and draws square waves
-# ([02](02_source_target.ipynb)).
+# A synthetic satellite turns once in two minutes on an orbit of eight minutes. Its telemetry, here called *real*, is two sines with white
+# noise, so that the truth is known. The simulator knows the periods and draws square waves ([02](02_source_target.ipynb)).
 
 # %%
 show(pipeline, "fig02_source_target")
@@ -75,8 +75,8 @@ assert len(levels) == 4
 show(pipeline, "fig04_enhanced_simulation")
 
 # %% [markdown]
-# *What to see:* the error is a fraction of the simulator's own. The enhanced signal is rougher than the truth, because part of the training
-# noise was memorised ([04](04_enhanced_simulation.ipynb)).
+# *What to see:* the error is a fraction of the simulator's own. The enhanced signal is rougher than the truth: part of the training noise
+# was memorised ([04](04_enhanced_simulation.ipynb)).
 
 # %%
 errors = measured("enhancement", pipeline)
@@ -92,7 +92,7 @@ assert after < bound[budget]
 assert rough > 2 * smooth
 
 # %% [markdown]
-# A matrix does better. (The one of notebook 04 is tuned otherwise: 0.031.) But real telemetry is never that clean.
+# A matrix does better. (Notebook 04 tunes it otherwise: 0.031.)
 #
 # ## Step 6: the noise
 #
@@ -121,8 +121,8 @@ num_records = pipeline.settings.iterations // pipeline.settings.record_every
 history = {key: values[:num_records] for key, values in pipeline.history.items() if values.ndim}
 
 # %% [markdown]
-# *What to see:* the two accuracies swing in opposite directions, and the losses stay near ln 2, which guessing gives. In this balance the
-# paper stops: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
+# *What to see:* the two accuracies swing in opposite directions, and the losses stay near ln 2, which guessing gives. Here the paper
+# stops: the noise is "sufficiently similar" ([12](12_accuracy_loss.ipynb)).
 
 # %%
 late = np.mean([history[f"accuracy_{kind}"][-3:] for kind in ("real", "generated")])
@@ -134,7 +134,7 @@ if budget == "full":
     assert np.all(np.abs(losses - np.log(2)) < 0.15)
 
 # %% [markdown]
-# At a glance it is:
+# At a glance, it is similar:
 
 # %%
 show(pipeline, "fig06_real_or_generated_noise")
@@ -164,7 +164,7 @@ assert generated < {"full": 0.2, "smoke": 0.6}[budget] * real
 show(pipeline, "fig13_combined")
 
 # %% [markdown]
-# *What to see:* with its noise, the signal is as rough as telemetry.
+# *What to see:* with its noise, the signal is about as rough as telemetry, here over all test windows:
 
 # %%
 signals = {
@@ -185,7 +185,7 @@ if budget == "full":  # twenty iterations give noise of the wrong size
 # %% [markdown]
 # ## Does it serve its purpose?
 #
-# The title promises robust detectors, and the text trains none. Here are three, which give unusual windows high scores:
+# The title promises robust detectors; the text trains none. Here are three:
 #
 # - *PCA residual*: the part of a window outside the principal components of training windows.
 # - *Dense autoencoder*: the error with which a network reproduces a window from a few numbers.
@@ -224,9 +224,9 @@ with drawing(alt, 2, 2.6, title, sharey=True) as panels:
     panels[0].legend(frameon=False, loc="upper center", fontsize=6.5)
 
 # %% [markdown]
-# *What to see:* after the clean signal, every detector alarms on nearly every nominal window. After the GAN's noise, it depends on the
-# detector. After Gaussian noise, which is right here, all alarm seldom, but the autoencoder finds fewer faults. After square waves, the PCA
-# residual and the forest alarm seldom and find fewer faults, too. Who always alarms finds everything.
+# *What to see:* trained on the clean enhanced signal, every detector alarms on nearly every nominal window. After the GAN's noise, it
+# depends on the detector. After Gaussian noise, which is right here, all alarm seldom, but the autoencoder finds fewer faults. After
+# square waves, the PCA residual and the forest alarm seldom and find fewer faults, too. A detector that always alarms finds everything.
 
 # %%
 print("false alarms / recall")
@@ -259,8 +259,8 @@ records = verdict(pipeline, "C6", "C8", "C9")
 assert [record["id"] for record in records] == ["C6", "C8", "C9"]
 
 # %% [markdown]
-# **Answer.** Not as it stands: the signal is nearly right, but two of three detectors take telemetry for anomalies. `fit` chooses among
-# noise models instead ([noise](../docs/noise.md)).
+# **Answer.** Not as it stands: the signal is nearly right, but two of three detectors alarm on more than a quarter of nominal telemetry.
+# `fit` chooses among noise models instead ([noise](../docs/noise.md)).
 #
 # ## Exercises
 #
