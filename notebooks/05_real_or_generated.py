@@ -10,8 +10,8 @@
 #   of windows varies.
 #
 # **What the paper says** (section 2.3): Figures 5, 6 and 7 are faces made by another system, StyleGAN2, "completely synthetic", to show
-# what adversarial networks can do. They show nothing of this paper's data and cannot be made from it. These are *counterparts* in the
-# paper's own domain, not reproductions: real telemetry among generated telemetry, for you to tell apart.
+# what adversarial networks can do. They cannot be made from this paper's data. The figures here are *counterparts*: real telemetry among
+# generated telemetry, for you to tell apart.
 
 # %%
 import numpy as np
@@ -46,9 +46,8 @@ else:
     print(f"{len(set(my_guess) & truly_generated)} of {len(truly_generated)} right.")
 
 # %% [markdown]
-# *What to see:* little at a glance. If three or four of your four letters are
-# right, was it skill? By pure guessing, the number of right letters has a hypergeometric distribution:
-# $P(k)=\binom{4}{k}\binom{4}{4-k}/\binom{8}{4}$.
+# *What to see:* little at a glance. If three or four of your four letters are right, was it skill? By pure guessing, the number of right
+# letters has a hypergeometric distribution: $P(k)=\binom{4}{k}\binom{4}{4-k}/\binom{8}{4}$.
 
 # %%
 from math import comb
@@ -58,7 +57,8 @@ say(f"Three or four right by pure guessing: **{lucky:.0%}**. One try of eight wi
 assert len(truly_generated) == 4
 
 # %% [markdown]
-# A thousand windows of each kind, a classifier, and windows that it was not trained on are a test:
+# A thousand windows of each kind, and a classifier that judges windows it was not trained on, are a test. (C7 asks for less: generated
+# telemetry must not be easier to recognise than telemetry that is 10 % larger.)
 
 # %%
 (record,) = verdict(pipeline, "C7")
@@ -73,7 +73,7 @@ assert auc > 0.8
 show(pipeline, "fig06_real_or_generated_noise")
 
 # %% [markdown]
-# *What to see:* little at a glance. But what is shared is invisible in a single window. Here are the mean of the four real windows and
+# *What to see:* little at a glance. But what windows share is invisible in a single one. Here are the mean of the four real windows and
 # the mean of the four generated ones:
 
 # %%
@@ -103,7 +103,7 @@ say(
 assert correlation["generated"] > {"full": 0.3, "smoke": 0.1}[budget] > abs(correlation["real"])
 
 # %% [markdown]
-# Windows that share a pattern vary in few dimensions. The *effective rank* counts them:
+# In how many dimensions do many windows vary? The *effective rank* counts them:
 
 # %%
 found = measured("noise resemblance", pipeline)
@@ -123,8 +123,8 @@ assert rank_generated / rank_real < {"full": 0.2, "smoke": 0.6}[budget]
 show(pipeline, "fig07_real_or_generated_series")
 
 # %% [markdown]
-# *What to see:* all stretches keep the rhythm of the satellite for as long as you look. The next cell makes one of each kind anew, as
-# long as the whole test part.
+# *What to see:* all stretches keep the rhythm of the satellite. The next cell makes one of each kind anew, as long as the whole test
+# part.
 
 # %%
 orbit, size = 480, pipeline.settings.window  # samples
@@ -140,8 +140,7 @@ say(
 assert min(rhythm) > {"full": 0.6, "smoke": -0.5}[budget]
 
 # %% [markdown]
-# The noise betrays them all the same. Each window brings the shared pattern along, so that the noise of a generated series repeats
-# itself in every window, however long the series is:
+# The noise betrays them all the same: each window brings the shared pattern along.
 
 # %%
 from enhsim_tf.paper.noise import extract_noise
@@ -154,7 +153,7 @@ for name, row in series.items():
 assert repeats["generated"] > {"full": 0.3, "smoke": 0.05}[budget] > abs(repeats["real"])
 
 # %% [markdown]
-# So the answer to the question is no. A difference that nobody sees can be the one that a detector sees best (notebook 13).
+# **Answer.** No. A difference that a glance misses can be the one that a detector sees best (notebook 13).
 #
 # ## Exercises
 #
@@ -223,7 +222,6 @@ check_answer(
 # print(needed)
 # ```
 #
-# About $n/2+1/2+0.82\sqrt{n}$, rounded up. For eight windows in groups of four, all must be right. The eye's failure on eight windows says
-# little about it, and its success would too.
+# About $n/2+1/2+0.82\sqrt{n}$, rounded up. In the quiz above, all four letters must be right.
 #
 # </details>
