@@ -10,9 +10,9 @@
 #   the probability that it is real; [adversarial loss](../docs/glossary.md#adversarial-loss); [AUC](../docs/glossary.md#auc): the
 #   probability that a judge gives a higher score to a generated window than to a real one. 0.5 means that it cannot tell them apart.
 #
-# **What the paper says** (section 2.3): one convolutional layer "using a window 20 neurons wide with a stride of 4 neurons per step";
-# it "pools each convolution based on the maximum value of the sample". Then the layers narrow to one neuron that says real or not. The
-# paper gives no number of filters; 500 is the author's, in the public code of his 1-D GAN.
+# **What the paper says** (section 2.3): one convolutional layer "using a window 20 neurons wide with a stride of 4 neurons per step"; it
+# "pools each convolution based on the maximum value of the sample". Then the layers narrow to one neuron that says real or not. The paper
+# gives no number of filters; 500 is from the author's public code.
 
 # %%
 import numpy as np
@@ -81,8 +81,8 @@ np.testing.assert_allclose(by_hand, of_keras, atol=1e-5)  # 32-bit sums of 20 pr
 #
 # $$L_D=-\tfrac12\,\mathrm{mean}\,\ln D(x)-\tfrac12\,\mathrm{mean}\,\ln\left(1-D(G(z))\right).$$
 #
-# The paper "trains on the entire batch (200 rows) of real and generated data", so there is one step for both terms. (The author's code
-# takes one for each.) The generated windows are given: no gradient goes to the generator.
+# The paper "trains on the entire batch (200 rows) of real and generated data", so there is one step for both terms. The generated windows
+# are given: no gradient goes to the generator.
 
 # %%
 import tensorflow as tf
@@ -139,8 +139,8 @@ print(f"loss before the fifth update: {loss:.2f}; guessing gives {np.log(2):.2f}
 # - *Reordered samples*: all 500 samples are put into another order.
 # - *Larger*: all samples are multiplied by 1.2.
 #
-# A filter looks at 20 samples and moves in steps of 4, so 4 places lie across each of the 4 cuts between blocks. All other places see the
-# same samples as before.
+# A filter looks at 20 samples and moves in steps of 4, so after reordering blocks, only 4 places at each of the 4 cuts see other samples
+# than before.
 
 # %%
 trained, rng = build_discriminator(pipeline.settings), np.random.default_rng(0)
@@ -170,9 +170,9 @@ with drawing(alt, 3, 2.5, title, sharex=True, sharey=True) as panels:
     panels[0].set(ylabel="probability real, changed")
 
 # %% [markdown]
-# *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, and on the right they lie far below
-# it. Reordered blocks keep nearly all pieces of 20 samples, reordered samples keep none, and in the larger windows every piece has grown.
-# The table gives the mean change of the probability.
+# *What to see:* on the left, the points lie near the diagonal. In the middle they scatter more widely, and on the right they lie far
+# below it. Reordered blocks keep nearly all pieces of 20 samples, reordered samples keep none, and in the larger windows every piece has
+# grown.
 
 # %%
 moved = {name: float(np.mean(np.abs(other - recorded))) for name, other in judged.items()}
@@ -184,10 +184,9 @@ assert not is_full or moved["reordered blocks"] < moved["larger"] / 1.5
 # %% [markdown]
 # ## What it misses
 #
-# Does it matter that the order is lost? Let other judges look at the same windows of the trained GAN. Each of the two is a linear
-# classifier, trained on four fifths of the windows and asked about the last fifth, for each fifth in turn. One sees the 500 values at their
-# places, the other the power of each frequency. Every judge is also asked to tell two sets of *real* windows apart, which nobody can: the
-# result is its *floor*.
+# Let other judges look at windows of the trained GAN. Each of the two is a linear classifier, trained on four fifths of the windows and
+# asked about the last fifth, for each fifth in turn. One sees the 500 values at their places, the other the power of each frequency.
+# Every judge is also asked to tell two sets of *real* windows apart, which nobody can: the result is its *floor*.
 
 # %%
 from enhsim_tf.common import two_sample
@@ -231,8 +230,8 @@ with drawing(alt, height=1.7, title=title) as panel:
 
 # %% [markdown]
 # *What to see:* the bar of the discriminator ends near its floor, and the other two bars far from theirs. Generated windows differ from
-# real ones, and a linear classifier is enough to find it; the largest responses of this discriminator's filters do not show it. The
-# generator learns from the discriminator alone, which at this point has nothing to say about the difference.
+# real ones, and a linear classifier is enough to find it. The lost places are not the whole reason: the power of each frequency holds no
+# places either. The generator learns from the discriminator alone, which at this point cannot tell the two apart.
 
 # %%
 for name in judges:
@@ -243,8 +242,8 @@ if is_full:
     assert max(floors.values()) < 0.6
 
 # %% [markdown]
-# The discriminator also judges one window at a time. That a thousand windows are all mixtures of the same few shapes (notebook 09) shows
-# only in the thousand together, which is the subject of exercise 2.
+# The discriminator also judges one window at a time. That all windows are mixtures of the same few shapes (notebook 09) shows only in
+# many together (exercise 2).
 #
 # **Answer.** It sees which short pieces a window holds and how large they are. It sees neither their order nor what many windows have in
 # common.
