@@ -366,9 +366,8 @@ assert set(rates) - passed["residual windows"] == {"signal_dependent"}
 #
 # ## Exercises
 #
-# **1.** A likelihood has a floor, too. What is the smallest loss that any model can reach on white Gaussian noise of standard deviation
-# 1?
-# (The density is $\exp(-x^2/2)/\sqrt{2\pi}$; the mean of $x^2$ is 1.)
+# **1.** What is the smallest loss that any model can reach on white Gaussian noise of standard deviation 1? (The density is
+# $\exp(-x^2/2)/\sqrt{2\pi}$; the mean of $x^2$ is 1.)
 
 # %%
 smallest_loss = None  # your answer

@@ -28,9 +28,8 @@ is_full = budget == "full"
 # %% [markdown]
 # ## Baselines on the paper's example
 #
-# Ridge regression is one matrix (notebook 04); here it comes from the package, with its penalty chosen by blocks of time. The other
-# baseline learns nothing at all. It looks up the $k$ training windows whose coarse windows are *nearest* to the new one, and returns the
-# mean of their telemetry:
+# Ridge regression is one matrix (notebook 04); here it comes from the package. The other baseline learns nothing: it looks up the $k$
+# training windows whose coarse windows are *nearest* to the new one, and returns the mean of their telemetry:
 
 
 # %%
@@ -349,7 +348,7 @@ with drawing(alt, height=2.4, title=title) as panel:
 # the further ridge regression falls behind, and random features stay nearer to the floor than this network.
 #
 # Neither knows any physics. Whoever guesses that heat goes with the square needs no random direction: the second regression gets the
-# *square* of what the first one predicts.
+# *square* of what the first one predicts. From a share of 0.2 on, it comes nearest of all to the floor.
 
 
 # %%

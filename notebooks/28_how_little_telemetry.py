@@ -35,8 +35,9 @@ is_full = budget == "full"
 # ## The data
 #
 # The waves are those of the paper's example, but neighbouring samples of the noise are correlated. Known are the square waves and one
-# contiguous *record* of $k$ windows of 500 samples, from which both methods may cut overlapping windows. Later nominal windows count
-# false alarms, others of them set the threshold for the recall at the real rate, and windows with injected anomalies count what is found.
+# contiguous *record* of $k$ windows of 500 samples, from which both methods may cut overlapping windows. Of the later nominal windows,
+# half count false alarms, and half set the threshold for the recall at the real rate. Windows with injected anomalies count what is
+# found.
 
 # %%
 NUM_REAL = (5, 20, 100) if is_full else (5, 20)
@@ -141,8 +142,8 @@ assert rates["threshold from the training windows"][0] > rates["threshold by cro
 #
 # The simulator uses the same record: ridge regression from square waves to the record, and noise fitted to its residuals. These must be
 # cross-fitted for the same reason as the scores. The noise is a Gaussian *autoregression*: each sample is a weighted sum of the samples
-# before it, plus a random number (notebook 25). It has few parameters, and then generates as many windows as wanted: some to train the
-# detector on, and others to set its threshold.
+# before it, plus a random number (notebook 25). It has few parameters. Once fitted, it generates as many windows as wanted: some to train
+# the detector on, and others to set its threshold.
 
 
 # %%
@@ -312,8 +313,8 @@ with drawing(alt, len(environments), 2.6, title, sharex=True, sharey=True) as pa
 
 # %% [markdown]
 # *What to see:* where the noise model describes the noise, the simulator stays within half a point (dashed) from five windows on, and the
-# real windows from 50 on. Where it does not, no number of windows brings it down. The means of the study pay where the one seed above did
-# not.
+# real windows from 50 on. Where it does not, no number of windows brings it down. With autoregressive noise, the simulator pays in the
+# study's means, and did not for the one seed above.
 
 # %%
 for environment, about in environments.items():

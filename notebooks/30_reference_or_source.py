@@ -41,9 +41,9 @@ faulty, planned = volts("telemetry_fault.csv"), columns("simulator_planned.csv")
 is_fault = pd.read_csv(folder / "simulator_fault.csv")["mask"].to_numpy() > 0
 
 # %% [markdown]
-# A satellite's battery has a coarse simulator. In a second run, its resistance rises. The first 70 % of the nominal telemetry are
-# *known*, the rest shows false alarms, and the windows of the fault show what is found. The simulator gets the commands of every run, but
-# does not know the fault.
+# A satellite's battery has a coarse simulator. In a second run, the battery's resistance rises. The first 70 % of the nominal telemetry
+# are *known*, the rest shows false alarms, and the windows of the fault show what is found. The simulator gets the commands of every run,
+# but does not know the fault.
 
 # %%
 border = int(0.7 * len(telemetry))

@@ -165,9 +165,9 @@ with drawing(alt, height=1.7, title=title) as panel:
     panel.set(xlabel="windows found (thresholds set for 1 %)", xlim=(0, 1.05))
 
 # %% [markdown]
-# *What to see:* the detector of each channel alone finds little more than its false alarms. Looking at both is not enough: after noise
-# without correlation, a detector does not notice that the correlation is gone. After noise drawn jointly, it finds nearly every window.
-# Without a simulator it finds nearly as many: here there is enough telemetry.
+# *What to see:* the detector of each channel alone finds little more than its false alarms. Looking at both is not enough: trained on
+# noise without correlation, a detector does not notice that the correlation is gone. Trained on noise drawn jointly, it finds nearly
+# every window. Without a simulator it finds nearly as many: here there is enough telemetry.
 
 # %%
 for name, (found, alarms) in rates.items():
@@ -196,7 +196,7 @@ print("\n".join(line for line in report.lines() if "correlation of the noise" in
 
 # %% [markdown]
 # **Answer.** By a detector that sees all channels and has learnt how they move together. If it learns from generated windows, these must
-# keep that, as residual windows do that are drawn for all channels at once.
+# keep the relation; residual windows drawn for all channels at once do.
 #
 # ## Exercises
 #
