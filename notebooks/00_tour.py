@@ -5,7 +5,6 @@
 #
 # - **After this lesson** you can explain each step of the paper, and say where the method fails.
 # - **You should know** what a Dense layer is.
-#
 # - **Terms:** *telemetry*: the measurements that a vehicle sends. *Window*: here 500 samples in a row. *Nominal*: without a fault. A
 #   *detector* learns from nominal data, scores new windows, and raises an alarm above a threshold. All terms:
 #   [glossary](../docs/glossary.md).
