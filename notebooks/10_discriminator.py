@@ -184,9 +184,9 @@ assert not is_full or moved["reordered blocks"] < moved["larger"] / 1.5
 # %% [markdown]
 # ## What it misses
 #
-# Let other judges look at windows of the trained GAN. Each of the two is a linear classifier, trained on four fifths of the windows and
-# asked about the last fifth, for each fifth in turn. One sees the 500 values at their places, the other the power of each frequency.
-# Every judge is also asked to tell two sets of *real* windows apart, which nobody can: the result is its *floor*.
+# Let two other judges look at windows of the trained GAN. Each is a linear classifier, trained on four fifths of the windows and asked
+# about the last fifth, for each fifth in turn. One sees the 500 values at their places, the other the power of each frequency. Every
+# judge is also asked to tell two sets of *real* windows apart, which nobody can: the result is its *floor*.
 
 # %%
 from enhsim_tf.common import two_sample
@@ -242,8 +242,7 @@ if is_full:
     assert max(floors.values()) < 0.6
 
 # %% [markdown]
-# The discriminator also judges one window at a time. That all windows are mixtures of the same few shapes (notebook 09) shows only in
-# many together (exercise 2).
+# The discriminator also judges one window at a time; exercise 2 looks at many.
 #
 # **Answer.** It sees which short pieces a window holds and how large they are. It sees neither their order nor what many windows have in
 # common.
