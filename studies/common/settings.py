@@ -146,8 +146,6 @@ class BatterySettings:
     coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
     fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
     paper_epochs: int = setting(40, "epochs", "paper, section 2.2", "40", smoke=1)
-    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "about 1,000", smoke=4)
-    num_network_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: autoencoders and the noise GAN take most of the time", smoke=1)
 
 
 @dataclasses.dataclass(frozen=True)
