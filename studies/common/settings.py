@@ -100,15 +100,6 @@ class FewWindowsSettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class ClassifierSettings:
-    """Classifiers of the study of few windows. They take minutes each, so they have fewer seeds than its other training data."""
-
-    num_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds")
-    num_real: tuple[int, ...] = setting((20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,))
-    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: 64 windows of each kind", smoke=20)
-
-
-@dataclasses.dataclass(frozen=True)
 class FactorialSettings:
     """The factorial study: `python -m studies.factorial`. Its other settings are those of robustness."""
 
@@ -176,7 +167,6 @@ class Settings:
     factorial: FactorialSettings = FactorialSettings()
     noise_models: NoiseModelsSettings = NoiseModelsSettings()
     few_windows: FewWindowsSettings = FewWindowsSettings()
-    classifiers: ClassifierSettings = ClassifierSettings()
     spacecraft: SpacecraftSettings = SpacecraftSettings()
     battery: BatterySettings = BatterySettings()
     reference_or_source: ReferenceOrSourceSettings = ReferenceOrSourceSettings()
