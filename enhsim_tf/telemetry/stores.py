@@ -40,7 +40,7 @@ def read_folder_channels(folder: Path, columns: list[str] | None, time: str | No
     if (folder / "labeled_anomalies.csv").is_file():
         raise InputError(
             f"Expected a store's folder. Received: {folder}, which holds labelled channels. "
-            "Load it with load_labelled, or name one array, such as train/T-1.npy with column 0."
+            "Name one array, such as train/T-1.npy with column 0."
         )
     if files_of(folder):  # a store has only folders inside
         return read_table_channels(folder, columns, time, options)

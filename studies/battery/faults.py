@@ -32,14 +32,7 @@ _INPUTS = {"raised resistance": "added resistance", "lost capacity": "lost mater
 
 
 def simulator_inputs(fault: Fault | None) -> dict[str, float]:
-    """The inputs of a simulator of the battery under a fault.
-
-    Args:
-        fault: The fault; None for nominal.
-
-    Returns:
-        The three inputs by name, all 0 for nominal, for a drifting sensor and for a payload that is stuck on.
-    """
+    """The three inputs of a simulator by name, all 0 for nominal (None), for a drifting sensor and for a payload that is stuck on."""
     inputs = dict.fromkeys(_INPUTS.values(), 0.0)
     if fault is not None and fault.kind in _INPUTS:
         inputs[_INPUTS[fault.kind]] = fault.size
@@ -60,17 +53,12 @@ def drift_under(num_samples: int, fault: Fault | None, onset: int) -> np.ndarray
     return fault.size * np.maximum(np.arange(num_samples) - onset, 0) / ORBIT_SAMPLES
 
 
+def columns_of(fault: Fault | None) -> dict[str, str | float]:
+    """The columns of a table that name a fault."""
+    return {"fault": "nominal" if fault is None else fault.kind, "severity": 0.0 if fault is None else fault.severity}
+
+
 def measure(values: np.ndarray, noise_sd: float, step: float, rng: np.random.Generator) -> np.ndarray:
-    """Measures simulated values with a sensor that adds white noise and rounds to its resolution.
-
-    Args:
-        values: Simulated values of any shape.
-        noise_sd: Standard deviation of the sensor's noise.
-        step: Resolution of the sensor.
-        rng: Random number generator.
-
-    Returns:
-        Telemetry, float32 of the same shape.
-    """
+    """Measures simulated values of any shape: the sensor adds white noise of `noise_sd` and rounds to multiples of `step`, in float32."""
     noisy = values + noise_sd * rng.standard_normal(np.shape(values))
     return (np.rint(noisy / step) * step).astype(np.float32)

@@ -50,15 +50,9 @@ REGIMES = {
 
 
 def draw_load(num_orbits: int, regime: Regime, rng: np.random.Generator) -> np.ndarray:
-    """Draws the load of the satellite: the bus and one to three payload passes in each orbit, at random times.
+    """Draws the load in amperes, shape `(num_orbits * ORBIT_SAMPLES,)`: the bus and one to three payload passes in each orbit.
 
-    Args:
-        num_orbits: Number of orbits; the first begins with the sun.
-        regime: How hard the battery is used.
-        rng: Random number generator.
-
-    Returns:
-        Load in amperes, float64 of shape `(num_orbits * ORBIT_SAMPLES,)`.
+    The passes have random times; the first orbit begins with the sun.
     """
     load = np.full(num_orbits * ORBIT_SAMPLES, regime.bus_a)
     for orbit in range(num_orbits):
@@ -69,14 +63,9 @@ def draw_load(num_orbits: int, regime: Regime, rng: np.random.Generator) -> np.n
 
 
 def battery_current(load: np.ndarray, regime: Regime) -> np.ndarray:
-    """Computes the current of the battery by counting charge.
+    """Computes the current of the battery for a load from the start of an orbit, by counting charge.
 
-    Args:
-        load: Load in amperes, shape `(samples,)`, from the start of an orbit.
-        regime: How hard the battery is used.
-
-    Returns:
-        Current in amperes, float64 of the same shape; positive discharges the battery.
+    Both are in amperes and have the shape `(samples,)`; a positive current discharges the battery.
     """
     solar = np.where(np.arange(len(load)) % ORBIT_SAMPLES < SUN_SAMPLES, regime.solar_a, 0.0)
     current, charge, hours = np.empty(len(load)), FIRST_CHARGE, INTERVAL_S / 3600

@@ -1,18 +1,19 @@
-"""Records the runs of both simulators that a replicate of the study works with: nominal orbits and faults, in one folder."""
+"""The runs of both simulators that a replicate works with, and windows of them, through the sensor: what is learnt from and judged on."""
 
-import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from enhsim_tf.common.atomic_files import write_json
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.stages import load_arrays, save_arrays
-from studies.battery.faults import ALL, Fault
-from studies.battery.orbits import Regime, draw_load
+from enhsim_tf.simulator.joint import cut
+from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts
+from studies.battery.faults import ALL, SENSOR_NOISE_V, SENSOR_STEP_V, Fault, measure
+from studies.battery.orbits import INTERVAL_S, ORBIT_SAMPLES, Regime, draw_load
 from studies.battery.simulate import MODELS, simulate_all
 
 PARTS = {
@@ -24,28 +25,26 @@ PARTS = {
 }
 """For each part its faults and its simulators. The enhanced simulator is fitted to `fit`. Detectors learn more real telemetry from
 `more`, everything is judged on `test` and `fault`, and training data are generated from `coarse`."""
+WINDOW = 500
+"""Samples in a window, as in the paper: nearly an orbit at the interval of 10 s."""
+NUM_TEST, NUM_FAULT = 400, 40
+"""Windows of the test orbits, and of each fault at each severity, on which everything is judged."""
+_AFTER_ONSET = round(60 / INTERVAL_S)  # samples in which a fault grows to its full size
 
 
-@dataclasses.dataclass(frozen=True)
-class Recorded:
+class Recorded(NamedTuple):
     """The runs of a replicate.
 
     Args:
         runs: float32 arrays of shape `(samples, 3)` with the columns `simulate.COLUMNS`, by `part/fault/model`.
-        about: `num_runs`, and `reduced`: how often the current was reduced, for each run in which it was.
+        reduced: How often the current was reduced because a solver failed, for each run in which it was.
     """
 
     runs: dict[str, np.ndarray]
-    about: dict[str, Any]
+    reduced: Mapping[str, int]
 
     def get(self, part: str, model: str, fault: Fault | None = None) -> np.ndarray:
-        """Returns a run, shape `(samples, 3)`.
-
-        Args:
-            part: A key of `PARTS`.
-            model: `coarse` or `fine`.
-            fault: The fault; None for nominal.
-        """
+        """The run of a model, `coarse` or `fine`, in one of `PARTS`, shape `(samples, 3)`; the fault is None for nominal."""
         return self.runs[f"{part}/{key_of(fault)}/{model}"]
 
 
@@ -60,7 +59,7 @@ def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, p
     Each part has loads of its own, drawn with the seed. All faults of a part share one load, and begin after its first orbit.
 
     Args:
-        folder: An existing folder, to which `runs.npz` and `about.json` are written.
+        folder: An existing folder.
         counts: Number of orbits of each of `PARTS`. Each run has one more, its first, in which the battery reaches its usual temperature.
         regime: How hard the battery is used.
         seed: Seed of the loads.
@@ -75,15 +74,63 @@ def record(folder: Path, counts: Mapping[str, int], regime: Regime, seed: int, p
     for number, (part, (faults, models)) in enumerate(PARTS.items()):
         load = draw_load(counts[part] + 1, regime, np.random.default_rng([seed, number]))
         for fault, runs in zip(faults, simulate_all(load, regime, faults, [MODELS[name] for name in models]), strict=True):
-            for model, run in zip(models, runs, strict=True):
-                arrays[f"{part}/{key_of(fault)}/{model}"] = run.values
+            arrays |= {f"{part}/{key_of(fault)}/{model}": run.values for model, run in zip(models, runs, strict=True)}
             if runs[0].reductions:
                 reduced[f"{part}/{key_of(fault)}"] = runs[0].reductions
         told(number + 1)
     save_arrays(folder, arrays, "runs")
-    write_json(folder / "about.json", {"reduced": reduced, "num_runs": len(arrays)})
+    write_json(folder / "about.json", {"reduced": reduced})
 
 
 def read(folder: Path) -> Recorded:
     """Reads what `record` wrote."""
-    return Recorded(load_arrays(folder, "runs"), json.loads((folder / "about.json").read_text(encoding="utf-8")))
+    return Recorded(load_arrays(folder, "runs"), json.loads((folder / "about.json").read_text(encoding="utf-8"))["reduced"])
+
+
+class PairWindows(NamedTuple):
+    """Windows of both simulators over the same time.
+
+    Args:
+        coarse: The coarse simulator's voltage, current and temperature, float32 of shape `(windows, WINDOW, 3)`.
+        fine: The fine simulator's voltage without noise, shape `(windows, WINDOW)`.
+        telemetry: The same through the sensor.
+        starts: First sample of each window in its run.
+    """
+
+    coarse: np.ndarray
+    fine: np.ndarray
+    telemetry: np.ndarray
+    starts: np.ndarray
+
+
+def pair_windows(
+    recorded: Recorded, part: str, number: int, seed: int, fault: Fault | None = None, is_planned: bool = False
+) -> PairWindows:
+    """Cuts a number of windows of both simulators, spread evenly over the run of a part.
+
+    The noise of the sensor depends on the seed, the part and the fault only, so that windows of a run share the noise of their
+    common samples. With `is_planned`, the coarse windows are those of the nominal run, which an operator has without knowing of a fault.
+    """
+    fine = recorded.get(part, "fine", fault)[:, 0]
+    coarse = recorded.get(part, "coarse", None if is_planned else fault)
+    rng = np.random.default_rng([seed, 0, *f"{part}/{key_of(fault)}".encode()])
+    telemetry = measure(fine, SENSOR_NOISE_V, SENSOR_STEP_V, rng)
+    starts = _starts(fine, number)
+    return PairWindows(cut([coarse], starts, WINDOW), cut_windows(fine, starts, WINDOW), cut_windows(telemetry, starts, WINDOW), starts)
+
+
+def judged_windows(recorded: Recorded, fault: Fault | None, seed: int, is_planned: bool = False) -> PairWindows:
+    """Windows of the test orbits, or of a fault, on which enhancers and detectors are judged; see `pair_windows`."""
+    part, number = ("test", NUM_TEST) if fault is None else ("fault", NUM_FAULT)
+    return pair_windows(recorded, part, number, seed, fault, is_planned)
+
+
+def coarse_windows(run: np.ndarray, number: int) -> np.ndarray:
+    """Cuts windows out of a run of the coarse simulator, shape `(number, WINDOW, 3)`; see `pair_windows`."""
+    return cut([run], _starts(run, number), WINDOW)
+
+
+def _starts(run: np.ndarray, number: int) -> np.ndarray:
+    """First samples of windows that are spread evenly over a run, behind its first orbit and behind the onset of a fault."""
+    begin = ORBIT_SAMPLES + _AFTER_ONSET
+    return begin + evenly_spaced_starts([run[begin:]], WINDOW, number)

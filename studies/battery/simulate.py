@@ -62,12 +62,7 @@ _REDUCTION, _MOST_REDUCTIONS = 0.9, 8  # after a failure of a solver, the curren
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """A recorded run of one simulator.
-
-    Args:
-        values: float32 array of shape `(samples, 3)` with the columns `COLUMNS`.
-        reductions: How often the current was reduced because a solver failed.
-    """
+    """A run of one simulator: float32 of shape `(samples, 3)` with `COLUMNS`, and how often the current was reduced for the solver."""
 
     values: np.ndarray
     reductions: int = 0
@@ -89,11 +84,7 @@ def _pybamm() -> Any:
 
 
 def check_installed() -> None:
-    """Checks that PyBaMM can be imported.
-
-    Raises:
-        InputError: If it is not installed.
-    """
+    """Raises an `InputError` if PyBaMM is not installed."""
     _pybamm()
 
 
@@ -125,15 +116,12 @@ def simulate(model: Model, current: np.ndarray, regime: Regime, faults: Sequence
         except pybamm.SolverError:
             found.append(None)
             continue
-        if times[-1] < clock[-1] or not (np.isfinite(volts).all() and np.isfinite(kelvins).all()):  # stopped at a limit
+        if times[-1] < clock[-1] or not np.isfinite([*volts, *kelvins]).all():  # stopped at a limit
             found.append(None)
             continue
-        columns = (
-            np.interp(clock, times, volts) + drift_under(len(clock), fault, onset),
-            current,
-            np.interp(clock, times, kelvins) - _ZERO_K,
-        )
-        found.append(Run(np.stack(columns, axis=1).astype(np.float32)))
+        volts = np.interp(clock, times, volts) + drift_under(len(clock), fault, onset)
+        celsius = np.interp(clock, times, kelvins) - _ZERO_K
+        found.append(Run(np.stack([volts, current, celsius], axis=1).astype(np.float32)))
     return found
 
 
@@ -171,7 +159,7 @@ def _build(model: Model, current: np.ndarray, clock: np.ndarray, regime: Regime,
 def simulate_all(
     load: np.ndarray, regime: Regime, faults: Sequence[Fault | None], models: Sequence[Model] = (COARSE, VEHICLE), onset: int = ONSET
 ) -> list[tuple[Run, ...]]:
-    """Runs simulators over a load, once for each fault, driven by the same current.
+    """Runs simulators over a load, once for each fault, driven by the same current; returns for each fault a run of each.
 
     Where a solver fails, the current of that run is reduced by a tenth and all simulators run again; each `Run` counts how often.
 
@@ -182,20 +170,17 @@ def simulate_all(
         models: The simulators.
         onset: First sample of each fault.
 
-    Returns:
-        For each fault a run of each simulator.
-
     Raises:
         InputError: If PyBaMM is not installed, or a run fails at the smallest current too.
     """
     currents = [battery_current(load_under(load, fault, regime, onset), regime) for fault in faults]
     found: dict[int, tuple[Run, ...]] = {}
     for number in range(_MOST_REDUCTIONS + 1):
-        waiting = [place for place in range(len(faults)) if place not in found]
-        groups: dict[bytes, list[int]] = {}
-        for place in waiting:
-            groups.setdefault(currents[place].tobytes(), []).append(place)
-        for same in groups.values():  # one built model is enough for equal currents
+        groups: dict[bytes, list[int]] = {}  # one built model is enough for equal currents
+        for place, current in enumerate(currents):
+            if place not in found:
+                groups.setdefault(current.tobytes(), []).append(place)
+        for same in groups.values():
             current, chosen = currents[same[0]] * _REDUCTION**number, [faults[place] for place in same]
             runs = zip(*(simulate(model, current, regime, chosen, onset) for model in models), strict=True)
             for place, each in zip(same, runs, strict=True):
@@ -203,5 +188,5 @@ def simulate_all(
                     found[place] = tuple(dataclasses.replace(run, reductions=number) for run in each)
         if len(found) == len(faults):
             return [found[place] for place in range(len(faults))]
-    failed = faults[next(place for place in range(len(faults)) if place not in found)]
+    failed = next(fault for place, fault in enumerate(faults) if place not in found)
     raise InputError(f"Expected loads that the solver can follow. Received: a failure of {failed} at any current. Reduce the load.")

@@ -31,17 +31,10 @@ class BlockBootstrap:
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws windows of noise, float32 of shape `(number, samples)`. The signal has no effect."""
-        return self._draw((number, self.windows.shape[1]), rng)
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples,)`. Consecutive blocks are independent."""
-        return self._draw((1, num_samples), rng)[0]
-
-    def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-        num_rows, samples = shape
-        chain = (num_rows, -(-samples // self.block) + 1)
+        samples = self.windows.shape[1]
+        chain = (number, -(-samples // self.block) + 1)
         sources = rng.integers(0, len(self.windows), chain)
         begins = rng.integers(0, self.windows.shape[1] - self.block + 1, chain)
-        places = np.arange(samples) + rng.integers(0, self.block, (num_rows, 1))  # a window starts at a random position of its first block
-        rows, blocks = np.arange(num_rows)[:, None], places // self.block
+        places = np.arange(samples) + rng.integers(0, self.block, (number, 1))  # a window starts at a random position of its first block
+        rows, blocks = np.arange(number)[:, None], places // self.block
         return self.windows[sources[rows, blocks], begins[rows, blocks] + places % self.block]

@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+import importlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,14 +34,14 @@ class Command:
         study: Name of the study and of its folder.
         description: What the study does, in a sentence.
         group: The group of settings whose `num_seeds` the option `--seeds` changes.
-        run: Runs the study; it takes the options, the settings and the output folder.
+        run: Runs the study; it takes the options, the settings and the output folder. None: `run` of `studies.STUDY.run`.
         options: Further options.
     """
 
     study: str
     description: str
     group: str
-    run: Callable[[argparse.Namespace, Any, Path], None]
+    run: Callable[[argparse.Namespace, Any, Path], Any] | None = None
     options: Sequence[Option] = ()
 
     def __call__(self, arguments: list[str] | None = None) -> int:
@@ -87,7 +88,8 @@ class Command:
         remove_leftovers(out)
         options.cache = make_folder(options.cache or default_cache())
         turned = {} if options.seeds is None else {f"{self.group}__num_seeds": options.seeds}
-        self.run(options, make_settings(options.budget, **turned), out)
+        run = self.run or importlib.import_module(f"studies.{self.study}.run").run
+        run(options, make_settings(options.budget, **turned), out)
         tell(f"tables, findings.json and figures in {out}/")
         return 0
 

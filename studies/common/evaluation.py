@@ -11,14 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject, inject_into_trace
+from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.metrics import recall, threshold
-from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows
-from studies.common.metrics import auc_pr_at_prevalence, auc_roc, recall_at_real_rate, vus_pr
-
-PREVALENCE = 0.02  # share of anomalous windows for which precision is stated
+from enhsim_tf.telemetry.windows import time_blocks
+from studies.common.metrics import recall_at_real_rate
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,32 +26,22 @@ class Trial:
         nominal: Real nominal windows without overlaps, in the order of time, on which false alarms are counted.
         reference: Other real nominal windows. Recall at the real rate uses a threshold from their scores.
         anomalous: Maps a kind and a severity to anomalous windows, which `anomalies.inject` made from real nominal windows.
-        trace: A continuous trace with anomalies of every kind, or None.
-        labels: Boolean array that marks the anomalous samples of the trace, or None.
         rate: Nominal false-alarm rate of the thresholds.
-        stride: Number of samples from one scored window of the trace to the next.
-        max_buffer: Largest buffer length of VUS-PR in samples, for example a period of the signal.
     """
 
     nominal: np.ndarray
     reference: np.ndarray
     anomalous: Mapping[tuple[str, float], np.ndarray]
-    trace: np.ndarray | None = None
-    labels: np.ndarray | None = None
     rate: float = 0.01
-    stride: int = 25
-    max_buffer: int = 120
 
 
 def make_trial(
     nominal: np.ndarray,
     reference: np.ndarray,
-    trace: np.ndarray | None,
     noise_sd: float,
     seed: int,
     num_anomalous: int = 150,
-    trace_severity: float = 4.0,
-    **settings: float,
+    rate: float = 0.01,
 ) -> Trial:
     """Creates a trial by injecting anomalies of every kind and severity into real nominal telemetry.
 
@@ -64,12 +51,10 @@ def make_trial(
     Args:
         nominal: Real nominal windows, shape `(windows, samples)`, in the order of time.
         reference: Other real nominal windows.
-        trace: A continuous real nominal trace, or None.
         noise_sd: Standard deviation of the real noise, which is the unit of severity.
         seed: Seed for the positions.
         num_anomalous: Number of anomalous windows for each kind and severity, evenly spaced over the nominal windows.
-        trace_severity: Severity of the anomalies in the trace.
-        **settings: Further fields of `Trial`.
+        rate: Nominal false-alarm rate of the thresholds.
 
     Returns:
         The trial.
@@ -84,17 +69,7 @@ def make_trial(
                 for number, duration in enumerate(durations)
             ]
             anomalous[kind, severity] = np.concatenate(parts)
-    labels = None
-    if trace is not None:
-        stretches, marks = [], []
-        for number, (kind, stretch) in enumerate(zip(INJECTIONS, np.array_split(trace, len(INJECTIONS)), strict=True)):
-            duration = min(DURATIONS[1], len(stretch) // 6)
-            rng = np.random.default_rng([seed, 100 + number])
-            changed, mark = inject_into_trace(stretch, kind, trace_severity, duration, noise_sd, 2, duration, rng)
-            stretches.append(changed)
-            marks.append(mark)
-        trace, labels = np.concatenate(stretches), np.concatenate(marks)
-    return Trial(nominal, reference, anomalous, trace, labels, **settings)
+    return Trial(nominal, reference, anomalous, rate)
 
 
 def evaluate_arm(
@@ -118,10 +93,10 @@ def evaluate_arm(
         on_detector: Called after each detector with the number of completed detectors.
 
     Returns:
-        The rows of three tables: `alarms` (detector, block, alarms, windows), `recall` (detector, kind, severity, recall,
-        recall_at_real_rate, auc_roc, auc_pr) and `traces` (detector, vus_pr).
+        The rows of two tables: `alarms` (detector, block, alarms, windows) and `recall` (detector, kind, severity, recall,
+        recall_at_real_rate).
     """
-    tables: dict[str, list[dict]] = {"alarms": [], "recall": [], "traces": []}
+    tables: dict[str, list[dict]] = {"alarms": [], "recall": []}
     for done, (name, make) in enumerate(detectors.items(), 1):
         detector = make(seed).fit(training)
         limit = threshold(detector.score(held_out), trial.rate)
@@ -138,37 +113,11 @@ def evaluate_arm(
                     "severity": severity,
                     "recall": recall(scores, limit),
                     "recall_at_real_rate": recall_at_real_rate(reference, scores, trial.rate),
-                    "auc_roc": auc_roc(nominal, scores),
-                    "auc_pr": auc_pr_at_prevalence(nominal, scores, PREVALENCE),
                 }
             )
-        if trial.trace is not None:
-            scores = score_trace(detector, trial.trace, training.shape[1], trial.stride)
-            tables["traces"].append({"detector": name, "vus_pr": vus_pr(trial.labels, scores, trial.max_buffer)})
         if on_detector is not None:
             on_detector(done)
     return tables
-
-
-def score_trace(detector: Detector, trace: np.ndarray, window: int, stride: int) -> np.ndarray:
-    """Scores each sample of a trace by the mean score of the windows that contain it.
-
-    Args:
-        detector: A fitted detector.
-        trace: Telemetry of shape `(samples,)`.
-        window: Number of samples in a window.
-        stride: Number of samples from one window to the next.
-
-    Returns:
-        Scores of shape `(samples,)`.
-
-    Raises:
-        InputError: If the trace is shorter than a window.
-    """
-    if len(trace) < window:
-        raise InputError(f"Expected a trace of at least a window of {window} samples. Received: {len(trace)} samples.")
-    begins = np.unique(np.append(np.arange(0, len(trace) - window + 1, stride), len(trace) - window))
-    return mean_over_windows(detector.score(cut_windows(trace, begins, window)), begins, window, len(trace))
 
 
 def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
@@ -185,3 +134,21 @@ def false_alarm_rates(rows: Sequence[Mapping]) -> dict[str, float]:
         name: sum(row["alarms"] for row in rows if row["detector"] == name) / sum(row["windows"] for row in rows if row["detector"] == name)
         for name in names
     }
+
+
+def cross_fitted_scores(make: Callable[[], Detector], windows: np.ndarray, starts: np.ndarray, num_folds: int) -> np.ndarray:
+    """Scores windows by detectors that were fitted to other blocks of time, which share no sample with them.
+
+    Args:
+        make: Returns an unfitted detector.
+        windows: Windows of one series, shape `(windows, samples)`.
+        starts: First sample of each window, shape `(windows,)`.
+        num_folds: Number of blocks of time.
+
+    Returns:
+        A score for each window, shape `(windows,)`.
+    """
+    scores = np.full(len(windows), np.nan)
+    for training, held_out in time_blocks(starts, num_folds, windows.shape[1]):
+        scores[held_out] = make().fit(windows[training]).score(windows[held_out])
+    return scores

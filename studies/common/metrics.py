@@ -1,4 +1,4 @@
-"""Measures of detectors that the studies report: recall at the real rate, areas under curves, and the share of a gap that is closed.
+"""Measures of detectors that the studies report: recall at the real rate, the volume under a surface, and the share of a gap that is closed.
 
 Higher scores are more anomalous. Scores are never adjusted by the labels ("point adjustment"), because that makes even random scores look
 good.
@@ -22,35 +22,6 @@ def recall_at_real_rate(real_scores: np.ndarray, anomalous_scores: np.ndarray, r
         rate: Nominal false-alarm rate of the threshold.
     """
     return recall(anomalous_scores, threshold(real_scores, rate))
-
-
-def auc_roc(nominal_scores: np.ndarray, anomalous_scores: np.ndarray) -> float:
-    """Area under the ROC curve (AUC): the probability that an anomalous window scores higher than a nominal one, ties counting one half.
-
-    Args:
-        nominal_scores: Scores of nominal windows.
-        anomalous_scores: Scores of anomalous windows.
-    """
-    from sklearn.metrics import roc_auc_score
-
-    labels = np.repeat([0, 1], [len(nominal_scores), len(anomalous_scores)])
-    return float(roc_auc_score(labels, np.concatenate([nominal_scores, anomalous_scores])))
-
-
-def auc_pr_at_prevalence(nominal_scores: np.ndarray, anomalous_scores: np.ndarray, prevalence: float = 0.02) -> float:
-    """Area under the precision-recall curve (average precision) for a given share of anomalous windows.
-
-    Args:
-        nominal_scores: Scores of nominal windows.
-        anomalous_scores: Scores of anomalous windows.
-        prevalence: Share of anomalous windows. It is also the expected value of this measure for random scores.
-    """
-    from sklearn.metrics import average_precision_score
-
-    numbers = [len(nominal_scores), len(anomalous_scores)]
-    weights = np.repeat([(1 - prevalence) / numbers[0], prevalence / numbers[1]], numbers)
-    scores = np.concatenate([nominal_scores, anomalous_scores])
-    return float(average_precision_score(np.repeat([0, 1], numbers), scores, sample_weight=weights))
 
 
 def gap_closed(rate: float, simulated_rate: float, real_rate: float) -> float:

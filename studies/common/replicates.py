@@ -1,13 +1,17 @@
 """The frame that studies share: replicates in turn, tables of all of them, and the files that are written from the tables."""
 
+import argparse
 import functools
+import importlib
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enhsim_tf.common.atomic_files import write_json
+from enhsim_tf.common.console import tell
 from enhsim_tf.common.stages import VERSIONS, Stages, Turns
+from studies.common.settings import Settings
 from studies.common.tables import KeptTables
 
 if TYPE_CHECKING:
@@ -88,3 +92,33 @@ def write_results(
     write_json(folder / "findings.json", found)
     save_all(figures, found, folder, kept.command)
     return found
+
+
+def run_study(
+    study: str,
+    replicate: "Callable[[str, int, Stages], Mapping[str, pd.DataFrame]]",
+    names: Iterable[str],
+    options: argparse.Namespace,
+    settings: Settings,
+    out: Path,
+    about: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Runs a study seed by seed and writes its tables, with the findings and figures of its modules `summary` and `figure`.
+
+    Args:
+        study: Name of the study, of its folder and of its group of settings, whose `first_seed` and `num_seeds` say with which seeds.
+        replicate: Computes the tables for a name, a seed and stages.
+        names: What is computed with each seed, for example environments.
+        options: The command line, with `cache` and `fresh`.
+        settings: All settings.
+        out: An existing folder.
+        about: As for `write_results`.
+
+    Returns:
+        The findings.
+    """
+    group = getattr(settings, study)
+    seeds = range(group.first_seed, group.first_seed + group.num_seeds)
+    summary, figure = (importlib.import_module(f"studies.{study}.{name}") for name in ("summary", "figure"))
+    tables = collect("replicate", seed_by_seed(replicate, names, seeds), options.cache, options.fresh, tell)
+    return write_results(tables, summary.KEPT, summary.summarise, figure.FIGURES, out, {"budget": settings.budget, **(about or {})})

@@ -95,15 +95,6 @@ class FewWindowsSettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class ClassifierSettings:
-    """Classifiers of the study of few windows. They take minutes each, so they have fewer seeds than its other training data."""
-
-    num_seeds: int = setting(1, "seeds", f"{OUR_CHOICE}: the first seeds")
-    num_real: tuple[int, ...] = setting((20, 1_000), "windows", f"{OUR_CHOICE}: the numbers of real windows with classifiers", smoke=(20,))
-    num_steps: int = setting(1_500, "steps", f"{OUR_CHOICE}: 64 windows of each kind", smoke=20)
-
-
-@dataclasses.dataclass(frozen=True)
 class FactorialSettings:
     """The factorial study: `python -m studies.factorial`. Its other settings are those of robustness."""
 
@@ -113,10 +104,11 @@ class FactorialSettings:
 
 
 @dataclasses.dataclass(frozen=True)
-class LabelledSettings:
+class SpacecraftSettings:
     """The study of real telemetry with labelled anomalies: `python -m studies.spacecraft`."""
 
-    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with the seeds 0, 1, ...", smoke=1)
+    num_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: networks and detectors are trained with each", smoke=1)
+    first_seed: int = setting(0, "seed", f"{OUR_CHOICE}: the first one")
     num_windows: int = setting(2_500, "windows", f"{OUR_CHOICE}: about every offset in a channel of the data set once", smoke=60)
     epochs: int = setting(6, "epochs", f"{OUR_CHOICE}: about 1,000 steps in a minute; more epochs did not lower the error", smoke=1)
     num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "around 1,000", smoke=4)
@@ -127,7 +119,6 @@ class LabelledSettings:
         5, "blocks of time", f"{OUR_CHOICE}: real windows set thresholds in the block that a detector was not fitted to", smoke=3
     )
     false_alarm_rate: float = setting(0.01, "share", f"{OUR_CHOICE}: as in the experiment on robustness")
-    max_order: int = setting(60, "samples", f"{OUR_CHOICE}: largest order of the fitted autoregression; AIC selects the order", smoke=20)
     block: int = setting(50, "samples", f"{OUR_CHOICE}: block length of the bootstrap: half a period")
 
 
@@ -143,8 +134,6 @@ class BatterySettings:
     coarse_orbits: int = setting(120, "orbits", f"{OUR_CHOICE}: coarse runs from which training data are generated", smoke=8)
     fault_orbits: int = setting(4, "orbits", f"{OUR_CHOICE}: orbits under each fault at each severity, in both simulators", smoke=1)
     paper_epochs: int = setting(40, "epochs", "paper, section 2.2", "40", smoke=1)
-    num_iterations: int = setting(1_000, "iterations", "paper, section 2.3", "about 1,000", smoke=4)
-    num_network_seeds: int = setting(3, "seeds", f"{OUR_CHOICE}: autoencoders and the noise GAN take most of the time", smoke=1)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,8 +164,7 @@ class Settings:
     factorial: FactorialSettings = FactorialSettings()
     noise_models: NoiseModelsSettings = NoiseModelsSettings()
     few_windows: FewWindowsSettings = FewWindowsSettings()
-    classifiers: ClassifierSettings = ClassifierSettings()
-    labelled: LabelledSettings = LabelledSettings()
+    spacecraft: SpacecraftSettings = SpacecraftSettings()
     battery: BatterySettings = BatterySettings()
     reference_or_source: ReferenceOrSourceSettings = ReferenceOrSourceSettings()
     budget: str = "full"

@@ -7,16 +7,9 @@ windows, and all training data are cut from the same overlapping windows of it, 
   the other blocks of time.
 - `simulator + ...`: tuned ridge regression from coarse to real windows, fitted to the record, plus noise of a simple model, fitted
   to residuals of blocks of time that the regression had not seen. Generated windows train detectors, and others set the threshold.
-- `simulator, threshold on real`: the detectors of `simulator + residual windows`, with the threshold set on windows of the record.
-- `real and simulator`: trained on both, with the threshold of `real`.
 - `CORAL`: windows of the simulator with Gaussian noise, whose mean and covariance are aligned with those of the record
   (Sun, Feng and Saenko 2016). The covariance of the simulator comes from ten times as many further windows. In the first run it came from
   the windows that train the detectors, which the map whitens better than others; thresholds were too high.
-- `classifier`, `domain-adversarial`: see `domain_adversarial`; they also learn from anomalies injected into windows of the simulator. The
-  record sets the threshold.
-- `classifier without simulator`: the same network, which learns from windows of the record and from anomalies injected into them. Scores
-  of two networks, each trained on the other half of the time, set the threshold of a third that is trained on all of it.
-- `moving deviation`: a score of one line that learns nothing. The record sets the threshold.
 """
 
 import dataclasses
@@ -27,18 +20,14 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 from enhsim_tf.enhancer.ridge import fit_ridge
-from enhsim_tf.noise.candidates import NoiseModel, fit_candidate
+from enhsim_tf.noise.candidates import fit_candidate
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, time_blocks
 
-REAL, BOTH, THRESHOLD_ON_REAL = "real", "real and simulator", "simulator, threshold on real"
-CORAL, CLASSIFIER, ADVERSARIAL, ONE_LINE = "CORAL", "classifier", "domain-adversarial", "moving deviation"
-CLASSIFIER_ON_REAL = "classifier without simulator"
+REAL, CORAL = "real", "CORAL"
 SIMULATOR = "simulator + "
 """Beginning of the names of training data with noise of a model; the name of the model follows."""
-NOISE_MODELS = ("none", "gaussian", "autoregression", "residual windows")  # in no environment does the noise follow the signal
-WHOLE_WINDOWS = "residual windows"
-"""The noise of training data that also use real windows, chosen before the first run because it is the simplest that needs no assumption."""
+NOISE_MODELS = ("gaussian", "autoregression", "residual windows")  # in no environment does the noise follow the signal
 NUM_BLOCKS = 5  # of time, for cross-fitting
 _START_RANGE = 1_000_000  # generated windows begin at a random sample below this one
 
@@ -76,34 +65,19 @@ class Record:
             noise[held_out] = self.windows[held_out] - fitted.predict(coarse[held_out])
         return noise, self.windows - noise
 
-    @functools.cache  # noqa: B019  the record lives as long as its cell
-    def noise_model(self, name: str) -> NoiseModel:
-        """The noise model of a name, fitted to the residuals."""
-        return fit_candidate(name, *self.residuals, self.starts)
-
     def generate(self, name: str, num_windows: int, purpose: int) -> np.ndarray:
-        """Generates windows of the simulator with noise of a model.
-
-        Args:
-            name: Name of the noise model.
-            num_windows: Number of windows.
-            purpose: Number of the random draw.
-        """
+        """Generates windows of the simulator with noise of one of `NOISE_MODELS`; `purpose` is the number of the random draw."""
         rng = np.random.default_rng([self.seed, purpose])
         clean = self.enhance(self._coarse(rng.integers(0, _START_RANGE, num_windows)))
-        return clean + self.noise_model(name).generate(num_windows, rng, clean)
+        return clean + fit_candidate(name, *self.residuals, self.starts).generate(num_windows, rng, clean)
 
 
 @dataclasses.dataclass(frozen=True)
 class CoralAlignment:
     """Correlation alignment: a linear map that gives windows the mean and covariance of other windows.
 
-    Covariances are shrunk towards their mean variance, because a short record does not determine them.
-
-    Args:
-        source_mean: Mean window of the source.
-        target_mean: Mean window of the target.
-        transfer: Matrix that whitens the source and colours it as the target.
+    Covariances are shrunk towards their mean variance, because a short record does not determine them. The matrix `transfer` whitens the
+    source and colours it as the target.
     """
 
     source_mean: np.ndarray

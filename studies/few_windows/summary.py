@@ -8,10 +8,8 @@ windows.
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from studies.common.tables import KeptTables
-from studies.few_windows.record import ADVERSARIAL, CLASSIFIER, CLASSIFIER_ON_REAL, REAL, SIMULATOR
+from studies.few_windows.record import REAL, SIMULATOR
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,11 +35,11 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
 
     Returns:
         For each environment the curves of all training data (`arms`) over the number of real windows, the numbers at which each simulator
-        `pays`, and those at which other methods do, compared with the real windows of the same seeds; the smallest number from which the
-        real windows suffice; by how much a classifier of injected anomalies finds more if it learns from the simulator instead of the real
-        windows; and the detector of nominal windows that finds most on the seeds and numbers of the classifiers.
+        `pays`, and those at which other methods do, compared with the real windows of the same seeds; and the smallest number from which
+        the real windows suffice.
     """
-    rows = tables["rows"].assign(rate=lambda table: table["alarms"] / table["windows"])
+    rows = tables["rows"].astype({"recall": float, "recall_at_real_rate": float})  # tables hold float32
+    rows["rate"] = rows["alarms"] / rows["windows"]
     numbers = sorted({int(number) for number in rows["num_real"]})
     environments = {}
     for environment in dict.fromkeys(rows["environment"]):
@@ -54,27 +52,15 @@ def summarise(tables: "dict[str, pd.DataFrame]") -> dict[str, Any]:
             "pays": {arm: _pays(own, arm, numbers) for arm in curves if arm.startswith(SIMULATOR)},
             "others_pay": {arm: _pays(own, arm, numbers) for arm in curves if arm != REAL and not arm.startswith(SIMULATOR)},
             "real_suffices_from": suffices[0] if suffices else None,
-            "classifiers": {arm: _gain(own, arm, numbers) for arm in (CLASSIFIER, ADVERSARIAL) if arm in curves},
-            "best_detector": _best_detector(own, numbers),
         }
     return {"environments": environments, "numbers": numbers, "seeds": sorted({int(seed) for seed in rows["seed"]})}
 
 
-def _curve(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, Any]:
-    """Means over seeds, and the 10 % and 90 % quantiles of the false-alarm rate over seeds, by the number of real windows."""
-    found: dict[str, Any] = {"rate": {}, "low": {}, "high": {}, "excess": {}, "recall": {}, "recall_at_real_rate": {}, "seeds": {}}
-    for number in numbers:
-        here = rows[rows["num_real"] == number]
-        if here.empty:
-            continue
-        by_seed = here.groupby("seed")[["rate", "recall", "recall_at_real_rate"]].mean()
-        low, high = np.quantile(by_seed["rate"], [0.1, 0.9])
-        means = {name: float(by_seed[name].mean()) for name in by_seed}
-        for name, value in (
-            means | {"low": float(low), "high": float(high), "excess": means["rate"] - RATE, "seeds": len(by_seed)}
-        ).items():
-            found[name][str(number)] = value
-    return found
+def _curve(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, dict[str, float]]:
+    """Means over seeds of the false-alarm rate, its excess and both recalls, by the number of real windows."""
+    by_seed = rows.groupby(["num_real", "seed"])[["rate", "recall", "recall_at_real_rate"]].mean()
+    means = by_seed.groupby("num_real").mean().assign(excess=lambda table: table["rate"] - RATE)
+    return {name: {str(number): float(values[number]) for number in numbers if number in values.index} for name, values in means.items()}
 
 
 def _pays(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> list[int]:
@@ -88,23 +74,4 @@ def _pays(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> list[int]:
             loss = real["recall_at_real_rate"][at] - its["recall_at_real_rate"][at]
             if max(its["excess"][at], 0) <= PAYS_SHARE * real["excess"][at] and loss <= MAX_RECALL_LOSS:
                 found.append(number)
-    return found
-
-
-def _gain(rows: "pd.DataFrame", arm: str, numbers: Sequence[int]) -> dict[str, float]:
-    """Recall at the matched rate of a classifier with the simulator minus that without, mean over the same seeds."""
-    recall = rows.pivot_table("recall_at_real_rate", ["num_real", "seed"], "arm")
-    gain = (recall[arm] - recall[CLASSIFIER_ON_REAL]).dropna().groupby("num_real").mean()
-    return {str(number): float(gain[number]) for number in numbers if number in gain.index}
-
-
-def _best_detector(rows: "pd.DataFrame", numbers: Sequence[int]) -> dict[str, dict[str, Any]]:
-    """The detector that finds most after training on the real windows, where there are classifiers, and its recall at the matched rate."""
-    same = rows[rows["arm"] == CLASSIFIER][["num_real", "seed"]].drop_duplicates()
-    recall = rows[rows["arm"] == REAL].merge(same).groupby(["num_real", "detector"])["recall_at_real_rate"].mean()
-    found = {}
-    for number in numbers:
-        if number in set(same["num_real"]):
-            name = recall.loc[number].idxmax()
-            found[str(number)] = {"name": name, "recall_at_real_rate": float(recall.loc[number, name])}
     return found

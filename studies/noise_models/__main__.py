@@ -5,22 +5,23 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from enhsim_tf.common.console import tell
-from studies.common.command import Command, Option
+from studies.common.command import Command
 from studies.common.environments import FAMILIES, environment_option, environments
 
 
-def run(options: argparse.Namespace, settings: Any, out: Path) -> None:
-    """Runs the study."""
-    from studies.noise_models.run import run
+def run(options: argparse.Namespace, settings: Any, out: Path) -> dict[str, Any]:
+    """Runs the study and returns its findings."""
+    from studies.common.replicates import run_study
+    from studies.noise_models.cells import Cell
 
-    run(settings, options.cache, out, environments(options, FAMILIES), options.model, options.fresh, tell)
+    def tables_of(family: str, seed: int, stages: Any) -> dict[str, Any]:
+        return Cell(settings.of(family, seed), stages).tables()
+
+    return run_study("noise_models", tables_of, environments(options, FAMILIES), options, settings, out)
 
 
-_MODEL = Option("--model", {"help": "try this noise model only; the rows of other models in the output folder are kept (default: all)"})
-command = Command(
-    "noise_models", "Tries noise models on fourteen families of noise.", "noise_models", run, [environment_option(FAMILIES), _MODEL]
-)
+description = "Tries noise models on fourteen families of noise."
+command = Command("noise_models", description, "noise_models", run, [environment_option(FAMILIES)])
 
 if __name__ == "__main__":
     sys.exit(command())

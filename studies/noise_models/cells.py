@@ -6,7 +6,6 @@ generated noise and judged on nominal windows with real noise, as in the study o
 
 import dataclasses
 import functools
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,15 +19,15 @@ from enhsim_tf.simulator.noise_choice import MOST_JUDGED, HeldOutJudge, NoiseWin
 from studies.common import evaluation
 from studies.common.settings import Settings
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
+from studies.noise_models.summary import KEPT, REAL
 from studies.robustness.replicate import Replicate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-REAL, LEARNT = "real", "mixture density network"
+LEARNT = "mixture density network"
 MODELS = (*CANDIDATES, LEARNT)
 """The noise models that are tried, the simplest first."""
-TABLES = ("detectors", "realism", "choice")
 _NUM_DRAWS = 3  # of as many generated windows as there are real ones: measures of realism are means over them
 # numbers of random draws, and the names of draws below, are those of the published tables
 _STREAMS = {"none": 0, "gaussian": 1, "autoregression": 2, "residual windows": 3, "matched residual windows": 7, LEARNT: 8}
@@ -48,15 +47,15 @@ class Cell:
         self.one = Replicate(settings, stages)
         self.example = self.one.example
 
-    def tables(self, models: Sequence[str] = (REAL, *MODELS)) -> "dict[str, pd.DataFrame]":
-        """The tables of models, or of real windows; each model is a stage of its own, so that an interrupted run goes on."""
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """The tables of real windows and of all models; each is a stage of its own, so that an interrupted run goes on."""
         import pandas as pd
 
         _, chosen = self.example.telemetry, self.settings
         counts = (chosen.robustness.num_windows, chosen.robustness.num_anomalous, chosen.noise_models)
         depends = (chosen.paper.of("windows"), *counts)
-        parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
-        for model in models:
+        parts: dict[str, list[pd.DataFrame]] = {name: [] for name in KEPT.names}
+        for model in (REAL, *MODELS):
             name = "noise model " + model.replace(" ", "_")
             folder = self.stages.run(name, functools.partial(self._make, model), (model, *depends), ("telemetry",))
             for table, found in parts.items():
@@ -98,13 +97,14 @@ class Cell:
 
     def _detected(self, arms: list[np.ndarray]) -> list[dict]:
         """False alarms and recall of every detector, trained on the first windows, with the threshold of the second ones."""
-        trial = dataclasses.replace(self.one.trial(self.settings.noise_models.num_anomalous), trace=None, labels=None)
+        trial = self.one.trial(self.settings.noise_models.num_anomalous)
         judged = evaluation.evaluate_arm(*arms, trial, DETECTORS, self.settings.seed)
         rows = []
         for name in DETECTORS:
             alarms, recall = ([row for row in judged[key] if row["detector"] == name] for key in ("alarms", "recall"))
             counts = {key: sum(row[key] for row in alarms) for key in ("alarms", "windows")}
-            rows.append({"detector": name, **counts} | {key: _mean(recall, key) for key in ("recall", "recall_at_real_rate")})
+            means = {key: float(np.mean([row[key] for row in recall])) for key in ("recall", "recall_at_real_rate")}
+            rows.append({"detector": name, **counts, **means})
         return rows
 
     @functools.cached_property
@@ -129,7 +129,3 @@ def _measured(floor: object, compared: list[np.ndarray]) -> "pd.DataFrame":
 
     rows = [{"measure": row.measure, "value": row.value, "ratio": row.ratio} for each in compared for row in floor.evaluate(each).rows]
     return pd.DataFrame(rows).groupby("measure", sort=False).agg(lambda each: each.mean(skipna=False)).reset_index()
-
-
-def _mean(rows: list[dict], key: str) -> float:
-    return float(np.mean([row[key] for row in rows]))

@@ -36,13 +36,11 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         on how many families it keeps the tolerances of `fit`; `choice`: what `fit` would choose, and how well that does; `seeds`.
     """
     models = list(dict.fromkeys(tables["detectors"]["model"]))
-    families = {
-        family: {
-            "looked_at": family in LOOKED_AT,
-            "models": {name: found for name in models if (found := _on_family(tables, family, name))},
-        }
-        for family in dict.fromkeys(tables["detectors"]["family"])
-    }
+    families = {}
+    for family in dict.fromkeys(tables["detectors"]["family"]):
+        of_family = {name: table[table["family"] == family] for name, table in tables.items()}
+        found = {name: _on_family(of_family, name) for name in models if name in set(of_family["detectors"]["model"])}
+        families[family] = {"looked_at": family in LOOKED_AT, "models": found}
     return {
         "seeds": sorted({int(seed) for seed in tables["detectors"]["seed"]}),
         "families": families,
@@ -53,19 +51,17 @@ def summarise(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     }
 
 
-def _by_seed(detectors: "pd.DataFrame", family: str, model: str) -> "pd.DataFrame":
+def _by_seed(detectors: "pd.DataFrame", model: str) -> "pd.DataFrame":
     """False-alarm rate and recall at own thresholds, means over the detectors, a row for each seed."""
-    rows = detectors[(detectors["family"] == family) & (detectors["model"] == model)]
+    rows = detectors[detectors["model"] == model]
     return rows.assign(alarms=rows["alarms"] / rows["windows"]).groupby("seed")[["alarms", "recall"]].mean()
 
 
-def _on_family(tables: "Mapping[str, pd.DataFrame]", family: str, model: str) -> dict[str, Any]:
+def _on_family(tables: "Mapping[str, pd.DataFrame]", model: str) -> dict[str, Any]:
     """Results of a model on a family, means over its seeds; differences are from detectors trained on real windows with the same seeds."""
-    own, real = (_by_seed(tables["detectors"], family, name) for name in (model, REAL))
-    if own.empty:
-        return {}
-    realism, choice = (table[(table["family"] == family) & (table["model"] == model)] for table in (tables["realism"], tables["choice"]))
-    difference = own - real.loc[own.index]
+    own, real = (_by_seed(tables["detectors"], name) for name in (model, REAL))
+    realism, choice = (tables[name][tables[name]["model"] == model] for name in ("realism", "choice"))
+    difference, judged = own - real.loc[own.index], _judgements(choice)
     found = {
         "seeds": [int(seed) for seed in own.index],
         "alarms": float(own["alarms"].mean()),
@@ -73,10 +69,9 @@ def _on_family(tables: "Mapping[str, pd.DataFrame]", family: str, model: str) ->
         "lost": float(-difference["recall"].mean()),
         "realism": float(np.mean(realism["ratio"] <= MAX_REALISM_RATIO)),
     }
-    judged = _judgements(choice)
-    return found | (
-        {"auc": float(choice["auc"].mean()), "passes": sum(each.passes for each in judged), "judged": len(judged)} if judged else {}
-    )
+    if judged:
+        found |= {"auc": float(choice["auc"].mean()), "passes": sum(each.passes for each in judged), "judged": len(judged)}
+    return found
 
 
 def _over_families(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -88,11 +83,8 @@ def _over_families(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "within_alarms": sum(alarms),
         "within_recall": sum(recall),
         "within_both": sum(first and second for first, second in zip(alarms, recall, strict=True)),
-        "mean_alarms": float(np.mean([about["alarms"] for about in found])),
-        "mean_lost": float(np.mean([about["lost"] for about in found])),
-        "mean_realism": float(np.mean([about["realism"] for about in found])),
-        "passes": sum(about.get("passes", 0) for about in found),
-        "judged": sum(about.get("judged", 0) for about in found),
+        **{f"mean_{key}": float(np.mean([about[key] for about in found])) for key in ("alarms", "lost", "realism")},
+        **{key: sum(about.get(key, 0) for about in found) for key in ("passes", "judged")},
     }
 
 
@@ -103,8 +95,8 @@ def _judgements(rows: "pd.DataFrame") -> list[CandidateJudgement]:
 
 def _choices(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
     """What the rule of `fit` chooses on each family and seed with judgements of all offered models."""
-    counts, excess, lost, num_passing = dict.fromkeys(OFFERED, 0), [], [], 0
-    rows = tables["choice"][tables["choice"]["model"].isin(OFFERED)]
+    counts, differences, num_passing = dict.fromkeys(OFFERED, 0), [], 0
+    rows, detectors = tables["choice"][tables["choice"]["model"].isin(OFFERED)], tables["detectors"]
     for (family, seed), own in rows.groupby(["family", "seed"]):
         judged = sorted(_judgements(own), key=lambda each: OFFERED.index(each.name))
         if len(judged) < len(OFFERED):
@@ -112,15 +104,12 @@ def _choices(tables: "Mapping[str, pd.DataFrame]") -> dict[str, Any]:
         chosen = choose(judged)
         counts[chosen] += 1
         num_passing += any(each.passes for each in judged)
-        difference = _by_seed(tables["detectors"], family, chosen).loc[seed] - _by_seed(tables["detectors"], family, REAL).loc[seed]
-        excess.append(float(difference["alarms"]))
-        lost.append(float(-difference["recall"]))
+        here = detectors[detectors["family"] == family]
+        differences.append(_by_seed(here, chosen).loc[seed] - _by_seed(here, REAL).loc[seed])
     return {
-        "judgements": len(excess),
+        "judgements": len(differences),
         "chosen": counts,
         "with_a_passing_model": num_passing,
-        "within_alarms": sum(each <= MAX_ALARM_EXCESS for each in excess),
-        "within_recall": sum(each <= MAX_RECALL_LOSS for each in lost),
-        "mean_excess": float(np.mean(excess)) if excess else None,
-        "mean_lost": float(np.mean(lost)) if lost else None,
+        "within_alarms": sum(bool(each["alarms"] <= MAX_ALARM_EXCESS) for each in differences),
+        "within_recall": sum(bool(-each["recall"] <= MAX_RECALL_LOSS) for each in differences),
     }

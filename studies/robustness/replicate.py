@@ -89,7 +89,6 @@ class Replicate:
         return evaluation.make_trial(
             nominal,
             reference,
-            None,
             self.settings.paper.noise_sd,
             self.settings.seed,
             chosen.num_anomalous if num_anomalous is None else num_anomalous,

@@ -1,13 +1,13 @@
 """How a detector is judged on the test part of a channel: false alarms, labelled sequences that are found, and areas under curves."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
-from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows, time_blocks
+from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows
 from studies.common.metrics import vus_pr
 from studies.spacecraft.telemanom import LabelledChannel
 
@@ -35,12 +35,12 @@ class Judge:
         self.labels = np.array(channel.is_anomalous)
         self.begins = np.arange(0, len(channel.test) - window + 1, max(1, window // STRIDES))
         self.windows = cut_windows(channel.test.values, self.begins, window)
-        self.meets = windows_that_meet(self.begins, window, channel.labels.sequences)
+        self.meets = windows_that_meet(self.begins, window, channel.sequences)
         self.is_nominal = ~self.meets.any(axis=0)
         if not self.is_nominal.any():
             raise InputError(
                 f"Expected a test part with windows of {window} samples that hold no labelled sample. "
-                f"Received: none of {len(self.begins)} in {channel.labels.channel}. Use another channel."
+                f"Received: none of {len(self.begins)} in {channel.name}. Use another channel."
             )
 
     def judge(self, scores: np.ndarray, own: np.ndarray, past: np.ndarray) -> dict[str, Any]:
@@ -75,33 +75,6 @@ class Judge:
 
 
 def windows_that_meet(begins: np.ndarray, window: int, ranges: Sequence[tuple[int, int]]) -> np.ndarray:
-    """Tells which windows share a sample with which range.
-
-    Args:
-        begins: First sample of each window, shape `(windows,)`.
-        window: Length of a window in samples.
-        ranges: Half-open ranges of samples.
-
-    Returns:
-        Boolean array of shape `(ranges, windows)`.
-    """
+    """Tells which windows share a sample with which half-open range, boolean of shape `(ranges, windows)`."""
     bounds = np.asarray(ranges, np.int64).reshape(-1, 2)
     return (begins < bounds[:, 1:]) & (begins + window > bounds[:, :1])
-
-
-def cross_fitted_scores(make: Callable[[], Any], windows: np.ndarray, starts: np.ndarray, num_folds: int) -> np.ndarray:
-    """Scores windows by detectors that were fitted to other blocks of time, which share no sample with them.
-
-    Args:
-        make: Returns an unfitted detector.
-        windows: Windows of one series, shape `(windows, samples)`.
-        starts: First sample of each window, shape `(windows,)`.
-        num_folds: Number of blocks of time.
-
-    Returns:
-        A score for each window, shape `(windows,)`.
-    """
-    scores = np.full(len(windows), np.nan)
-    for training, held_out in time_blocks(starts, num_folds, windows.shape[1]):
-        scores[held_out] = make().fit(windows[training]).score(windows[held_out])
-    return scores

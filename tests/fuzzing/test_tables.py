@@ -16,7 +16,7 @@ from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source, read_telemetry
-from studies.spacecraft.telemanom import load_labelled
+from studies.spacecraft.telemanom import load_channel, read_labels
 from tests.fuzzing.readers import all_of, changed, changed_json, judge, tried
 
 NUM = 60
@@ -191,7 +191,8 @@ def read_labelled(array, labels, folder):
         (folder / part).mkdir()
         (folder / part / "A-1.npy").write_bytes(content)
     (folder / "labeled_anomalies.csv").write_bytes(labels)
-    for channel in load_labelled(folder):
+    for name in read_labels(folder):
+        channel = load_channel(folder, name)
         assert len(channel.is_anomalous) == len(channel.test)
 
 

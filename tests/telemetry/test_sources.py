@@ -187,7 +187,7 @@ def test_the_series_of_a_store(tmp_path, refused):
     with refused("without any"):
         read_source(tmp_path / "empty")
     (tmp_path / "empty" / "labeled_anomalies.csv").touch()
-    with refused("load_labelled"):
+    with refused("labelled channels"):
         read_source(tmp_path / "empty")
 
 

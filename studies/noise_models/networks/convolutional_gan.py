@@ -11,9 +11,6 @@ References:
     Yazici et al., "The unusual effectiveness of averaging in GAN training", 2019.
 """
 
-import os
-from collections.abc import Callable
-
 import numpy as np
 
 from enhsim_tf.common.backend import keras, tf
@@ -24,7 +21,9 @@ layers, ops = keras.layers, keras.ops
 
 _SLOW_SAMPLES = np.array([500.0, 2_000.0, 8_000.0])  # correlation times of the slow channels, from 1 to 16 of the paper's windows
 _NUM_WHITE = 4  # white-noise channels of the latent series, before the slow ones
-_WIDTH = 21  # of both convolutions of the generator, in samples
+_CHANNELS, _WIDTH = 8, 21  # of both convolutions of the generator; the width is in samples
+_RARE_UNITS = 8  # of the path that processes one sample at a time
+_FILTERS, _FILTER_WIDTH, _STRIDE = 32, 20, 4  # of the discriminator's convolution
 _MARGIN = 2 * (_WIDTH - 1)  # samples by which the generator shortens its input
 _BATCH = 200  # windows of each kind in an iteration
 _RATE, _DISCRIMINATOR_RATE, _BETA_1 = 0.002, 0.001, 0.5  # of Adam
@@ -38,27 +37,13 @@ _TINY = 1e-6  # keeps logarithms and square roots finite
 
 
 class ConvolutionalGAN:
-    """A trained generator of noise windows.
-
-    Args:
-        generator: The generator, see `build_generator`.
-        window: Number of samples in a window.
-        scale: Standard deviation of the real noise, in the unit of the telemetry.
-    """
+    """A trained generator of windows of noise, whose real standard deviation is `scale`."""
 
     def __init__(self, generator: keras.Model, window: int, scale: float):
         self.generator, self.window, self.scale = generator, int(window), float(scale)
 
     def generate(self, number: int, rng: np.random.Generator) -> np.ndarray:
-        """Generates windows of noise.
-
-        Args:
-            number: Number of windows.
-            rng: Random generator of the latent series.
-
-        Returns:
-            float32 array of shape `(number, samples)`, in the unit of the telemetry.
-        """
+        """Generates windows of noise, float32 of shape `(number, samples)`, in the unit of the telemetry."""
         from scipy.signal import lfilter
 
         latent = rng.standard_normal((number, self.window + _MARGIN, _NUM_WHITE + len(_SLOW_SAMPLES)), np.float32)
@@ -68,32 +53,14 @@ class ConvolutionalGAN:
             latent[:, :, channel] = lfilter([1.0], [1.0, -decay], steps, axis=1)
         return predict_windows(self.generator, latent, 1_024)[:, :, 0] * np.float32(self.scale)
 
-    def save(self, path: str | os.PathLike) -> None:
-        """Writes the weights, the window length and the scale to an `.npz` file."""
-        np.savez(path, *self.generator.get_weights(), window=self.window, scale=self.scale)
 
-    @classmethod
-    def load(cls, path: str | os.PathLike) -> "ConvolutionalGAN":
-        """Reads what `save` wrote."""
-        with np.load(path) as saved:
-            model = cls(build_generator(), saved["window"], saved["scale"])
-            model.generator.set_weights([saved[f"arr_{number}"] for number in range(len(saved) - 2)])
-        return model
-
-
-def fit_convolutional_gan(
-    residual_windows: np.ndarray, num_iterations: int, seed: int, progress: Callable[[int], None] | None = None
-) -> ConvolutionalGAN:
+def fit_convolutional_gan(residual_windows: np.ndarray, num_iterations: int, seed: int) -> ConvolutionalGAN:
     """Trains a convolutional GAN on windows of noise.
 
     Args:
         residual_windows: Real noise of shape `(windows, samples)`, in the unit of the telemetry.
         num_iterations: Number of iterations. 0 leaves the generator untrained.
         seed: Seed of the initial weights and of all random numbers in training.
-        progress: Called after each iteration with the number of completed iterations.
-
-    Returns:
-        The model, whose `generate(number, rng)` returns windows of noise.
 
     Raises:
         InputError: If the noise is not finite or constant, or if the training diverges.
@@ -104,10 +71,8 @@ def fit_convolutional_gan(
         raise InputError("Expected finite noise that varies. Received: windows with NaN or infinity, or of one value. Look for outliers.")
     generator, discriminator = build_generator(seed=seed), build_discriminator(noise / scale, seed=seed)
     training = _Training(generator, discriminator, noise / np.float32(scale), num_iterations, seed)
-    for iteration in range(num_iterations):
+    for _ in range(num_iterations):
         training.step()
-        if progress is not None:
-            progress(iteration + 1)
     if num_iterations:
         training.generator_optimizer.finalize_variable_values(generator.trainable_variables)
     if not all(np.isfinite(weight).all() for weight in generator.get_weights()):
@@ -138,16 +103,15 @@ class _Training:
         """Updates the discriminator on real and on generated windows, and then the generator through the discriminator."""
         real = tf.gather(self.noise, keras.random.randint((_BATCH,), 0, self.noise.shape[0], seed=self.seeds))
         generated = self.generator(self._draw_latent())
+        weights = self.discriminator.trainable_variables
         for rows, tag in ((real, 1.0), (generated, 0.0)):
-            weights = self.discriminator.trainable_variables
             with tf.GradientTape() as tape:
                 loss = self.loss(tf.fill((_BATCH, 1), tag), self.discriminator(rows, training=True))
             self.discriminator_optimizer.apply(tape.gradient(loss, weights), weights)
         weights = self.generator.trainable_variables
         with tf.GradientTape() as tape:
-            loss = self.loss(
-                tf.fill((_BATCH, 1), 1.0), self.discriminator(self.generator(self._draw_latent(), training=True), training=True)
-            )
+            generated = self.generator(self._draw_latent(), training=True)
+            loss = self.loss(tf.fill((_BATCH, 1), 1.0), self.discriminator(generated, training=True))
         self.generator_optimizer.apply(tape.gradient(loss, weights), weights)
 
     def _draw_latent(self) -> tf.Tensor:
@@ -162,18 +126,8 @@ def _falling(rate: float, steps: int) -> keras.optimizers.schedules.LearningRate
     return keras.optimizers.schedules.CosineDecay(rate, max(steps - constant, 1), _LAST_RATE, warmup_target=rate, warmup_steps=constant)
 
 
-def build_generator(channels: int = 8, rare_units: int = 8, seed: int = 0) -> keras.Model:
-    """Builds the generator.
-
-    Args:
-        channels: Number of channels of each of the two convolutions.
-        rare_units: Number of units of the path that processes one sample at a time.
-        seed: Seed for the initial weights.
-
-    Returns:
-        An uncompiled Keras model, whose input has the shape `(rows, samples + 40, 7)` and whose output has the shape
-        `(rows, samples, 1)`, for any number of samples.
-    """
+def build_generator(seed: int = 0) -> keras.Model:
+    """Builds the generator, from latent series of shape `(rows, samples + 40, 7)` to noise of shape `(rows, samples, 1)`."""
 
     def kernel(number: int) -> keras.Initializer:
         return seeded_initialiser("he_uniform", seed * 1000 + number)
@@ -183,11 +137,11 @@ def build_generator(channels: int = 8, rare_units: int = 8, seed: int = 0) -> ke
     aligned = layers.Cropping1D(_WIDTH - 1)(latent)  # keeps the samples that remain after the convolutions
     shaped = white
     for number in (400, 401):
-        shaped = layers.Conv1D(channels, _WIDTH, activation="leaky_relu", kernel_initializer=kernel(number))(shaped)
+        shaped = layers.Conv1D(_CHANNELS, _WIDTH, activation="leaky_relu", kernel_initializer=kernel(number))(shaped)
     # Units that become active at one to four standard deviations. Their squares start large, because heavy tails that start
     # small grow too slowly during training.
     rarely = keras.initializers.RandomUniform(-4.0, -1.0, seed=seed * 1000 + 402)
-    rare = layers.Dense(rare_units, "relu", kernel_initializer=kernel(403), bias_initializer=rarely)(aligned[:, :, :_NUM_WHITE])
+    rare = layers.Dense(_RARE_UNITS, "relu", kernel_initializer=kernel(403), bias_initializer=rarely)(aligned[:, :, :_NUM_WHITE])
     paths = layers.Concatenate()([shaped, aligned[:, :, :_NUM_WHITE], rare, 2 * rare * rare])
     noise = layers.Dense(1, kernel_initializer=kernel(404))(paths)
     gain = layers.Dense(8, "tanh", kernel_initializer=kernel(405))(aligned[:, :, _NUM_WHITE:])
@@ -196,8 +150,8 @@ def build_generator(channels: int = 8, rare_units: int = 8, seed: int = 0) -> ke
     return keras.Model(latent, noise, name="generator")
 
 
-def build_discriminator(noise_windows: np.ndarray, filters: int = 32, width: int = 20, stride: int = 4, seed: int = 0) -> keras.Model:
-    """Builds the discriminator on summary statistics.
+def build_discriminator(noise_windows: np.ndarray, seed: int = 0) -> keras.Model:
+    """Builds the discriminator on summary statistics, from windows of shape `(windows, samples, 1)` to the probability that they are real.
 
     Each statistic is standardised by its mean and its standard deviation over real windows, and its tails are compressed by
     an inverse hyperbolic sine. The standardisation is necessary because some statistics vary little. For example, where the
@@ -206,14 +160,7 @@ def build_discriminator(noise_windows: np.ndarray, filters: int = 32, width: int
 
     Args:
         noise_windows: Real noise at unit scale, shape `(windows, samples)`.
-        filters: Number of filters of the convolution.
-        width: Width of each filter in samples.
-        stride: Stride of the convolution in samples.
         seed: Seed for the initial weights.
-
-    Returns:
-        An uncompiled Keras model, whose input has the shape `(windows, samples, 1)`. Its output of shape `(windows, 1)` is the
-        probability that a window is real.
     """
 
     def dense(units: int, number: int, activation: str = "leaky_relu") -> layers.Layer:
@@ -226,9 +173,8 @@ def build_discriminator(noise_windows: np.ndarray, filters: int = 32, width: int
     mean, deviation = on_real.mean(axis=0, dtype=np.float64), on_real.std(axis=0, dtype=np.float64) + _MIN_DEVIATION
     statistics = layers.Normalization(mean=mean.tolist(), variance=np.square(deviation).tolist())(statistics)
 
-    convolution = layers.Conv1D(
-        filters, width, stride, activation="leaky_relu", kernel_initializer=seeded_initialiser("he_uniform", seed * 1000 + 500)
-    )
+    kernel = seeded_initialiser("he_uniform", seed * 1000 + 500)
+    convolution = layers.Conv1D(_FILTERS, _FILTER_WIDTH, _STRIDE, activation="leaky_relu", kernel_initializer=kernel)
     responses = convolution(layers.Reshape((window, 1))(unit))
     pooled = [
         layers.GlobalMaxPooling1D()(responses),
@@ -240,11 +186,7 @@ def build_discriminator(noise_windows: np.ndarray, filters: int = 32, width: int
 
 
 def _statistics(values: keras.KerasTensor) -> tuple[keras.KerasTensor, keras.KerasTensor, keras.KerasTensor]:
-    """Computes the summary statistics of each window, the window at unit scale, and its log power spectrum.
-
-    Args:
-        values: Windows of shape `(windows, samples)`.
-    """
+    """Computes the summary statistics of windows of shape `(windows, samples)`, the windows at unit scale, and their log power spectra."""
 
     def mean(each: keras.KerasTensor) -> keras.KerasTensor:
         return ops.mean(each, axis=1, keepdims=True)

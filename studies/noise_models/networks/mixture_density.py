@@ -86,15 +86,12 @@ class MixtureDensityNoise:
         return self
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Generates windows of noise.
+        """Generates windows of noise, float32 of shape `(number, samples)`, in the unit of the telemetry.
 
         Args:
             number: Number of windows.
             rng: Random generator.
             signal: The signal that the noise is added to, shape `(number, samples)`; required if the noise depends on it.
-
-        Returns:
-            float32 array of shape `(number, samples)`, in the unit of the telemetry.
         """
         below, noise = self._standardised(signal), np.empty((number, self.window))
         for first in range(0, number, _ROWS):
@@ -162,13 +159,7 @@ class MixtureDensityNoise:
         return np.concatenate(inputs), values[rows, places, None]
 
     def _inputs(self, seen: np.ndarray, below: np.ndarray | None, rows: np.ndarray, places: np.ndarray | int) -> np.ndarray:
-        """What the network sees before a sample.
-
-        Args:
-            seen: The samples before it, shape `(samples, past)`.
-            below: The signal, shape `(windows, samples)`, or None.
-            rows: Window of each sample.
-            places: Place of each sample in its window.
+        """What the network sees before samples at places of windows, from the samples `seen` before each and the signal `below`.
 
         Returns:
             float32 array of shape `(samples, inputs)`: what the linear prediction sees, the oldest samples first, then the logarithms of magnitudes.
@@ -195,15 +186,8 @@ def _split(starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
 def _build(inputs: np.ndarray, targets: np.ndarray, num_linear: int, num_far: int, seed: int) -> keras.Model:
     """Builds the network, which starts as one density around the linear prediction of least squares.
 
-    Args:
-        inputs: Inputs of shape `(samples, inputs)`, from which their means and standard deviations are computed.
-        targets: The samples that follow, shape `(samples, 1)`.
-        num_linear: Number of inputs of the linear prediction, the first ones.
-        num_far: Number of those that the hidden layers do not see, the first ones.
-        seed: Seed of the weights.
-
-    Returns:
-        A model whose output of shape `(samples, 3 * components)` holds logits, means and logarithms of the scales.
+    The linear prediction sees the first `num_linear` inputs; the hidden layers do not see the first `num_far`. The output, of shape
+    `(samples, 3 * components)`, holds logits, means and logarithms of the scales.
     """
     mean, deviation = inputs.mean(axis=0, dtype=np.float64), inputs.std(axis=0, dtype=np.float64) + 1e-6
     known = np.column_stack([(inputs[:, :num_linear] - mean[:num_linear]) / deviation[:num_linear], np.ones(len(inputs))])
@@ -229,12 +213,7 @@ def _build(inputs: np.ndarray, targets: np.ndarray, num_linear: int, num_far: in
 
 
 def negative_log_likelihood(targets: keras.KerasTensor, mixture: keras.KerasTensor) -> keras.KerasTensor:
-    """Mean negative logarithm of the density of samples.
-
-    Args:
-        targets: Samples of shape `(samples, 1)`.
-        mixture: Logits, means and logarithms of the scales of the components, shape `(samples, 3 * components)`.
-    """
+    """Mean negative logarithm of the density of samples of shape `(samples, 1)`, by the output of the network."""
     logits, means, log_scales = ops.split(mixture, 3, axis=1)
     squares = ops.square((targets - means) * ops.exp(-log_scales))
     logs = _LOG_CONSTANTS - log_scales - (_DEGREES + 1) / 2 * ops.log1p(squares / _DEGREES)

@@ -9,8 +9,8 @@ import pytest
 from enhsim_tf.common.errors import InputError
 from studies.battery import simulate as module
 from studies.battery.faults import Fault
-from studies.battery.orbits import REGIMES, draw_load
-from studies.battery.simulate import COARSE, MODELS, simulate, simulate_all
+from studies.battery.orbits import REGIMES
+from studies.battery.simulate import MODELS, simulate, simulate_all
 
 os.environ["PYBAMM_DISABLE_TELEMETRY"] = "true"  # before PyBaMM is imported
 pytestmark = [
@@ -59,28 +59,6 @@ def test_a_cell_without_current_keeps_its_voltage_and_the_temperature_around_it(
         (run,) = simulate(MODELS[model], np.zeros(60), GENTLE, [None], onset=10)
         assert np.ptp(run.values[:, VOLTS]) < 1e-3
         np.testing.assert_allclose(run.values[:, CELSIUS], celsius, atol=0.01)
-
-
-def test_charge_that_is_returned_restores_the_voltage():
-    rest, there = np.zeros(300), np.full(90, 2.5)
-    (run,) = simulate(COARSE, np.concatenate([np.zeros(10), there, -there, rest]), GENTLE, [None], onset=10)
-    assert run.values[99, VOLTS] < run.values[0, VOLTS] - 0.05
-    assert run.values[-1, VOLTS] == pytest.approx(run.values[0, VOLTS], abs=0.003)
-
-
-def test_a_cell_that_cools_worse_is_warmer_and_a_smaller_one_swings_more(pulses):
-    _, runs = pulses
-    for nominal, _, smaller, warmer in runs.values():
-        assert warmer.values[-1, CELSIUS] > nominal.values[-1, CELSIUS] + 0.1
-        assert np.ptp(smaller.values[130:, VOLTS]) > np.ptp(nominal.values[130:, VOLTS])
-
-
-def test_the_same_load_gives_the_same_runs():
-    load = draw_load(1, GENTLE, np.random.default_rng(0))[:SHORT]
-    first, second = (simulate_all(load, GENTLE, [None], onset=10)[0] for _ in range(2))
-    for one, other in zip(first, second, strict=True):
-        np.testing.assert_array_equal(one.values, other.values)
-    np.testing.assert_array_equal(first[0].values[:, AMPERES], first[1].values[:, AMPERES])
 
 
 def test_a_failed_run_is_repeated_with_less_current_and_counted(monkeypatch):

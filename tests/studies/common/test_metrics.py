@@ -1,4 +1,4 @@
-"""Areas, gaps and the recall at the real rate, compared with small cases by hand, closed forms and a direct implementation of VUS-PR."""
+"""Gaps, the volume under a surface and the recall at the real rate, compared with small cases by hand, closed forms and a direct implementation of VUS-PR."""
 
 import math
 
@@ -6,35 +6,13 @@ import numpy as np
 import pytest
 from sklearn.metrics import average_precision_score
 
-from studies.common.metrics import auc_pr_at_prevalence, auc_roc, gap_closed, recall_at_real_rate, vus_pr
+from studies.common.metrics import gap_closed, recall_at_real_rate, vus_pr
 
 
 def test_recall_at_the_real_rate_by_hand():
     assert recall_at_real_rate(np.arange(99), [97.5, 98, 98.5, 200], rate=0.01) == 0.5  # the threshold is 98
     assert recall_at_real_rate(np.arange(99), [97, 98.5], rate=0.02) == 0.5  # the threshold is 97
     assert recall_at_real_rate(np.arange(199), [197.5, 196.5]) == 0.5  # by default 1 %: the threshold is 197
-
-
-def test_area_under_roc_by_hand():
-    assert auc_roc([0, 2], [2, 3]) == (3 + 0.5) / 4
-    assert auc_roc(np.ones(5), np.ones(3)) == 0.5
-
-
-def test_area_under_precision_and_recall_at_a_prevalence_by_hand():
-    # order: anomalous, nominal, anomalous, nominal; each anomalous weighs p / 2, each nominal (1 - p) / 2
-    p = 0.2
-    expected = 0.5 * 1 + 0.5 * p / (p + (1 - p) / 2)
-    assert auc_pr_at_prevalence([3, 1], [4, 2], prevalence=p) == pytest.approx(expected)
-    # more nominal windows of the same scores change nothing
-    assert auc_pr_at_prevalence([3, 1] * 50, [4, 2], prevalence=p) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("prevalence", [0.02, 0.3])
-def test_area_of_a_random_score_is_the_prevalence(prevalence):
-    rng = np.random.default_rng(0)
-    assert auc_pr_at_prevalence(rng.random(20_000), rng.random(20_000), prevalence) == pytest.approx(prevalence, rel=0.1)
-    assert auc_pr_at_prevalence(rng.random(50), 1 + rng.random(50), prevalence) == 1
-    assert auc_pr_at_prevalence(np.ones(50), np.ones(70), prevalence) == pytest.approx(prevalence)  # flags all or none
 
 
 def test_gap_closed():

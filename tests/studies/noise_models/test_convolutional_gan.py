@@ -5,7 +5,7 @@ import pytest
 
 from enhsim_tf.common import measures
 from studies.common.noise_processes import AutoregressiveNoise
-from studies.noise_models.networks.convolutional_gan import ConvolutionalGAN, fit_convolutional_gan
+from studies.noise_models.networks.convolutional_gan import fit_convolutional_gan
 
 pytestmark = pytest.mark.slow
 
@@ -21,10 +21,7 @@ def test_a_known_process_is_recovered():
     assert abs(measures.autocorrelation(generated, 1)[1] - 0.8) < 0.1
 
 
-def test_untrained_windows_have_full_rank_and_are_saved(tmp_path):
+def test_untrained_windows_have_full_rank():
     # windows from a latent vector of 16 elements fill at most 16 dimensions before a non-linearity
-    gan = fit_convolutional_gan(_noise(50, 120), 0, seed=2)
-    windows = gan.generate(600, np.random.default_rng(3))
+    windows = fit_convolutional_gan(_noise(50, 120), 0, seed=2).generate(600, np.random.default_rng(3))
     assert measures.effective_rank(windows) > 60
-    gan.save(tmp_path / "gan.npz")
-    np.testing.assert_array_equal(ConvolutionalGAN.load(tmp_path / "gan.npz").generate(600, np.random.default_rng(3)), windows)

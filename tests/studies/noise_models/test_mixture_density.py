@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.measures import autocorrelation
 from studies.noise_models.networks.mixture_density import MixtureDensityNoise
 
@@ -43,9 +42,3 @@ def test_quantised_noise_keeps_its_levels():
     noise = _windows(0.5 * np.rint(rng.standard_normal(200 * WINDOW) / 0.5))
     generated = MixtureDensityNoise(seed=5, num_steps=20).fit(noise).generate(50, rng)
     np.testing.assert_allclose(generated, 0.5 * np.rint(generated / 0.5), atol=1e-6)
-
-
-def test_a_signal_is_not_guessed():
-    noise = np.random.default_rng(6).standard_normal((20, WINDOW))
-    with pytest.raises(InputError, match="Received: none"):
-        MixtureDensityNoise(num_steps=0).fit(noise, noise).generate(2, np.random.default_rng(7))

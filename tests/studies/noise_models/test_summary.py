@@ -1,15 +1,9 @@
-"""The findings of the study of noise models: with hand-made tables, and from the published ones."""
-
-import json
-from pathlib import Path
+"""The findings of the study of noise models, with hand-made tables."""
 
 import pandas as pd
 
-from studies.common.environments import FAMILIES
-from studies.common.noise_gallery import GALLERY, LOOKED_AT
-from studies.noise_models import cells, summary
+from studies.noise_models import summary
 
-PUBLISHED = Path(summary.__file__).parent / "results"
 # false alarms of 1,000 windows and recall of each model: what every number below is worked out from
 RESULTS = {
     "real": (10, 0.60),
@@ -56,7 +50,6 @@ def test_the_findings_are_those_of_hand_made_tables(near):
     choice = found["choice"]
     assert choice["chosen"] == {"gaussian": 0, "autoregression": 2, "residual windows": 0, "matched residual windows": 2}
     assert (choice["judgements"], choice["with_a_passing_model"], choice["within_alarms"], choice["within_recall"]) == (4, 2, 2, 4)
-    assert choice["mean_excess"] == near(0.0125) and choice["mean_lost"] == near(0.01)
 
 
 def test_a_model_is_compared_with_the_real_windows_of_its_own_seeds(near):
@@ -66,13 +59,3 @@ def test_a_model_is_compared_with_the_real_windows_of_its_own_seeds(near):
     made["detectors"] = detectors[(detectors["model"] == "real") | (detectors["seed"] == 1)]
     made["choice"] = made["choice"][made["choice"]["seed"] == 1]
     assert summary.summarise(made)["families"]["white"]["models"]["autoregression"]["excess"] == near(0.02)
-
-
-def test_the_lists_of_families_are_those_of_the_gallery():
-    assert set(FAMILIES) == set(GALLERY) > set(LOOKED_AT) and set(summary.OFFERED) < set(cells.MODELS)
-
-
-def test_the_published_findings_come_from_the_published_tables(near):
-    kept = json.loads((PUBLISHED / "findings.json").read_text(encoding="utf-8"))
-    again = summary.summarise(summary.KEPT.read(PUBLISHED))
-    assert json.loads(json.dumps(again)) == near({key: kept[key] for key in again}) and kept["budget"] == "full"

@@ -1,23 +1,18 @@
-"""False alarms, finds, and cross-fitted scores, compared with small cases by hand."""
+"""False alarms, finds, and scores that need no trained detector, compared with small cases by hand and with direct computations."""
 
 import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry
-from studies.spacecraft.judging import Judge, cross_fitted_scores, windows_that_meet
-from studies.spacecraft.telemanom import LabelledChannel, Labels
+from studies.spacecraft.judging import Judge
+from studies.spacecraft.reference import left_discord
+from studies.spacecraft.telemanom import LabelledChannel
 
 
 def channel(sequences, samples=400):
-    series, none = Telemetry(np.random.default_rng(0).standard_normal(samples).astype(np.float32)), np.zeros((samples, 0), np.float32)
-    return LabelledChannel(Labels("A", tuple(sequences), ("point",) * len(sequences)), series, series, none, none)
-
-
-def test_windows_meet_the_ranges_whose_samples_they_hold():
-    begins, window, ranges = np.arange(0, 91, 5), 10, [(20, 23), (60, 75)]
-    for row, labelled in zip(windows_that_meet(begins, window, ranges), map(set, (range(*each) for each in ranges)), strict=True):
-        assert row.tolist() == [bool(labelled & set(range(begin, begin + window))) for begin in begins]
+    series = Telemetry(np.random.default_rng(0).standard_normal(samples).astype(np.float32))
+    return LabelledChannel("A", series, series, tuple(sequences))
 
 
 def test_alarms_and_finds_by_hand():
@@ -44,32 +39,27 @@ def test_the_areas_of_a_perfect_and_of_a_random_score():
     assert random["auc_pr"] == pytest.approx(300 / 5_000, abs=0.05)  # the share of labelled samples
 
 
-class Mean:
-    """Scores a window by its distance from the mean training window, and remembers what it was fitted to."""
-
-    fitted = []
-
-    def fit(self, windows):
-        self.fitted.append(windows)
-        self.mean = windows.mean(axis=0)
-        return self
-
-    def score(self, windows):
-        return np.abs(windows - self.mean).max(axis=1)
-
-
-def test_cross_fitted_scores_come_from_detectors_that_saw_no_sample_of_the_window():
-    values, window = np.arange(300.0), 10
-    starts = np.arange(0, 291, 3)
-    windows = np.lib.stride_tricks.sliding_window_view(values, window)[starts]
-    Mean.fitted = []
-    scores = cross_fitted_scores(Mean, windows, starts, 5)
-    assert len(Mean.fitted) == 5 and np.isfinite(scores).all()
-    for learnt, held_out in zip(Mean.fitted, np.array_split(np.arange(len(starts)), 5), strict=True):
-        assert not set(learnt.ravel()) & set(windows[held_out].ravel())
-        np.testing.assert_allclose(scores[held_out], np.abs(windows[held_out] - learnt.mean(axis=0)).max(axis=1))
-
-
 def test_a_test_part_without_nominal_windows_is_refused():
     with pytest.raises(InputError, match="no labelled sample"):
         Judge(channel([(0, 400)]), 16, 8, 0.1)
+
+
+def discord_by_definition(series, begin, window):
+    pieces = [series[start : start + window] for start in (*range(begin - window + 1), begin)]
+    *earlier, last = [(piece - piece.mean()) / piece.std() for piece in pieces]
+    return min(np.linalg.norm(last - each) for each in earlier)
+
+
+def test_left_discord_is_the_distance_to_the_nearest_earlier_window_whatever_its_level_and_scale():
+    series = np.random.default_rng(0).standard_normal(300)
+    begins = np.array([40, 100, 270])
+    np.testing.assert_allclose(left_discord(series, begins, 30), [discord_by_definition(series, begin, 30) for begin in begins], rtol=1e-9)
+    assert left_discord(np.concatenate([series[:20], 5 + 3 * series[:20]]), [20], 20)[0] == pytest.approx(0, abs=1e-6)
+
+
+def test_left_discord_of_constant_windows_and_of_the_first_window(refused):
+    series = np.concatenate([np.random.default_rng(2).standard_normal(40), np.ones(40)])
+    found = left_discord(series, np.array([0, 40, 60]), 20)
+    np.testing.assert_allclose(found, [2 * np.sqrt(20), np.sqrt(20), 0.0])
+    with refused("windows inside the series"):
+        left_discord(series, [61], 20)
