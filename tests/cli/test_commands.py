@@ -21,7 +21,11 @@ from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.anomalies import INJECTIONS
+from enhsim_tf.simulator import fit_many
 from enhsim_tf.simulator.model_folder import channels_of, models_of
+from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.simulator.simulator import EnhancedSimulator
+from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.known_simulators import of_waves
 
 ROOT = Path(__file__).parents[2]
@@ -80,13 +84,53 @@ def files(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
+def coarse_run(num_samples=1_500, seed=0):
+    """A recorded run of somebody's own simulator."""
+    rng = np.random.default_rng(seed)
+    volts, watts = (np.convolve(each, np.hanning(12), "same") for each in rng.standard_normal((2, num_samples)))
+    times = pd.date_range("2024-01-01", periods=num_samples, freq="10s")
+    return pd.DataFrame({"utc": times, "volts": volts.round(4), "watts": (100 * watts).round(2)})
+
+
+def clean_celsius(run):
+    return 20 + 2 * run["volts"] + 0.01 * np.roll(run["watts"], 1)
+
+
+def telemetry_of(run, seed=1):
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(len(run))
+    return pd.DataFrame({"utc": run["utc"], "celsius": (clean_celsius(run) + noise).round(4)})
+
+
+def fault_run():
+    run, late = coarse_run(300, seed=5), np.arange(300) >= 100
+    run.loc[late, "watts"] *= 0.5
+    return run.assign(scenario=np.where(late, "weak", "nominal"), severity=0.5 * late, mask=late)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A read-only folder with telemetry, recorded runs, a simulator that was fitted to one, and what the fit said."""
+    folder, run = tmp_path_factory.mktemp("runs"), coarse_run()
+    frames = {"run": run, "old": telemetry_of(run), "fault": fault_run(), "new": telemetry_of(fault_run(), seed=9), "short": run.iloc[:20]}
+    for name, frame in (frames | {"later": run.assign(utc=run["utc"] + pd.Timedelta("400D"))}).items():
+        frame.to_csv(folder / f"{name}.csv", index=False)
+    chosen = ["--window", "32", "--num-windows", "300", "--noise", "residual-windows"]
+    ended = shell("fit", "old.csv", "--coarse", "run.csv", "--out", "models", *chosen, cwd=folder)
+    assert (ended.returncode, ended.stderr) == (0, ""), ended.stderr
+    (folder / "said.txt").write_text(ended.stdout)
+    return folder
+
+
 @pytest.fixture
-def told(world, tmp_path, monkeypatch, capfd):
+def told(world, tmp_path, monkeypatch, capfd, request):
     """Runs the command in this process and in a temporary folder; returns exit code, stdout and the lines of stderr."""
 
     def run(*arguments):
         monkeypatch.chdir(tmp_path)
-        code = main([str(argument).replace("WORLD", str(world)) for argument in arguments])
+        arguments = [str(argument).replace("WORLD", str(world)) for argument in arguments]
+        if any("RUNS" in argument for argument in arguments):
+            arguments = [argument.replace("RUNS", str(request.getfixturevalue("runs"))) for argument in arguments]
+        code = main(arguments)
         out, error = capfd.readouterr()
         return code, out, error.splitlines()
 
@@ -306,12 +350,80 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
     assert not list((tmp_path / "models").iterdir())
 
 
+def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
+    monkeypatch.setattr(fit_many, "_cleaned", lambda *arguments: {}["defect"])
+    outcome = fit_many.fit_or_say(fit_many.Job({"volts": None}, Path("x"), FitOptions(), Cleaning()))
+    line = outcome.failed["volts"]
+    assert not outcome.reports and len(line.splitlines()) == 1 and "KeyError" in line and "'defect'" in line
+
+
 def test_several_sources_and_what_reading_takes_are_options():
     words = ["inject", "a.csv", "b.csv", "--missing-values=-999.9,9999", "--label-column", "x", "--no-header", "--out", "y"]
     options = parse(words)
     chosen = cleaning_options(options, 3)
     assert options.source == ["a.csv", "b.csv"] and parse(["inject", "a.csv", "--out", "y"]).source == "a.csv"
     assert (chosen.missing_values, chosen.label_column, chosen.no_header) == (("-999.9", "9999"), ("x",), True)
+
+
+# a simulator of one's own
+
+COPIES = ["generate", "RUNS/models", "--coarse", "RUNS/fault.csv", "--out", "x.parquet"]
+
+
+def test_the_fit_reports_the_pairing_and_the_candidates(runs):
+    said = (runs / "said.txt").read_text()
+    assert "delay: none found" in said and "enhancers, error on held-out blocks" in said and "Used: ridge" in said
+    assert {path.name for path in (runs / "models" / "celsius").iterdir()} >= {"manifest.json", "report.json", "report.png", "arrays.npz"}
+
+
+def test_options_of_a_fit_with_a_run(told, tmp_path):
+    chosen = ["--enhancer", "level-and-gain", "--coarse-column", "volts", "--delay", "10", "--noise", "residual-windows", "--window", "32"]
+    code, out, errors = told("fit", "RUNS/old.csv", "--coarse", "RUNS/run.csv", "--out", "m", *chosen)
+    assert (code, errors) == (0, []) and "delay: 10 s as given" in out and "Used: level and gain" in out
+    assert EnhancedSimulator.load(tmp_path / "m" / "celsius").alignment.columns == ("volts",)
+
+
+def test_copies_of_a_run_keep_its_labels(told, tmp_path):
+    code, out, errors = told(*COPIES, "--copies", 4)
+    covered = next(line for line in out.splitlines() if "the training range covers" in line)
+    assert (code, errors) == (0, []) and "(nominal " in covered and "4 copies of 300 samples" in out.splitlines()[-1]
+    frame, run = pd.read_parquet(tmp_path / "x.parquet"), fault_run()
+    assert len(frame) == 1_200 and list(frame.columns) == ["copy", "time", "value", "out_of_range", "scenario", "severity", "mask"]
+    for _, copy in frame.groupby("copy"):
+        assert np.sqrt(np.mean((copy["value"].to_numpy() - clean_celsius(run))[5:-5] ** 2)) < 0.2
+        assert copy["scenario"].tolist() == run["scenario"].tolist() and copy["mask"].tolist() == run["mask"].tolist()
+    assert told("generate", "RUNS/models", "--windows", 5, "--out", "w.parquet")[0] == 0, "nominal windows need no run"
+
+
+def test_scores_are_those_of_the_difference(told, tmp_path):
+    score = ["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/fault.csv", "--windows", 300, "--out", "scores.csv"]
+    code, out, errors = told(*score)
+    assert (code, errors) == (0, []) and "of 300 scored samples" in out and "events.csv" in out and "false alarms per day" in out
+    frame = pd.read_csv(tmp_path / "scores.csv")
+    assert list(frame.columns)[1:] == ["value", "enhanced", "score", "flag", "out_of_range"] and len(frame) == 300
+    assert np.corrcoef(frame["value"], frame["enhanced"])[0, 1] > 0.98
+    assert list(pd.read_csv(tmp_path / "scores.events.csv").columns)[:3] == ["begin", "end", "peak"]
+
+
+def test_an_update_with_a_run(told, tmp_path):
+    code, out, errors = told("update", "RUNS/models", "RUNS/old.csv", "--coarse", "RUNS/run.csv", "--out", "new")
+    assert (code, errors) == (0, []) and "updated with 1,500 samples" in out
+    assert EnhancedSimulator.load(tmp_path / "new" / "celsius").trained["updates"][0]["num_samples"] == 1_500
+
+
+@pytest.mark.parametrize(("change", "word"), [({"watts": None}, "without 'watts'"), ({"value": 1.0}, "'value'")])
+def test_bad_fault_runs(told, tmp_path, change, word):
+    fault_run().assign(**change).dropna(axis="columns").to_csv(tmp_path / "bad.csv", index=False)
+    code, out, errors = told("generate", "RUNS/models", "--coarse", "bad.csv", "--out", "out/x.parquet")
+    assert (code, out, len(errors)) == (2, "", 1) and errors[0].startswith("error: Expected ") and word in errors[0]
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_a_coarse_run_is_not_overwritten(told, tmp_path):
+    fault_run().to_parquet(tmp_path / "x.parquet")
+    before = (tmp_path / "x.parquet").read_bytes()
+    code, _, errors = told("generate", "RUNS/models", "--coarse", "x.parquet", "--out", "x.parquet")
+    assert code == 2 and "differ" in errors[0] and (tmp_path / "x.parquet").read_bytes() == before
 
 
 # examples of the README and of the page on telemetry of one's own
@@ -354,6 +466,7 @@ FIT = ["fit", "WORLD/one.csv", "--out", "models"]
 GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
 INJECT = ["inject", "WORLD/one.csv", "--out", "x.csv"]
 SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
+OF_RUNS = "generate MODEL_DIR --coarse"
 WRONG = {
     "no command": ([], "{fit,generate,verify,score,update,inject}"),
     "unknown command": (["train"], "'train'"),
@@ -401,6 +514,26 @@ WRONG = {
     "score a channel of two": (["score", "WORLD/joint", "WORLD/one.csv", "--out", "x.parquet"], "volts, amps"),
     "update into a foreign folder": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
     "update where a simulator is": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/models"], "--replace"),
+    "a delay without a run": ([*FIT, "--delay", "3"], "--delay only together with --coarse"),
+    "a column of no run": ([*FIT, "--coarse-column", "volts"], "--coarse-column only"),
+    "copies without a run": ([*GENERATE, "--copies", "3", "--windows", "2"], "--copies only"),
+    "windows of a run": ([*COPIES, "--windows", "2"], "--windows without --coarse"),
+    "scenarios of a run": ([*COPIES, "--scenario", "stuck:0.5"], "--scenario without --coarse"),
+    "no copies": ([*COPIES, "--copies", "0"], "1 copy or more"),
+    "a scenario of a model of runs": (
+        ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--out", "x.parquet"],
+        OF_RUNS,
+    ),
+    "one in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--scenario", "stuck:0.5", "--out", "x.parquet"], OF_RUNS),
+    "an event in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--at", "stuck@10/20", "--out", "x.parquet"], OF_RUNS),
+    "one in a large data set of it": (
+        ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--workers", "1", "--out", "x"],
+        OF_RUNS,
+    ),
+    "a run shorter than a window": (["generate", "RUNS/models", "--coarse", "RUNS/short.csv", "--out", "x.parquet"], "32 samples"),
+    "scores without a run": (["score", "RUNS/models", "RUNS/new.csv", "--out", "x.parquet"], "Expected --coarse"),
+    "an update without a run": (["update", "RUNS/models", "RUNS/new.csv", "--out", "x"], "Expected --coarse"),
+    "a run of another time": (["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/later.csv", "--out", "x.parquet"], "in time"),
     "inject nothing": (INJECT, "--kinds"),
     "inject an unknown kind": ([*INJECT, "--kinds", "ramp,rust"], "'rust'"),
     "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
