@@ -24,11 +24,8 @@ enhsim-tf fit --help shows the options of fit; generate, verify, score, update a
 python -m enhsim_tf.reproduce, reproduces the paper.
 """
 DETECTORS = tuple(map(option_name, (RESIDUAL, *all_detectors())))
-KINDS = (
-    "spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain, of each channel on its own;\n"
-    "another_time, delay, lost_coupling, common_shift, of several channels in one table"
-)
 EXIT = "exit code: 0 success; 2 the input or an option is invalid, or at least one of several channels failed; 130 interrupted"
+_OWN, _MODELS = "your own simulator", "output folder of `fit`"  # the title of a group of options, and the help text of MODEL_DIR
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -40,275 +37,221 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     Raises:
         InputError: If an option is unknown or its value has the wrong type.
     """
-    form = {"formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = Parser(
         prog="enhsim-tf",
         description="Fits simulators to channels of telemetry, generates labelled training data with them, and scores new telemetry.",
         epilog=EXAMPLES + EXIT,
-        **form,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"enhsim-tf {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="{fit,generate,verify,score,update,inject}", required=True)
+    for add in (_add_fit, _add_generate, _add_verify, _add_score, _add_update, _add_inject):
+        add(commands)
+    options = parser.parse_args(arguments)
+    if len(getattr(options, "source", ())) == 1:
+        (options.source,) = options.source
+    return options
 
-    fit = commands.add_parser(
+
+def _command(commands: argparse._SubParsersAction, name: str, short: str, description: str | None = None, epilog: str = ""):  # noqa: ANN202
+    form = argparse.RawDescriptionHelpFormatter
+    return commands.add_parser(name, help=short, description=description, epilog=epilog + EXIT, formatter_class=form)
+
+
+def _add_fit(commands: argparse._SubParsersAction) -> None:
+    fit = _command(
+        commands,
         "fit",
-        help="fit an enhanced simulator to nominal telemetry",
-        description="Fits an enhanced simulator to the channels of nominal telemetry. The coarse simulator of a channel is a square wave, or the\n"
+        "fit an enhanced simulator to nominal telemetry",
+        "Fits an enhanced simulator to the channels of nominal telemetry. The coarse simulator of a channel is a square wave, or the\n"
         "commands in an array of 25 or 55 columns, or a constant level if nothing is periodic. The last part of the telemetry is held out, and the\n"
         "report evaluates the simulator on it.",
-        epilog=EXIT,
-        **form,
     )
     _add_source(fit)
     fit.add_argument("--out", type=Path, required=True, metavar="MODEL_DIR", help="output folder, one subfolder for each simulator")
     fit.add_argument("--separately", action="store_true", help="fit each channel on its own (default: all channels in one simulator)")
     add_options(fit, FitOptions, "window", "enhancer", "noise", "held_out", "num_windows", "epochs")
-    fit.add_argument("--workers", metavar="auto|N", help="with --separately: channels fitted in parallel (default: auto, one per core)")
-    fit.add_argument(
-        "--engine",
-        choices=("local", "ray"),
-        default="local",
-        help="run workers on this machine (default) or with Ray (docs/large_data_sets.md)",
-    )
-    coarse = fit.add_argument_group(
-        "your own simulator", "fit with a recorded run of your simulator at the times of the telemetry (docs/own_simulator.md)"
-    )
+    _add_workers(fit, "with --separately: channels fitted in parallel")
+    coarse = fit.add_argument_group(_OWN, "fit with a recorded run of your simulator at the times of the telemetry (docs/own_simulator.md)")
     _add_coarse(coarse)
-    coarse.add_argument(
-        "--coarse-column",
-        action="append",
-        metavar="NAME",
-        help="use only this column of the recorded run; may be repeated (default: all numeric columns)",
-    )
+    _add_repeated(coarse, "--coarse-column", "use only this column of the recorded run (default: all numeric columns)")
     add_options(coarse, FitOptions, "delay_s")
     _add_json(fit)
     _add_seed(fit)
 
-    generate = commands.add_parser(
+
+def _add_generate(commands: argparse._SubParsersAction) -> None:
+    generate = _command(
+        commands,
         "generate",
-        help="generate labelled training data",
-        description="Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
+        "generate labelled training data",
+        "Generates windows or one continuous series. Labels mark exactly the samples that a degraded mode has changed, and give\n"
         "the scenario (nominal or the mode), its severity, onset and end.",
-        epilog="degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1. The onset is the start\n"
-        "of the degraded mode as a share of the window or series (default: 0.25). A channel without times counts as one sample per second.\n"
-        + EXIT,
-        **form,
+        "degraded modes: stuck, drift, gain_loss, friction, dropout, period_change; severity from 0 to 1. The onset is the start\n"
+        "of the degraded mode as a share of the window or series (default: 0.25). A channel without times counts as one sample per second.\n",
     )
-    generate.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
+    generate.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
     how_many = generate.add_mutually_exclusive_group()
     how_many.add_argument("--windows", type=int, metavar="N", help="total number of windows")
     how_many.add_argument("--continuous", metavar="LENGTH", help="length of one continuous series, such as 1d, 6h, 90min or 5000 (samples)")
-    generate.add_argument(
-        "--start", metavar="TIME", help="start time of the series, such as 2024-01-01 (default: times are seconds from 0)"
-    )
-    generate.add_argument(
-        "--scenario",
-        action="append",
-        default=[],
-        metavar="[CHANNEL=]MODE:SEVERITY[:ONSET]",
-        help="a degraded mode, such as stuck:0.5, of all channels or of one; may be repeated",
-    )
+    generate.add_argument("--start", metavar="TIME", help="start of the series, such as 2024-01-01 (default: times are seconds from 0)")
+    what = "a degraded mode, such as stuck:0.5, of all channels or of one"
+    _add_repeated(generate, "--scenario", what, "[CHANNEL=]MODE:SEVERITY[:ONSET]", [])
     series = generate.add_argument_group("events in a series", "with --continuous; each event is followed by nominal operation")
     series.add_argument("--number", type=int, metavar="N", help="number of events at random places; the scenarios are used in turn")
-    series.add_argument(
-        "--at",
-        action="append",
-        default=[],
-        metavar="MODE[:SEVERITY]@BEGIN/LENGTH",
-        help="an event at a given sample or time, such as stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h; may be repeated",
-    )
-    series.add_argument(
-        "--length", default="100", metavar="N[:N]", help="length of events at random places: samples, a time, or a range (default: 100)"
-    )
-    series.add_argument(
-        "--gap", type=int, metavar="N", help="nominal samples around an event at a random place (default: the longest length)"
-    )
-    series.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channel, is_anomaly")
+    _add_events(series, "event", "MODE", "stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h")
     generate.add_argument("--nominal-share", type=float, metavar="SHARE", help="share of nominal windows, with --scenario (default: 0.5)")
-    generate.add_argument("--channel", action="append", metavar="NAME", help="only the simulator of this name; may be repeated")
-    generate.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="OUT",
-        help="a .parquet file (a series may be a .csv file), or a folder for several simulators",
-    )
-    coarse = generate.add_argument_group("your own simulator", "for models that were fitted with --coarse (docs/own_simulator.md)")
+    _add_repeated(generate, "--channel", "only the simulator of this name")
+    out = "a .parquet file (a series may be a .csv file), or a folder for several simulators"
+    generate.add_argument("--out", type=Path, required=True, metavar="OUT", help=out)
+    coarse = generate.add_argument_group(_OWN, "for models that were fitted with --coarse (docs/own_simulator.md)")
     _add_coarse(coarse)
     coarse.add_argument("--copies", type=int, metavar="N", help="copies of the run, each with different noise (default: 1)")
     _add_cleaning(coarse)
     large = generate.add_argument_group(
         "large data sets", "with any of these options, OUT is a folder of many files (docs/large_data_sets.md)"
     )
-    large.add_argument("--workers", metavar="auto|N", help="number of worker processes (default: auto, one per core)")
-    large.add_argument(
-        "--engine", choices=("local", "ray"), help="run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS"
-    )
-    large.add_argument(
-        "--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models (docs/large_data_sets.md)"
-    )
+    _add_workers(large, "number of worker processes", None)
+    large.add_argument("--scenarios", type=Path, metavar="FILE", help="YAML file with shares and ranges of scenarios and models")
     _add_seed(generate, None)  # None shows that the option was not given: a scenario file may contain the seed
 
-    verify = commands.add_parser("verify", help="verify a large data set against its manifest", epilog=EXIT, **form)
+
+def _add_verify(commands: argparse._SubParsersAction) -> None:
+    verify = _command(commands, "verify", "verify a large data set against its manifest")
     verify.add_argument("folder", type=Path, metavar="FOLDER", help="output folder of `generate --workers`")
     verify.set_defaults(seed=0)
 
-    score = commands.add_parser(
+
+def _add_score(commands: argparse._SubParsersAction) -> None:
+    score = _command(
+        commands,
         "score",
-        help="score telemetry with a detector that has learnt from generated telemetry",
-        description="Writes a score and a flag for each sample of the source. Beside SCORES it writes the alarms, one per row, to a file that ends in\n"
+        "score telemetry with a detector that has learnt from generated telemetry",
+        "Writes a score and a flag for each sample of the source. Beside SCORES it writes the alarms, one per row, to a file that ends in\n"
         ".events.csv: begin, end, peak, duration_s, num_flagged, score and confidence. Flagged samples at most one window apart form one\n"
         "alarm. The threshold never flags more of the nominal telemetry of the fit than it is set for.",
-        epilog=textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
-        + f"\nresidual and innovation judge the difference between the telemetry and the simulator (docs/own_data.md)\n{EXIT}",
-        **form,
+        textwrap.fill(f"detectors: {', '.join(DETECTORS)}", 120, break_on_hyphens=False)
+        + "\nresidual and innovation judge the difference between the telemetry and the simulator (docs/own_data.md)\n",
     )
-    score.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
+    score.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
     _add_source(score)
-    score.add_argument(
-        "--detector", choices=DETECTORS, metavar="NAME", help="detector (default: the one that `fit` chose by held-out time)"
-    )
+    what = "detector (default: the one that `fit` chose by held-out time)"
+    score.add_argument("--detector", choices=DETECTORS, metavar="NAME", help=what)
     add_options(score, ScoreOptions, "false_alarm_rate")
-    score.add_argument(
-        "--windows",
-        dest="num_windows",
-        type=int,
-        default=ScoreOptions.num_windows,
-        metavar="N",
-        help="generated windows from which the detector learns (default: %(default)s)",
-    )
-    coarse = score.add_argument_group("your own simulator", "score the difference between the telemetry and the enhanced run")
-    _add_coarse(coarse)
+    what = "generated windows from which the detector learns (default: %(default)s)"
+    score.add_argument("--windows", dest="num_windows", type=int, default=ScoreOptions.num_windows, metavar="N", help=what)
+    _add_coarse(score.add_argument_group(_OWN, "score the difference between the telemetry and the enhanced run"))
     score.add_argument("--figure", action="store_true", help="draw series, scores and events beside SCORES, as .png")
     score.add_argument("--out", type=Path, required=True, metavar="SCORES", help="a .parquet or .csv file; a folder for several simulators")
     _add_json(score)
     _add_seed(score)
 
-    update = commands.add_parser(
+
+def _add_update(commands: argparse._SubParsersAction) -> None:
+    update = _command(
+        commands,
         "update",
-        help="update simulators with newer nominal telemetry",
-        description="Fits the simulators again to newer nominal telemetry, and reports what changed, with errors and alarms of the old and the new\n"
+        "update simulators with newer nominal telemetry",
+        "Fits the simulators again to newer nominal telemetry, and reports what changed, with errors and alarms of the old and the new\n"
         "simulator on the held-out end of the new telemetry (docs/own_data.md). The old simulators are kept.",
-        epilog=EXIT,
-        **form,
     )
-    update.add_argument("models", type=Path, metavar="MODEL_DIR", help="output folder of `fit`")
+    update.add_argument("models", type=Path, metavar="MODEL_DIR", help=_MODELS)
     _add_source(update)
-    _add_coarse(update.add_argument_group("your own simulator", "for simulators that were fitted with --coarse"))
+    _add_coarse(update.add_argument_group(_OWN, "for simulators that were fitted with --coarse"))
     update.add_argument("--out", type=Path, metavar="NEW_DIR", help="folder for the updated simulators (default: MODEL_DIR-updated)")
     update.add_argument("--replace", action="store_true", help="replace simulators that are in NEW_DIR, which may be MODEL_DIR")
     add_options(update, FitOptions, "held_out")
     _add_json(update)
     _add_seed(update)
 
-    inject = commands.add_parser(
+
+def _add_inject(commands: argparse._SubParsersAction) -> None:
+    inject = _command(
+        commands,
         "inject",
-        help="put labelled anomalies into nominal telemetry",
-        description="Puts anomalies into nominal telemetry of your own, at random or given places, and writes it with labels (docs/inject.md).",
-        epilog=f"kinds: {KINDS}\n" + EXIT,
-        **form,
+        "put labelled anomalies into nominal telemetry",
+        "Puts anomalies into nominal telemetry of your own, at random or given places, and writes it with labels (docs/inject.md).",
+        "kinds: spike, level_shift, ramp, stuck, variance_change, oscillation, dropout, gain, of each channel on its own;\n"
+        "another_time, delay, lost_coupling, common_shift, of several channels in one table\n",
     )
     _add_source(inject)
     inject.add_argument("--kinds", metavar="KIND,...", help="kinds of anomaly at random places, or all; they are used in turn")
     inject.add_argument("--number", type=int, metavar="N", help="number of anomalies at random places (default: one of each kind)")
-    inject.add_argument(
-        "--at",
-        action="append",
-        default=[],
-        metavar="KIND[:SEVERITY]@BEGIN/LENGTH",
-        help="an anomaly at a given sample or time, such as ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h; may be repeated",
-    )
-    inject.add_argument(
-        "--severity", default="4", metavar="SD[:SD]", help="severity in standard deviations of the noise, or a range (default: 4)"
-    )
-    inject.add_argument(
-        "--length", default="100", metavar="N[:N]", help="length in samples, a time such as 10min, or a range (default: 100)"
-    )
-    inject.add_argument(
-        "--gap", type=int, metavar="N", help="nominal samples around an anomaly at a random place (default: the longest length)"
-    )
-    inject.add_argument(
-        "--noise-sd", type=float, metavar="SD", help="standard deviation of the noise (default: estimated from second differences)"
-    )
-    inject.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
+    severity = "severity in standard deviations of the noise, or a range (default: 4)"
+    inject.add_argument("--severity", default="4", metavar="SD[:SD]", help=severity)
+    noise = "standard deviation of the noise (default: estimated from second differences)"
+    inject.add_argument("--noise-sd", type=float, metavar="SD", help=noise)
+    _add_events(inject, "anomaly", "KIND", "ramp:4@5000/200 or stuck:inf@2024-01-05T12:00/2h")
     inject.add_argument("--out", type=Path, required=True, metavar="OUT", help="a .parquet or .csv file; a folder for several channels")
     _add_seed(inject)
-    return parser.parse_args(arguments)
 
 
-def _add_json(parser: argparse.ArgumentParser) -> None:
+# options of several commands
+
+_Parser = argparse.ArgumentParser | argparse._ArgumentGroup
+
+
+def _add_repeated(parser: _Parser, word: str, text: str, metavar: str = "NAME", default: list[str] | None = None) -> None:
+    parser.add_argument(word, action="append", default=default, metavar=metavar, help=f"{text}; may be repeated")
+
+
+def _add_json(parser: _Parser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object in place of lines of text")
 
 
-def _add_seed(parser: argparse.ArgumentParser, default: int | None = 0) -> None:
+def _add_seed(parser: _Parser, default: int | None = 0) -> None:
     parser.add_argument("--seed", type=int, default=default, help="random seed (default: 0)")
 
 
-class _Sources(argparse.Action):
-    """Keeps one source as text and several as a list."""
+def _add_workers(parser: _Parser, text: str, engine: str | None = "local") -> None:
+    parser.add_argument("--workers", metavar="auto|N", help=f"{text} (default: auto, one per core)")
+    where = "run workers on this machine (default) or with Ray, on the cluster at RAY_ADDRESS (docs/large_data_sets.md)"
+    parser.add_argument("--engine", choices=("local", "ray"), default=engine, help=where)
 
-    def __call__(self, parser, namespace, values, option_string=None):  # noqa: ANN001, ANN204  as argparse calls it
-        """Stores the values."""
-        setattr(namespace, self.dest, values[0] if len(values) == 1 else values)
+
+def _add_events(parser: _Parser, noun: str, form: str, examples: str) -> None:
+    _add_repeated(parser, "--at", f"an {noun} at a given sample or time, such as {examples}", f"{form}[:SEVERITY]@BEGIN/LENGTH", [])
+    length = "length at random places: samples, a time such as 10min, or a range (default: 100)"
+    parser.add_argument("--length", default="100", metavar="N[:N]", help=length)
+    gap = f"nominal samples around an {noun} at a random place (default: the longest length)"
+    parser.add_argument("--gap", type=int, metavar="N", help=gap)
+    parser.add_argument("--timeeval", action="store_true", help="write TimeEval's CSV: timestamp, the channels, is_anomaly")
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("source", metavar="SOURCE", nargs="+", action=_Sources, help=SOURCES)
-    parser.add_argument(
-        "--column", action="append", metavar="NAME", help="only this column; may be repeated (default: all numeric columns)"
-    )
-    parser.add_argument(
-        "--time", metavar="NAME", help="the time column (default: detected); give 'none' to use the sample number as the time"
-    )
+    parser.add_argument("source", metavar="SOURCE", nargs="+", help=SOURCES)
+    _add_repeated(parser, "--column", "only this column (default: all numeric columns)")
+    time = "the time column (default: detected); give 'none' to use the sample number as the time"
+    parser.add_argument("--time", metavar="NAME", help=time)
     parser.add_argument("--interval", type=float, metavar="SECONDS", help="sampling interval (default: the most frequent one)")
     table = parser.add_argument_group("tables in other forms", "what is detected unless it is given (docs/own_data.md)")
-    table.add_argument(
-        "--label-column", action="append", metavar="NAME", help="column that labels anomalous rows, or 'none'; may be repeated"
-    )
-    table.add_argument(
-        "--series-column", action="append", metavar="NAME", help="column whose values tell several series apart, or 'none'; may be repeated"
-    )
-    table.add_argument(
-        "--value-column", action="append", metavar="NAME", help="column that holds the values of such series; may be repeated"
-    )
+    _add_repeated(table, "--label-column", "column that labels anomalous rows, or 'none'")
+    _add_repeated(table, "--series-column", "column whose values tell several series apart, or 'none'")
+    _add_repeated(table, "--value-column", "column that holds the values of such series")
     table.add_argument("--no-header", action="store_true", help="the file has no line of names: columns are 'column 0', 'column 1', ...")
     table.add_argument("--decimal", choices=(".", ","), help="decimal sign; the other one separates thousands")
     _add_cleaning(parser)
 
 
-def _add_coarse(parser: argparse._ArgumentGroup) -> None:
+def _add_coarse(parser: _Parser) -> None:
     parser.add_argument("--coarse", metavar="SOURCE", help="recorded run of the simulator: " + SOURCES)
     parser.add_argument("--coarse-time", metavar="NAME", help="the time column of that run (default: detected)")
-    parser.add_argument(
-        "--coarse-start",
-        metavar="TIME",
-        help="time in UTC of the zero of that run, such as 2024-03-01T00:00:00, if its times count from zero",
-    )
+    start = "time in UTC of the zero of that run, such as 2024-03-01T00:00:00, if its times count from zero"
+    parser.add_argument("--coarse-start", metavar="TIME", help=start)
 
 
-def _add_cleaning(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
-    parser.add_argument(
-        "--time-format",
-        metavar="FORMAT",
-        help="how times are written: a format such as %%d.%%m.%%Y, or for numbers s, ms, us, ns, min, h, D, excel, mjd, jd, datenum (default: detected)",
+def _add_cleaning(parser: _Parser) -> None:
+    form = (
+        "how times are written: a format such as %%d.%%m.%%Y, or for numbers s, ms, us, ns, min, h, D, excel, mjd, jd, datenum "
+        "(default: detected)"
     )
-    parser.add_argument(
-        "--missing-values",
-        action="append",
-        default=[],
-        metavar="VALUE,...",
-        help="values that mean 'no value', such as --missing-values=-999.9",
-    )
-    parser.add_argument(
-        "--timezone", metavar="ZONE", help="time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
-    )
-    parser.add_argument(
-        "--max-fill", type=int, metavar="N", help="longest gap, in samples, that is filled (default: 5; any with --fill hold)"
-    )
-    parser.add_argument(
-        "--fill",
-        choices=("linear", "hold"),
-        default="linear",
-        help="fill gaps by straight lines (default), or hold the last value, for telemetry that is sent only when it changes",
-    )
+    parser.add_argument("--time-format", metavar="FORMAT", help=form)
+    missing = "values that mean 'no value', such as --missing-values=-999.9"
+    parser.add_argument("--missing-values", action="append", default=[], metavar="VALUE,...", help=missing)
+    zone = "time zone, such as Europe/Berlin, of times that do not state one (default: UTC)"
+    parser.add_argument("--timezone", metavar="ZONE", help=zone)
+    most = "longest gap, in samples, that is filled (default: 5; any with --fill hold)"
+    parser.add_argument("--max-fill", type=int, metavar="N", help=most)
+    fill = "fill gaps by straight lines (default), or hold the last value, for telemetry that is sent only when it changes"
+    parser.add_argument("--fill", choices=("linear", "hold"), default="linear", help=fill)
     parser.add_argument("--drop-bad", action="store_true", help="drop and count values and times that cannot be read, instead of stopping")

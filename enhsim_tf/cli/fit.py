@@ -3,21 +3,17 @@
 import argparse
 import json
 
-from enhsim_tf.cli.options import cleaning_options, refuse_without_coarse, tell_failed
+from enhsim_tf.cli.options import cleaning_options, refuse_without, tell_failed
 from enhsim_tf.common.console import tell
 
 
 def run_fit(options: argparse.Namespace) -> int:
-    """Fits one simulator to all channels of the source, or one to each, and returns the exit code.
-
-    Args:
-        options: Parsed options of `fit`.
-    """
+    """Fits one simulator to all channels of the source, or one to each, and returns the exit code."""
     from enhsim_tf.simulator.options import FitOptions, options_from
 
     chosen = options_from(options, FitOptions)
     if options.coarse is None:
-        refuse_without_coarse(options, "coarse_time", "coarse_start", "coarse_column", "delay_s")
+        refuse_without(options, "coarse", "coarse_time", "coarse_start", "coarse_column", "delay_s")
     from enhsim_tf.common.parallel.engines import parse_workers
 
     workers = parse_workers(options.workers, options.engine)
@@ -27,12 +23,11 @@ def run_fit(options: argparse.Namespace) -> int:
     from enhsim_tf.telemetry.sources import read_source
 
     speaks = not options.json
-    if speaks:
-        tell("reading ...")
+    say = tell if speaks else lambda line: None
+    say("reading ...")
     run = None if options.coarse is None else CoarseRun(options.coarse, options.coarse_column, options.coarse_time, options.coarse_start)
     series = read_source(options.source, options.column, options.time, cleaning)
     commands = None if run is not None else read_commands(options.source, options.column)
-    say = tell if speaks else lambda line: None
     reports, failed = fit_channels(
         series, options.out, chosen, cleaning, say, options.separately, workers, options.engine, speaks, run, commands
     )

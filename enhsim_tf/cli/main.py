@@ -14,14 +14,7 @@ from enhsim_tf.common.errors import InputError
 
 
 def run(options: argparse.Namespace) -> int:
-    """Runs the selected command and returns its exit code.
-
-    Args:
-        options: Parsed options.
-
-    Raises:
-        InputError: If an option or the input is invalid.
-    """
+    """Runs the selected command and returns its exit code."""
     if options.seed is not None and not 0 <= options.seed < 2**31:
         raise InputError(f"Expected a seed from 0 to before 2**31. Received: --seed {options.seed}.")
     commands = {
@@ -36,9 +29,5 @@ def run(options: argparse.Namespace) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command. Invalid input gives one line on stderr and exit code 2.
-
-    Args:
-        arguments: Arguments of the command. None uses those of the process.
-    """
+    """Runs the command; None uses the arguments of the process. Invalid input gives one line on stderr and exit code 2."""
     return run_command(lambda: run(parse(arguments)), "interrupted; what was finished is kept")

@@ -19,15 +19,7 @@ if TYPE_CHECKING:
 
 
 def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
-    """Calls a function for each channel and returns the exit code. A channel that fails does not stop the others.
-
-    Args:
-        channels: Names of the channels.
-        work: Function of a channel's name.
-
-    Raises:
-        InputError: If there is only one channel and it fails.
-    """
+    """Calls a function for each channel and returns the exit code. If one of several channels fails, the others go on."""
     channels, failed = list(channels), {}
     for channel in channels:
         try:
@@ -40,31 +32,19 @@ def for_each(channels: Iterable[str], work: Callable[[str], None]) -> int:
 
 
 def tell_failed(failed: dict[str, str]) -> int:
-    """Prints one line on stderr for each failed channel and returns the exit code.
-
-    Args:
-        failed: The reason of each failure, by the channel's name.
-    """
+    """Prints one line on stderr for each failed channel, with the reason, and returns the exit code."""
     for channel, reason in failed.items():
         print(f"error: {printable(channel)}: {' '.join(reason.splitlines())}", file=sys.stderr)
     return 2 if failed else 0
 
 
-def refuse_without_coarse(options: argparse.Namespace, *names: str) -> None:
-    """Refuses options that have a meaning only with `--coarse`.
-
-    Args:
-        options: Parsed options, without `--coarse`.
-        *names: Names of the options.
-
-    Raises:
-        InputError: If one of them is given.
-    """
+def refuse_without(options: argparse.Namespace, partner: str, *names: str) -> None:
+    """Refuses options that have a meaning only with another one, which is not given."""
     for name in names:
-        if getattr(options, name) not in (None, []):
+        if getattr(options, name) not in (None, [], False):
             word = name.removesuffix("_s").replace("_", "-")
             raise InputError(
-                f"Expected --{word} only together with --coarse. Received: --{word} without it. Leave it out, or give --coarse."
+                f"Expected --{word} only together with --{partner}. Received: --{word} without it. Leave it out, or give --{partner}."
             )
 
 
@@ -74,32 +54,24 @@ def counted(number: int, noun: str) -> str:
 
 
 def cleaning_options(options: argparse.Namespace, min_part: int, labelled: str = "keep") -> "Cleaning":
-    """Returns the settings of reading and cleaning given by the options.
+    """Returns the settings of reading and cleaning given by the options of a command that reads telemetry or runs.
 
     Args:
-        options: Parsed options of a command that reads telemetry or runs.
+        options: Parsed options.
         min_part: Minimum length of a part in samples.
         labelled: Treatment of rows that are labelled anomalous.
     """
     from enhsim_tf.telemetry.cleaning.clean import Cleaning
 
     bad = "drop" if options.drop_bad else "refuse"
+    same = "label_column series_column value_column no_header decimal time_format timezone max_fill fill".split()
     return Cleaning(
-        **{
-            name: getattr(options, name)
-            for name in ("label_column", "series_column", "value_column", "no_header")
-            if hasattr(options, name)
-        },
+        **{name: getattr(options, name) for name in same if hasattr(options, name)},
         interval_s=getattr(options, "interval", None),
-        decimal=getattr(options, "decimal", None),
         labelled=labelled,
-        time_format=options.time_format,
         missing_values=tuple(value for values in options.missing_values for value in values.split(",")),
-        timezone=options.timezone,
         on_bad_times=bad,
         on_bad_values=bad,
-        max_fill=options.max_fill,
-        fill=options.fill,
         min_part=min_part,
     )
 
@@ -111,9 +83,6 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
         out: The value of `--out`: a file for one channel, or a folder that gets one file per channel.
         channels: Names of the channels.
         suffixes: Allowed file extensions; the first is used for files in a folder.
-
-    Raises:
-        InputError: If one file is given for several channels, or if a file cannot be written.
     """
     from enhsim_tf.common.atomic_files import make_folder
     from enhsim_tf.simulator.model_folder import folder_of
@@ -137,15 +106,7 @@ def output_paths(out: Path, channels: Iterable[str], suffixes: tuple[str, ...]) 
 
 
 def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str]) -> None:
-    """Checks that no output file is an input file.
-
-    Args:
-        paths: Output files.
-        source: The input, one or several files; it may be no file at all.
-
-    Raises:
-        InputError: If one is.
-    """
+    """Checks that no output file is an input file. The source is one or several files, or no file at all."""
     for path in paths:
         for each in [source] if isinstance(source, str) else source:
             if path.exists() and os.path.exists(each) and path.samefile(each):
@@ -153,19 +114,9 @@ def refuse_same_file(paths: Iterable[Path], source: str | Sequence[str]) -> None
 
 
 def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict[str, dict[str, str]]:
-    """Finds the channels of a source for each model, and says which columns have none.
+    """Returns, for each model whose channels a source has, the name in the source of each of its channels; says which columns are left.
 
     A single channel and a single model of one channel match even if their names differ.
-
-    Args:
-        series: Names of the channels of the source.
-        models: Folder of each model by its name.
-
-    Returns:
-        For each model whose channels the source has, the name in the source of each of its channels.
-
-    Raises:
-        InputError: If the source has the channels of no model.
     """
     from enhsim_tf.simulator.model_folder import channels_of
 
@@ -188,19 +139,7 @@ def channels_by_model(series: Iterable[str], models: Mapping[str, Path]) -> dict
 def cleaned_channels(
     series: "Mapping[str, pd.Series]", names: Mapping[str, str], cleaning: "Cleaning"
 ) -> "tuple[Recording, dict[str, Cleaned]]":
-    """Cleans the channels of a model and brings them onto one clock.
-
-    Args:
-        series: Raw values of each channel of the source.
-        names: Name in the source of each channel of the model.
-        cleaning: Settings of the cleaning.
-
-    Returns:
-        The telemetry, and what was cleaned of each channel.
-
-    Raises:
-        InputError: If a channel cannot be used, or if the channels share too little time.
-    """
+    """Cleans the channels of a model, whose names in the source are given, brings them onto one clock, and returns what was cleaned."""
     from enhsim_tf.simulator.joint import join_channels
     from enhsim_tf.telemetry.cleaning.clean import clean
 
@@ -214,47 +153,8 @@ def cleaned_channels(
     return joined[0], cleaned
 
 
-def events_line(frame: "pd.DataFrame", path: Path) -> str:
-    """Says how many events the scores of a channel have, and how many are expected on nominal telemetry.
-
-    Args:
-        frame: Scores, as returned by `scoring.score`.
-        path: Path of the scores.
-    """
-    from enhsim_tf.simulator.scoring import events_path
-
-    number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
-    unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
-    return (
-        f"{counted(number, 'event')} in {events_path(path)}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "
-        f"(95 % interval {low:.3g} to {high:.3g})"
-    )
-
-
-def load(folder: Path) -> "EnhancedSimulator":
-    """Loads the simulator saved in a folder."""
-    from enhsim_tf.simulator.simulator import EnhancedSimulator
-
-    return EnhancedSimulator.load(folder)
-
-
-def run_for(
-    simulator: "EnhancedSimulator", source: str | Sequence[str] | None, options: argparse.Namespace, cleaning: "Cleaning"
-) -> "Recording | None":
-    """Reads the coarse run that a simulator needs: the commands of the telemetry's own file, or the recorded run of `--coarse`.
-
-    Args:
-        simulator: The simulator.
-        source: The source of the telemetry.
-        options: Parsed options.
-        cleaning: Settings of the cleaning of the telemetry.
-
-    Returns:
-        The run; None for square waves.
-
-    Raises:
-        InputError: If `--coarse` is missing, or given for square waves.
-    """
+def run_for(simulator: "EnhancedSimulator", options: argparse.Namespace, cleaning: "Cleaning") -> "Recording | None":
+    """Reads the coarse run that a simulator needs: the commands of the telemetry's own file, or the run of `--coarse`; None for waves."""
     if not simulator.is_run_model:
         if options.coarse is not None:
             simulator.recorded_runs()
@@ -266,9 +166,11 @@ def run_for(
         from enhsim_tf.coarse_simulator.commands import CommandTraces
         from enhsim_tf.telemetry.commands import read_commands
 
-        found = read_commands(source)
+        found = read_commands(options.source)
         if found is None:
-            raise InputError(f"Expected an array with commands, as in the fit. Received: {source}, which has none. Give such an array.")
+            raise InputError(
+                f"Expected an array with commands, as in the fit. Received: {options.source}, which has none. Give such an array."
+            )
         return CommandTraces.from_config(commands).recording(found)
     if options.coarse is None:
         raise InputError(

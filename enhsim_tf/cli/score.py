@@ -10,9 +10,7 @@ from enhsim_tf.cli.options import (
     cleaned_channels,
     cleaning_options,
     counted,
-    events_line,
     for_each,
-    load,
     output_paths,
     refuse_same_file,
     run_for,
@@ -27,11 +25,7 @@ if TYPE_CHECKING:
 
 
 def run_score(options: argparse.Namespace) -> int:
-    """Scores the channels of the source with their simulators and returns the exit code.
-
-    Args:
-        options: Parsed options of `score`.
-    """
+    """Scores the channels of the source with their simulators and returns the exit code."""
     from enhsim_tf.detection.registry import RESIDUAL, all_detectors, option_name
     from enhsim_tf.simulator.options import ScoreOptions
 
@@ -41,6 +35,7 @@ def run_score(options: argparse.Namespace) -> int:
     cleaning = cleaning_options(options, 2)
     from enhsim_tf.simulator.model_folder import models_of
     from enhsim_tf.simulator.scoring import events_path, events_table, score, write_scores
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
     from enhsim_tf.telemetry.cleaning.report import lines_of
     from enhsim_tf.telemetry.sources import read_source
 
@@ -54,8 +49,8 @@ def run_score(options: argparse.Namespace) -> int:
 
     def write(model: str) -> None:
         telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
-        simulator = load(models[model])
-        run = run_for(simulator, options.source, options, cleaning)
+        simulator = EnhancedSimulator.load(models[model])
+        run = run_for(simulator, options, cleaning)
         frame = score(simulator, telemetry, run, chosen)
         write_scores(paths[model], frame)
         if options.figure:
@@ -82,6 +77,8 @@ def run_score(options: argparse.Namespace) -> int:
 
 
 def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", path: Path) -> list[str]:
+    from enhsim_tf.simulator.scoring import events_path
+
     name, trained, lines = spoken(simulator.channels), simulator.trained, []
     if not trained.get("keeps_promise", True):
         lines.append(
@@ -100,4 +97,10 @@ def _said(frame: "pd.DataFrame", simulator: "EnhancedSimulator", path: Path) -> 
     if "out_of_range" in frame:
         outside = float((frame["out_of_range"] > 1).sum())
         line += f"; {outside / max(scored, 1):.1%} outside the training range" if outside else ""
-    return [*lines, f"{line}; in {path}", f"{name}: {events_line(frame, path)}"]
+    number, (expected, low, high) = len(frame.attrs["events"]), frame.attrs["false_alarms_per_day"]
+    unit = "day" if hasattr(frame.index, "tz") else "86,400 samples"
+    events = (
+        f"{counted(number, 'event')} in {events_path(path)}; on generated nominal telemetry {expected:.3g} false alarms per {unit} "
+        f"(95 % interval {low:.3g} to {high:.3g})"
+    )
+    return [*lines, f"{line}; in {path}", f"{name}: {events}"]

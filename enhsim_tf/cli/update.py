@@ -5,17 +5,13 @@ import json
 import os
 from pathlib import Path
 
-from enhsim_tf.cli.options import channels_by_model, cleaned_channels, cleaning_options, for_each, load, run_for
+from enhsim_tf.cli.options import channels_by_model, cleaned_channels, cleaning_options, for_each, run_for
 from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
 
 def run_update(options: argparse.Namespace) -> int:
-    """Updates the simulators of the channels of the source and returns the exit code.
-
-    Args:
-        options: Parsed options of `update`.
-    """
+    """Updates the simulators of the channels of the source and returns the exit code."""
     from enhsim_tf.common.atomic_files import make_folder, replace_folder, write_json
     from enhsim_tf.simulator.model_folder import folder_of, models_of, refuse_foreign
     from enhsim_tf.simulator.options import FitOptions
@@ -38,14 +34,15 @@ def run_update(options: argparse.Namespace) -> int:
                 f"Expected --out without a model of {printable(model)}, because update keeps the old one. Received: {folder}. "
                 "Give another --out, or --replace."
             )
+    from enhsim_tf.simulator.simulator import EnhancedSimulator
     from enhsim_tf.simulator.updating import update
 
     found = {}
 
     def write(model: str) -> None:
         telemetry, cleaned = cleaned_channels(series, channels[model], cleaning)
-        simulator = load(models[model])
-        run = run_for(simulator, options.source, options, cleaning)
+        simulator = EnhancedSimulator.load(models[model])
+        run = run_for(simulator, options, cleaning)
         updated, report = update(simulator, telemetry, run, options.held_out, options.seed)
         make_folder(out)
         kept = {"update": report.to_dict(), "cleaning": {name: each.report.to_dict() for name, each in cleaned.items()}}

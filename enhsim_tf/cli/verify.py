@@ -1,4 +1,4 @@
-"""`python -m enhsim_tf verify`: verifies a large data set."""
+"""`enhsim-tf verify`: verifies a large data set."""
 
 import argparse
 
@@ -6,11 +6,14 @@ from enhsim_tf.common.console import tell
 
 
 def run_verify(options: argparse.Namespace) -> int:
-    """Verifies a large data set against its manifest and returns the exit code.
+    """Verifies a large data set against its manifest, prints one line for each problem, and returns the exit code."""
+    from enhsim_tf.datasets.folder import find_problems, read_manifest
 
-    Args:
-        options: Parsed options of `verify`.
-    """
-    from enhsim_tf.datasets.generate import verify
-
-    return verify(options.folder, tell)
+    code = 0
+    for line in find_problems(options.folder):
+        tell(line)
+        code = 2
+    if not code:
+        settings = read_manifest(options.folder)["settings"]
+        tell(f"{settings['windows']:,} windows in {-(-settings['windows'] // settings['shard']):,} shards, all intact")
+    return code

@@ -12,22 +12,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from enhsim_tf.common.atomic_files import remove_leftovers
 from enhsim_tf.common.console import progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.parallel import engines
-from enhsim_tf.datasets.folder import (
-    MANIFEST,
-    check_folder,
-    find_problems,
-    finish_manifest,
-    is_intact,
-    locked,
-    open_journal,
-    read_manifest,
-    read_records,
-    remove_temporary_files,
-    start_manifest,
-)
+from enhsim_tf.datasets.folder import JOURNAL, MANIFEST, check_folder, is_intact, locked, open_journal, read_records, write_manifest
 from enhsim_tf.datasets.plan import Plan
 from enhsim_tf.datasets.shard import Record, ShardMaker, shard_file
 
@@ -43,9 +32,6 @@ def generate_data_set(
         workers: Number of worker processes. None uses one per CPU.
         engine: How workers are run: `local` or `ray`.
         tell: Function that is called with each line of output.
-
-    Raises:
-        InputError: If the folder contains something else, another run writes to it, or it is not writable.
     """
     out = Path(out)
     if out.suffix == ".parquet":
@@ -54,11 +40,11 @@ def generate_data_set(
     try:
         with locked(out):
             check_folder(out, plan)  # again, now that no other run can change the folder
-            remove_temporary_files(out)
+            remove_leftovers(out)
             try:
                 _generate(out, plan, workers, engine, tell)
             finally:
-                remove_temporary_files(out)
+                remove_leftovers(out)
     except BrokenPipeError:  # the reader of the output has closed the pipe
         raise
     except OSError as error:
@@ -66,7 +52,8 @@ def generate_data_set(
 
 
 def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Callable[[str], None]) -> None:
-    start_manifest(out, plan)
+    if not (out / MANIFEST).exists():
+        write_manifest(out, plan)
     began, quiet = time.monotonic(), not sys.stderr.isatty()
     recorded = read_records(out)
     records: dict[int, Record] = {}
@@ -82,44 +69,22 @@ def _generate(out: Path, plan: Plan, workers: int | None, engine: str, tell: Cal
     running = engines.run(engine, ShardMaker(plan, out), missing, workers)  # starts no worker if no shard is missing
     with bar, open_journal(out) as write, contextlib.closing(running):
         for record in running:
-            before = recorded.get(record.shard, record)
+            name, before = shard_file(record.shard), recorded.get(record.shard, record)
             if before.sha256 != record.sha256 and before.rows == record.rows:
                 raise InputError(
-                    f"Expected {shard_file(record.shard)} to match its record in {out}. Received: other bytes, because this machine computes "
-                    f"different results or the record is damaged. Remove {MANIFEST} and run the same command again to generate all shards."
+                    f"Expected {name} to match its record in {out}. Received: other bytes, because this machine computes "
+                    f"different results or the record is damaged. Remove the folder, or give another --out, and run the same command again."
                 )
-            if not (out / shard_file(record.shard)).is_file():
+            if not (out / name).is_file():
                 raise InputError(
-                    f"Expected {shard_file(record.shard)} in {out} after it was written. Received: no such file, because another machine wrote it elsewhere. "
+                    f"Expected {name} in {out} after it was written. Received: no such file, because another machine wrote it elsewhere. "
                     "Give an --out that all machines share."
                 )
             write(record)
             records[record.shard] = record
             bar.update(record.rows)
-    finish_manifest(out, plan, records)
+    write_manifest(out, plan, records)
+    (out / JOURNAL).unlink(missing_ok=True)
     made, seconds = plan.num_windows - kept, time.monotonic() - began
     rate = f", {made:,} of them now, {made / seconds:,.0f} a second" if made else ""
     tell(f"{plan.num_windows:,} windows of {plan.window} samples in {plan.num_shards:,} shards in {out}{rate}")
-
-
-def verify(folder: str | os.PathLike, tell: Callable[[str], None] = print) -> int:
-    """Verifies a finished data set and prints one line for each problem.
-
-    Args:
-        folder: Folder of the data set.
-        tell: Function that is called with each line of output.
-
-    Returns:
-        The exit code: 0 if there is no problem, otherwise 2.
-
-    Raises:
-        InputError: If the folder is not a data set, or if its manifest is damaged.
-    """
-    num_problems = 0
-    for line in find_problems(folder):
-        num_problems += 1
-        tell(line)
-    if not num_problems:
-        settings = read_manifest(Path(folder))["settings"]
-        tell(f"{settings['windows']:,} windows in {-(-settings['windows'] // settings['shard']):,} shards, all intact")
-    return 2 if num_problems else 0

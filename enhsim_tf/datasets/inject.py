@@ -1,34 +1,38 @@
-"""Makes a labelled test set without a simulator, by adding anomalies to a user's own nominal telemetry."""
+"""Makes a labelled test set without a simulator, by adding anomalies to a user's own nominal telemetry.
+
+Most kinds of anomaly change one channel. Those of `JOINT_KINDS` need several: three leave the values of every channel as usual and change
+how channels move together, and one is a fault that acts on all of them.
+"""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.label_columns import label_samples
-from enhsim_tf.datasets.labelled_windows import parse_length
-from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_place
+from enhsim_tf.datasets.label_columns import series_table
+from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_length, parse_place
 from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.detection.injection import Anomaly, check_kind, estimate_noise_sd, inject_anomalies
+from enhsim_tf.detection.injection import Anomaly, check_kind, draw_begin, estimate_noise_sd, inject_anomalies
 from enhsim_tf.telemetry.series import Telemetry
 
 if TYPE_CHECKING:
     import pandas as pd
 
+JOINT_KINDS = ("another_time", "delay", "lost_coupling", "common_shift")
 _MOST = 10_000  # anomalies in a channel
 
 
 @dataclasses.dataclass(frozen=True)
 class InjectOptions:
-    """Settings of `inject_channel`.
+    """Settings of `inject_channel` and `inject_joint`.
 
     Args:
-        kinds: Kinds of the anomalies whose places are drawn, keys of `anomalies.INJECTIONS`. They are used in turn.
+        kinds: Kinds of the anomalies whose places are drawn, of `anomalies.INJECTIONS` or of `JOINT_KINDS`. They are used in turn.
         severity: Least and greatest severity, in units of the standard deviation of the noise. Each anomaly draws its own.
-        length: Least and greatest length, in the form of `labelled_windows.parse_length`: samples, or a time such as `10min`. Each
-            anomaly draws its own.
+        length: Least and greatest length: samples, or a time such as `10min`. Each anomaly draws its own.
         number: Number of anomalies whose places are drawn. None: one of each kind.
         at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
             is not given.
@@ -37,7 +41,7 @@ class InjectOptions:
         seed: Random seed. Each channel draws from its own generator, which depends on the seed and the name of the channel.
 
     Raises:
-        InputError: If a kind is unknown or a number is out of range.
+        InputError: If a kind is unknown, a number is out of range, or options contradict each other.
     """
 
     kinds: Sequence[str] = ()
@@ -49,9 +53,21 @@ class InjectOptions:
     noise_sd: float | None = None
     seed: int = 0
 
+    @property
+    def is_joint(self) -> bool:
+        """Whether the anomalies are those of several channels."""
+        return bool(set(self.kinds) & set(JOINT_KINDS))
+
     def __post_init__(self):
         low, high = self.severity
-        for kind in self.kinds:
+        if self.is_joint and set(self.kinds) - set(JOINT_KINDS):
+            kinds = ", ".join(self.kinds)
+            raise InputError(f"Expected kinds among {', '.join(JOINT_KINDS)}. Received: {kinds}. Inject other kinds on their own.")
+        if self.is_joint and (self.at or self.noise_sd is not None):
+            raise InputError(
+                f"Expected drawn places and the estimated noise with {self.kinds[0]}. Received: --at or --noise-sd. Leave it out."
+            )
+        for kind in () if self.is_joint else self.kinds:
             check_kind(kind, low)
         if not (0 <= low <= high and (high < np.inf or low == high)):
             raise InputError(f"Expected severities from 0 on, the least first. Received: {low:g}:{high:g}.")
@@ -84,10 +100,6 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.Da
     Raises:
         InputError: If anomalies overlap, do not fit or change no sample, or if the noise of the channel cannot be estimated.
     """
-    import pandas as pd
-
-    from enhsim_tf.telemetry.pandas_series import to_series
-
     rng = np.random.default_rng([options.seed, *parts[0].name.encode()])
     values, interval_s = [part.values for part in parts], parts[0].interval_s
     noise_sd = estimate_noise_sd(values) if options.noise_sd is None else options.noise_sd
@@ -96,7 +108,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.Da
             f"Expected telemetry with noise, whose standard deviation is the unit of severity. Received: {parts[0].name}, in which every "
             "second difference is zero. Give the standard deviation with --noise-sd."
         )
-    index = pd.concat([to_series(part) for part in parts]).index
+    index = _index_of(parts)
     shortest, longest = length_limits(options.length, interval_s)
     number = (len(options.kinds) if options.number is None else options.number) if options.kinds else 0
     drawn = [
@@ -110,7 +122,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.Da
     gap = max([length for *_, length in drawn], default=0) if options.gap is None else options.gap
     changed, mask, anomalies = inject_anomalies(values, given, drawn, noise_sd, gap, rng)
     events = [(each.kind, each.severity, each.begin, each.end) for each in anomalies]
-    frame = pd.DataFrame({"value": changed, **label_samples(mask, events)}, index=index)
+    frame = series_table(changed[:, None], mask[:, None], [parts[0].name], events, index)
     frame.attrs.update(noise_sd=noise_sd, anomalies=anomalies)
     return frame
 
@@ -119,3 +131,86 @@ def _checked_place(text: str) -> Place:
     place = parse_place(text)
     check_kind(place.kind, 1.0 if place.severity is None else place.severity)
     return place
+
+
+def _index_of(parts: Sequence[Telemetry]) -> "pd.Index":
+    import pandas as pd
+
+    from enhsim_tf.telemetry.pandas_series import to_series
+
+    return pd.concat([to_series(part) for part in parts]).index
+
+
+def join_injected(frames: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
+    """Joins the tables of `inject_channel` to one with the values of all channels and `mask`, which marks what is changed in any of them."""
+    import pandas as pd
+
+    (first, frame), *others = frames.items()
+    for name, other in others:
+        if not other.index.equals(frame.index):
+            raise InputError(
+                f"Expected channels with the same times for one TimeEval file. Received: {first!r} with {len(frame):,} and {name!r} with "
+                f"{len(other):,} samples, or other times. Give a folder as --out, which gets one file per channel."
+            )
+    values = {name if others else "value": each["value"] for name, each in frames.items()}
+    return pd.DataFrame(values | {"mask": np.any([each["mask"] for each in frames.values()], axis=0)}, index=frame.index)
+
+
+def inject_joint(telemetry: Recording, options: InjectOptions) -> "pd.DataFrame":
+    """Injects anomalies of `JOINT_KINDS` into nominal telemetry of several channels, at drawn places.
+
+    Args:
+        telemetry: Nominal telemetry.
+        options: Which anomalies are injected. The severity is that of `common_shift`.
+
+    Returns:
+        A data frame with one row per sample: the channels, `label_columns.LABELS` and `mask NAME` for each channel. Samples that are not marked
+        keep their values. `frame.attrs["anomalies"]` has kind, severity, begin, end and channel of each.
+    """
+    from enhsim_tf.simulator.joint import telemetry_of
+
+    kinds = options.kinds
+    if len(telemetry.columns) < 2:
+        raise InputError(f"Expected several channels for {', '.join(kinds)}. Received: {telemetry.name} alone. Give more columns.")
+    rng, (shortest, longest) = np.random.default_rng([options.seed, 61]), length_limits(options.length, telemetry.interval_s)
+    values = np.concatenate([part.values for part in telemetry.parts]).astype(np.float32)
+    edges = np.cumsum([0, *map(len, telemetry.parts)]).tolist()
+    bounds, nominal = list(zip(edges[:-1], edges[1:], strict=True)), values.copy()
+    noise_sd = np.array([estimate_noise_sd([part.values[:, channel] for part in telemetry.parts]) for channel in range(values.shape[1])])
+    drawn = [(kinds[each % len(kinds)], int(rng.integers(shortest, longest + 1))) for each in range(options.number or len(kinds))]
+    found: list[tuple[str, float, int, int, str]] = []
+    for kind, length in sorted(drawn, key=lambda each: -each[1]):
+        taken = [(begin, end) for _, _, begin, end, _ in found]
+        begin = draw_begin(bounds, taken, length, longest if options.gap is None else options.gap, rng)
+        is_common, here = kind == "common_shift", slice(begin, begin + length)
+        degree = draw_between(options.severity, rng) if is_common else 1.0
+        channel = int(rng.integers(values.shape[1]))
+        if is_common:
+            values[here] += (degree * noise_sd).astype(np.float32)
+        else:
+            values[here, channel] = _changed(nominal, kind, here, channel, bounds, rng)
+        found.append((kind, degree, begin, begin + length, "all" if is_common else telemetry.columns[channel]))
+    found.sort(key=lambda each: each[2])
+    index = _index_of(telemetry_of(telemetry))
+    frame = series_table(values, values != nominal, telemetry.columns, [each[:4] for each in found], index)
+    frame.attrs["anomalies"] = found
+    return frame
+
+
+def _changed(
+    nominal: np.ndarray, kind: str, here: slice, channel: int, bounds: Sequence[tuple[int, int]], rng: np.random.Generator
+) -> np.ndarray:
+    """Returns what a channel becomes during an anomaly of one channel."""
+    length = here.stop - here.start
+    if kind == "delay":
+        start = next(low for low, high in bounds if low <= here.start < high)
+        return nominal[np.maximum(np.arange(here.start, here.stop) - max(1, length // 4), start), channel]
+    first = draw_begin(bounds, [(here.start, here.stop)], length, 0, rng)
+    away = slice(first, first + length)
+    if kind == "another_time":
+        return nominal[away, channel]
+    others = np.delete(nominal, channel, axis=1).astype(np.float64)
+    centred = others - others.mean(axis=0)
+    weights, *_ = np.linalg.lstsq(centred, nominal[:, channel] - nominal[:, channel].mean(dtype=np.float64), rcond=None)
+    follows = centred @ weights
+    return (nominal[here, channel] - follows[here] + follows[away]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The label columns of every labelled table of this package: series, windows, shards and injected telemetry.
+"""The labelled tables of this package: windows, series and injected telemetry. Beside the values, each has the columns `LABELS`.
 
 - `scenario`: `nominal`, or the degraded mode or kind of anomaly
 - `severity`: severity of the mode or anomaly; 0 if nominal
@@ -8,12 +8,14 @@
 
 In a table of one row per sample, the labels describe the event that changed the sample, and samples are counted by rows of the
 table. In a table of one row per window, the labels describe the window. Its samples are counted from 0, and `mask` is a list.
+Values are in the column `value` or `window`. Of several channels, each has its own columns (`NAME` or `window NAME`, and `mask NAME`), and
+`mask` marks the samples that are changed in any of them.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,105 +31,111 @@ LABELS = ("scenario", "severity", "onset", "end", "mask")
 _TIMEEVAL = ("timestamp", "is_anomaly")  # the first and the last column of TimeEval's files
 
 
-def label_samples(mask: np.ndarray, events: Sequence[tuple[str, float, int, int]]) -> dict[str, "pd.Categorical | pd.Series | np.ndarray"]:
-    """Makes the label columns of a series.
+def series_table(
+    values: np.ndarray, masks: np.ndarray, channels: Sequence[str], events: Sequence[tuple[str, float, int, int]], index: "pd.Index"
+) -> "pd.DataFrame":
+    """Makes the labelled table of a series. A sample that was not changed is labelled nominal, also within an event.
 
     Args:
-        mask: Boolean array that marks the changed samples, shape `(samples,)`.
+        values: float32 of shape `(samples, channels)`.
+        masks: Which samples were changed, same shape.
+        channels: Names of the channels.
         events: Name, severity, onset and end of each event, in the order of time and without overlaps.
-
-    Returns:
-        The columns `LABELS`, each with one value per sample. A sample that was not changed is labelled nominal, also within an
-        event, such as a sample between two spikes.
+        index: Index of the table.
     """
     import pandas as pd
 
+    mask, is_joint = masks.any(axis=1), len(channels) > 1
     names = list(dict.fromkeys([NOMINAL, *(name for name, *_ in events)]))
     codes, severity, onset, end = (np.zeros(len(mask), dtype) for dtype in (np.int8, np.float32, np.int32, np.int32))
     for name, degree, first, last in events:
         inside = slice(first, last)
         codes[inside], severity[inside], onset[inside], end[inside] = names.index(name), degree, first, last
-    hidden = ~mask
-    codes[hidden], severity[hidden] = 0, 0
-    return {
+    codes[~mask], severity[~mask] = 0, 0
+    columns = {
+        **dict(zip(channels if is_joint else ["value"], values.T, strict=True)),
         "scenario": pd.Categorical.from_codes(codes, names),
         "severity": severity,
-        "onset": pd.arrays.IntegerArray(onset, hidden.copy()),
-        "end": pd.arrays.IntegerArray(end, hidden.copy()),
+        "onset": pd.arrays.IntegerArray(onset, ~mask),
+        "end": pd.arrays.IntegerArray(end, ~mask),
         "mask": mask,
+        **{f"mask {name}": masks[:, number] for number, name in enumerate(channels) if is_joint},
     }
+    return pd.DataFrame(columns, index=index)
 
 
-def label_windows(names: Sequence[str], severities: Sequence[float], masks: np.ndarray) -> dict[str, "pa.Array"]:
-    """Makes the label columns of windows.
+def window_table(
+    windows: np.ndarray, masks: np.ndarray, channels: Sequence[str], names: Sequence[str], severities: Sequence[float]
+) -> "pa.Table":
+    """Makes the labelled table of windows. A window in which no sample was changed is labelled nominal, with the severity 0.
 
     Args:
+        windows: float32 of shape `(windows, samples, channels)`.
+        masks: Which samples were changed, same shape.
+        channels: Names of the channels.
         names: Scenario of each window, which may be nominal.
         severities: Severity of the scenario of each window.
-        masks: Boolean array that marks the changed samples, shape `(windows, samples)`.
-
-    Returns:
-        The columns `LABELS`. A window in which the scenario changed no sample is labelled nominal, with the severity 0.
     """
     import pyarrow as pa
 
-    changed, samples = masks.any(axis=1), masks.shape[1]
-    onset, end = masks.argmax(axis=1), samples - masks[:, ::-1].argmax(axis=1)
-    return {
+    def lists(values: np.ndarray) -> "pa.Array":
+        return pa.FixedSizeListArray.from_arrays(pa.array(np.ascontiguousarray(values).ravel()), values.shape[1])
+
+    mask, samples, is_joint = masks.any(axis=2), windows.shape[1], len(channels) > 1
+    changed, onset, end = mask.any(axis=1), mask.argmax(axis=1), samples - mask[:, ::-1].argmax(axis=1)
+    columns = {f"window {name}" if is_joint else "window": lists(windows[:, :, number]) for number, name in enumerate(channels)}
+    columns |= {
         "scenario": pa.array(np.where(changed, np.asarray(names, object), NOMINAL), pa.string()),
         "severity": pa.array(np.where(changed, severities, 0).astype(np.float32)),
         "onset": pa.array(onset.astype(np.int32), mask=~changed),
         "end": pa.array(end.astype(np.int32), mask=~changed),
-        "mask": pa.FixedSizeListArray.from_arrays(pa.array(masks.ravel()), samples),
+        "mask": lists(mask),
     }
+    return pa.table(columns | {f"mask {name}": lists(masks[:, :, number]) for number, name in enumerate(channels) if is_joint})
 
 
-def write_table(path: str | os.PathLike, frame: "pd.DataFrame") -> None:
-    """Writes a labelled table to a `.csv` or `.parquet` file. Its index becomes the first column.
+def window_schema(window: int, channels: Sequence[str]) -> "pa.Schema":
+    """Returns the schema of `window_table` for windows of some length."""
+    none = np.zeros((0, window, len(channels)), np.float32)
+    return window_table(none, none > 0, channels, [], []).schema
+
+
+def parquet_options(schema: "pa.Schema") -> dict[str, Any]:
+    """Returns the options with which Parquet files of windows are written.
+
+    Values store bytes of equal significance together: signs and exponents compress well, noisy mantissas do not.
+    """
+    texts = [name for name in ("scenario", "model") if name in schema.names]
+    encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in schema.names if name.startswith("window")}
+    return {"compression": "zstd", "use_dictionary": texts, "column_encoding": encoding, "write_statistics": texts}
+
+
+def write_table(path: str | os.PathLike, frame: "pd.DataFrame", timeeval: Sequence[str] = ()) -> None:
+    """Writes a labelled series to a `.csv` or `.parquet` file, which appears only when it is complete.
 
     Args:
-        path: Path of the file, which appears only when it is complete.
-        frame: The table.
+        path: Path of the file.
+        frame: The table. Its index becomes the first column.
+        timeeval: Names of the channels, to write TimeEval's CSV (Wenig, Schmidl and Papenbrock, VLDB 2022) instead: `timestamp`, in UTC
+            without a zone, or sample numbers or seconds; one column per channel; and `is_anomaly`, which is 1 where the mask is true.
+
+    Raises:
+        InputError: If a channel has the name of another column of TimeEval's CSV.
     """
-    make_folder(Path(path).parent)
+    import pandas as pd
+
     table = frame.reset_index()
     table.attrs = {}  # Parquet would store them as JSON
+    if timeeval:
+        taken = [name for name in timeeval if name in _TIMEEVAL]
+        if taken:
+            raise InputError(f"Expected channels that are not named {' or '.join(_TIMEEVAL)}. Received: {taken[0]!r}. Rename it.")
+        times = frame.index.tz_convert(None) if isinstance(frame.index, pd.DatetimeIndex) else frame.index
+        values = {name: frame["value" if len(timeeval) == 1 else name].to_numpy() for name in timeeval}
+        table = pd.DataFrame({"timestamp": times, **values, "is_anomaly": frame["mask"].to_numpy().astype(np.int8)})
+    make_folder(Path(path).parent)
     with replace_file(path) as temporary:
         if Path(path).suffix == ".csv":
             table.to_csv(temporary, index=False)
         else:
             table.to_parquet(temporary, compression="zstd", index=False)
-
-
-def write_timeeval(path: str | os.PathLike, channels: Mapping[str, "pd.DataFrame"]) -> None:
-    """Writes labelled series as CSV in the layout of TimeEval: `timestamp`, one column per channel, `is_anomaly`.
-
-    Times are in UTC and without a zone. A series without times has its sample numbers or seconds in `timestamp`. `is_anomaly` is
-    1 where the mask of any channel is true. TimeEval (Wenig, Schmidl and Papenbrock, VLDB 2022), aeon and others read such files.
-
-    Args:
-        path: Path of the file, which appears only when it is complete.
-        channels: Labelled series with the columns `value` and `mask`, by the name of the channel. Their indexes are equal.
-
-    Raises:
-        InputError: If the indexes differ, or if a channel has the name of one of the other columns.
-    """
-    import pandas as pd
-
-    (first, frame), *others = channels.items()
-    for name in channels:
-        if name in _TIMEEVAL:
-            raise InputError(f"Expected channels that are not named {' or '.join(_TIMEEVAL)}. Received: {name!r}. Rename it.")
-    for name, other in others:
-        if not other.index.equals(frame.index):
-            raise InputError(
-                f"Expected channels with the same times for one TimeEval file. Received: {first!r} with {len(frame):,} and {name!r} with "
-                f"{len(other):,} samples, or other times. Give a folder as --out, which gets one file per channel."
-            )
-    times = frame.index.tz_convert(None) if isinstance(frame.index, pd.DatetimeIndex) else frame.index
-    columns = {"timestamp": times, **{name: each["value"].to_numpy() for name, each in channels.items()}}
-    marked = np.any([each["mask"].to_numpy() for each in channels.values()], axis=0)
-    table = pd.DataFrame({**columns, "is_anomaly": marked.astype(np.int8)})
-    make_folder(Path(path).parent)
-    with replace_file(path) as temporary:
-        table.to_csv(temporary, index=False)

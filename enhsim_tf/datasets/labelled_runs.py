@@ -1,16 +1,16 @@
 """Labelled training data from recorded runs: copies of a run with different noise, whose rows keep the labels of the run."""
 
+import dataclasses
 import os
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+from enhsim_tf.telemetry.series import nanoseconds
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -22,7 +22,7 @@ _OWN = ("copy", "time", "sample", "value", "out_of_range")
 
 
 def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recording, num_copies: int, seed: int = 0) -> int:
-    """Writes copies of a run to one Parquet file, copy by copy. The file appears only when it is complete.
+    """Writes copies of a run to one Parquet file, which appears only when it is complete, and returns the number of rows.
 
     The columns are `copy` (from 0), `time` (of the telemetry, that is with the delay of the model; `sample` if the run has no
     times), `value` (of several channels, their names), `out_of_range` (above 1, the coarse run is outside the training range), and the carried columns of the run.
@@ -34,9 +34,6 @@ def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recor
         num_copies: Number of copies, each with another draw of noise.
         seed: Random seed of the noise.
 
-    Returns:
-        The number of rows.
-
     Raises:
         InputError: If the run cannot be enhanced, a carried column has the name of another column, or there are too many rows.
     """
@@ -47,25 +44,22 @@ def write_copies(path: str | os.PathLike, model: "EnhancedSimulator", run: Recor
     num_rows = num_copies * len(usable)
     if num_copies < 1 or num_rows > _MOST_ROWS:
         raise InputError(f"Expected 1 copy or more, and at most {_MOST_ROWS:,} rows. Received: {num_copies:,} copies, {num_rows:,} rows.")
-    shared = _shared_columns(model, usable)
+    time, others = _shared_columns(model, usable)
     names = ["value"] if len(model.channels) == 1 else list(model.channels)
-    metadata = {"interval_s": repr(model.interval_s), "channel": ", ".join(model.channels)}
-    order = ["copy", *(name for name in ("time", "sample") if name in shared), *names]
-    order += [name for name in shared if name not in order]
+    first = {"copy": pa.int32(), **{name: column.type for name, column in time.items()}, **dict.fromkeys(names, pa.float32())}
+    schema = pa.schema(first | {name: column.type for name, column in others.items()})
+    schema = schema.with_metadata({"interval_s": repr(model.interval_s), "channel": ", ".join(model.channels)})
     make_folder(Path(path).parent)
-    types = {"copy": pa.int32(), **dict.fromkeys(names, pa.float32())} | {name: column.type for name, column in shared.items()}
-    schema = pa.schema([(name, types[name]) for name in order]).with_metadata(metadata)
     with replace_file(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
         for number, parts in enumerate(model.generate_copies(usable, num_copies, seed)):
             values = np.concatenate(parts)
             own = {name: pa.array(np.ascontiguousarray(values[:, channel])) for channel, name in enumerate(names)}
-            columns: Mapping[str, Any] = {"copy": pa.array(np.full(len(values), number, np.int32))} | own | shared
-            writer.write_table(pa.table([columns[name] for name in order], schema=schema))
+            writer.write_table(pa.table({"copy": pa.array(np.full(len(values), number, np.int32)), **time, **own, **others}))
     return num_rows
 
 
-def _shared_columns(model: "EnhancedSimulator", usable: Recording) -> dict[str, "pa.Array"]:
-    """Returns the columns that are the same in every copy: times, score of the range, and what is carried."""
+def _shared_columns(model: "EnhancedSimulator", usable: Recording) -> "tuple[dict[str, pa.Array], dict[str, pa.Array]]":
+    """Returns the columns that are the same in every copy: the times, and the score of the range with what is carried."""
     import pandas as pd
     import pyarrow as pa
 
@@ -77,35 +71,24 @@ def _shared_columns(model: "EnhancedSimulator", usable: Recording) -> dict[str, 
         raise InputError(
             f"Expected other names than {', '.join(_OWN)} for the columns to be carried. Received: {taken[0]!r} in {usable.name}. Rename it."
         )
-    times = np.concatenate([nanoseconds(_clock(usable, number, model.alignment.delay_s)) for number in range(len(usable.parts))])
+    clocks = [usable.clock(part) for part in usable.parts]
+    delay_s = model.alignment.delay_s
+    times = np.concatenate([nanoseconds(dataclasses.replace(each, offset_s=each.offset_s + delay_s)) for each in clocks])
     has_time = usable.start is not None
-    columns = {"time": pa.array(times, pa.timestamp("ns", tz="UTC"))} if has_time else {"sample": pa.array(times // 10**9)}
-    columns["out_of_range"] = pa.array(np.concatenate([trusted.score_run(part.values) for part in usable.parts]))
+    time = {"time": pa.array(times, pa.timestamp("ns", tz="UTC"))} if has_time else {"sample": pa.array(times // 10**9)}
+    others = {"out_of_range": pa.array(np.concatenate([trusted.score_run(part.values) for part in usable.parts]))}
     for name in usable.parts[0].carried:
         cells = pd.concat([pd.Series(part.carried[name]).reset_index(drop=True) for part in usable.parts], ignore_index=True)
         try:
             column = pa.array(cells, from_pandas=True)
         except (pa.ArrowException, TypeError, ValueError):  # cells of several types, such as numbers and words
             column = pa.array([None if pd.isna(cell) else str(cell) for cell in cells.astype(object)], pa.string())
-        columns[name] = column
-    return columns
-
-
-def _clock(usable: Recording, number: int, delay_s: float) -> Telemetry:
-    part = usable.clock(usable.parts[number])
-    return Telemetry(part.values, part.interval_s, part.offset_s + delay_s, part.start, part.name)
+        others[name] = column
+    return time, others
 
 
 def coverage_lines(model: "EnhancedSimulator", run: Recording) -> list[str]:
-    """Says which share of a run the training range covers, as a whole and for each of its scenarios.
-
-    Args:
-        model: A simulator of recorded runs.
-        run: The run.
-
-    Returns:
-        Lines of text. The shares of scenarios are given if the run has a column `scenario` of at most 20 different values.
-    """
+    """Says which share of a run the training range covers, as a whole and for each of at most 20 values of its column `scenario`."""
     import pandas as pd
 
     from enhsim_tf.simulator.trusted_range import TrustedRange

@@ -1,89 +1,165 @@
-"""The mix of a large data set: which scenarios and models it has, and their shares."""
+"""The mix of a large data set, from the options or from a scenario file (docs/large_data_sets.md): scenarios, models and their shares."""
 
+import collections
 import dataclasses
-from collections.abc import Sequence
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
+import yaml
+from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError, WrapValidator, model_validator
+from pydantic.dataclasses import dataclass
+
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
 
 MOST_WINDOWS = 10**10
-MOST_SCENARIOS = 1_000
-MOST_MODELS = 20  # each worker holds all models in memory
-LATEST_ONSET = 0.999
+_LATEST_ONSET = 0.999
+_MAX_BYTES = 300_000  # a thousand scenarios with everything written out need 100,000
+_TOLERANCE = 1e-6  # of a sum of shares
 
 
-@dataclasses.dataclass(frozen=True)
+def _number(high: float) -> Any:
+    return Annotated[float, Strict(), Field(ge=0, le=high)]
+
+
+def _whole(least: int, most: int) -> Any:
+    return Annotated[int, Strict(), Field(ge=least, le=most)]
+
+
+def _range(high: float) -> Any:
+    return Annotated[tuple[_number(high), _number(high)], WrapValidator(_pair)]
+
+
+def _pair(found: Any, check: Callable[[Any], tuple[float, float]]) -> tuple[float, float]:
+    low, high = check(tuple(found) if isinstance(found, list | tuple) else (found, found))
+    if low > high:
+        raise ValueError("a range has the lower number first")
+    return low, high
+
+
+_Text = Annotated[str, Strict(), Field(min_length=1, max_length=200)]
+_KEYS = ConfigDict(extra="forbid")
+
+
+@dataclass(config=_KEYS)
 class ScenarioShare:
-    """A degraded mode and its share of the windows.
+    """A degraded mode and its share of all windows. Severity and onset of each window are drawn between two limits."""
 
-    Args:
-        mode: One of `degraded.MODES`.
-        share: Share of all windows.
-        severity: Minimum and maximum severity. The severity of each window is drawn uniformly between them.
-        onset: Minimum and maximum onset as a share of the window, drawn in the same way.
-        channel: The only channel that is degraded; None for all.
-    """
-
-    mode: str
-    share: float
-    severity: tuple[float, float]
-    onset: tuple[float, float]
-    channel: str | None = None
+    mode: Literal[tuple(MODES)]
+    share: _number(1)
+    severity: _range(1)
+    onset: _range(_LATEST_ONSET) = (0.25, 0.25)  # as a share of the window
+    channel: _Text | None = None  # the only one that is degraded
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(config=_KEYS)
 class ModelShare:
-    """A model and its share of the windows.
+    """A model and its share of all windows."""
 
-    Args:
-        name: Label of its windows in the column `model`.
-        folder: Folder of the model, relative to the folder of all models.
-        share: Share of all windows.
-    """
-
-    name: str
-    folder: str
-    share: float
+    folder: _Text  # relative to the folder of all models
+    name: _Text | None = None  # label of its windows; its folder, if none is given
+    share: _number(1) | None = None  # the same as that of the other models, if none is given
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(config=_KEYS)
 class Mix:
-    """The composition of a data set: scenarios and models with their shares.
+    """The composition of a data set. All shares of windows add up to one, and so do those of models."""
 
-    Args:
-        nominal: Share of nominal windows. This share and those of the scenarios add up to one.
-        scenarios: The degraded modes.
-        models: The models. If empty, the options of the command select the models.
-        num_windows: Total number of windows, or None if the file does not contain it.
-        seed: Master seed of the data set, or None.
-        shard: Windows per file, or None for the default.
-    """
+    nominal: _number(1) | None = None  # share of nominal windows: what the scenarios leave, if none is given
+    scenarios: Annotated[tuple[ScenarioShare, ...], Field(max_length=1_000)] = ()
+    models: Annotated[tuple[ModelShare, ...], Field(max_length=20)] = ()  # each worker holds all models in memory
+    windows: _whole(1, MOST_WINDOWS) | None = None
+    seed: _whole(0, 2**31 - 1) | None = None
+    shard: _whole(1, 10_000_000) | None = None  # windows per file
 
-    nominal: float = 1.0
-    scenarios: tuple[ScenarioShare, ...] = ()
-    models: tuple[ModelShare, ...] = ()
-    num_windows: int | None = None
-    seed: int | None = None
-    shard: int | None = None
+    @model_validator(mode="after")
+    def _go_together(self) -> Self:
+        shared = math.fsum(scenario.share for scenario in self.scenarios)
+        self.nominal = max(0.0, 1 - shared) if self.nominal is None else self.nominal
+        for model in self.models:
+            model.name, model.share = model.name or model.folder, 1 / len(self.models) if model.share is None else model.share
+        if len({model.name for model in self.models}) < len(self.models):
+            raise ValueError("no two models have the same name")
+        totals = [self.nominal + shared, *([math.fsum(model.share for model in self.models)] if self.models else [])]
+        if any(abs(total - 1) > _TOLERANCE for total in totals):
+            raise ValueError(f"nominal and the shares of the scenarios, and the shares of the models, add up to 1, not to {totals}")
+        return self
 
 
 def make_mix(scenarios: Sequence[Degraded], nominal_share: float) -> Mix:
-    """Makes the mix given by the options `--scenario` and `--nominal-share`. All scenarios get equal shares.
-
-    Args:
-        scenarios: Degraded modes. If there is none, all windows are nominal.
-        nominal_share: Share of nominal windows.
-
-    Raises:
-        InputError: If the share or an onset is out of range.
-    """
-    if not 0 <= nominal_share <= 1:
-        raise InputError(f"Expected a nominal share from 0 to 1. Received: {nominal_share}.")
+    """Makes the mix of the options `--scenario` and `--nominal-share`. All scenarios get equal shares; without any, all is nominal."""
     if not scenarios:
         return Mix()
-    late = [each.onset for each in scenarios if each.onset > LATEST_ONSET]
-    if late:
-        raise InputError(f"Expected an onset from 0 to {LATEST_ONSET}. Received: {late[0]}. Choose an earlier one.")
     share = (1 - nominal_share) / len(scenarios)
-    parts = [ScenarioShare(each.mode, share, (each.severity,) * 2, (each.onset,) * 2, each.channel) for each in scenarios]
-    return Mix(nominal_share, tuple(parts))
+    parts = [dataclasses.asdict(each) | {"share": share} for each in scenarios]
+    return _mix_of({"nominal": nominal_share, "scenarios": parts}, "the options")
+
+
+def read_mix(path: str | os.PathLike) -> Mix:
+    """Reads and validates a scenario file.
+
+    Raises:
+        InputError: If the file cannot be read or has invalid content. The message names the place, with list entries counted from 1.
+    """
+    path = Path(path)
+    return _mix_of(_load(path), repr(path.name))
+
+
+def _mix_of(content: Any, source: str) -> Mix:
+    try:
+        return TypeAdapter(Mix).validate_python(content)
+    except ValidationError as found:
+        error = found.errors(include_url=False)[0]
+        place = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
+        reason = "no such key" if error["type"] == "unexpected_keyword_argument" else error["msg"].removeprefix("Value error, ")
+        raise InputError(
+            f"Expected {place or 'keys and values'} as in docs/large_data_sets.md: {reason}. Received: {_shown(error['input'])} in {source}."
+        ) from None
+
+
+def _shown(received: Any) -> str:
+    try:
+        return repr(received)[:80]
+    except ValueError:  # Python does not format integers of more than 4,300 digits
+        return "a number with thousands of digits"
+
+
+class _Loader(yaml.SafeLoader):
+    """The safe loader, without aliases, which multiply what is written, and repeated keys. A key without a value is left out."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.MarkedYAMLError(problem="an alias", problem_mark=self.peek_event().start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        counts = collections.Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+        twice = [key for key, count in counts.items() if count > 1]
+        if twice:
+            raise yaml.MarkedYAMLError(problem=f"the key {twice[0][:40]!r} stands there twice", problem_mark=node.start_mark)
+        return {key: value for key, value in super().construct_mapping(node, deep).items() if value is not None}
+
+
+def _load(path: Path) -> Any:
+    """What a YAML file holds."""
+    try:
+        with open(path, "rb") as file:
+            raw = file.read(_MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # a path with a zero byte raises ValueError
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"Expected a scenario file that can be read. Received: {str(path)!r} ({reason}).") from None
+    if len(raw) > _MAX_BYTES:
+        raise InputError(f"Expected a scenario file of at most {_MAX_BYTES:,} bytes. Received: a longer one, {path.name!r}.")
+    try:
+        return yaml.load(raw.decode("utf-8-sig"), _Loader)
+    except yaml.MarkedYAMLError as error:
+        where = "" if error.problem_mark is None else f" in line {error.problem_mark.line + 1}"
+        reason = f"{' '.join(str(error.problem or error.context).split())[:120]}{where}"
+    except RecursionError:
+        reason = "too deeply nested entries"
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # an invalid date or number, or bytes that are not UTF-8
+        reason = " ".join(str(error).split())[:120]
+    raise InputError(f"Expected plain YAML, as in docs/large_data_sets.md. Received: {path.name!r}, {reason}.")

@@ -1,4 +1,4 @@
-"""Parses the places of events on the command line, `KIND[:SEVERITY]@BEGIN/LENGTH`, and the ranges of their random lengths."""
+"""Parses scenarios, lengths, times and places of events, as they are written on the command line."""
 
 import dataclasses
 import re
@@ -7,29 +7,78 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.labelled_windows import parse_length, parse_start
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_FORM = re.compile(r"(?P<kind>\w+)(?::(?P<severity>[^@]+))?@(?P<begin>.+)/(?P<length>[^/]+)")
+_PLACE = re.compile(r"(?P<kind>\w+)(?::(?P<severity>[^@]+))?@(?P<begin>.+)/(?P<length>[^/]+)")
+_SECONDS = {"d": 86_400, "h": 3_600, "min": 60, "s": 1, "ms": 1e-3}
+_LENGTH = re.compile(
+    r"(?P<number>[0-9]{1,15}(?:\.[0-9]{1,15}(?= *[a-z]))?) *(?P<unit>d|h|min|s|ms)?"
+)  # decimals need a unit, because a number of samples is a whole number
+_MOST_SAMPLES = 20_000_000  # of a series, which is held in memory
+
+
+def parse_scenario(text: str) -> Degraded:
+    """Parses `mode:severity` or `mode:severity:onset`, such as `stuck:0.5`, with `CHANNEL=` before it for one of several channels."""
+    channel, is_named, rest = text.rpartition("=")
+    mode, *numbers = rest.split(":")
+    if mode not in MODES or not 1 <= len(numbers) <= 2:
+        raise InputError(f"Expected mode:severity or mode:severity:onset, mode one of {', '.join(MODES)}. Received: {text!r}.")
+    try:
+        values = [float(number) for number in numbers]
+    except ValueError:
+        raise InputError(f"Expected numbers from 0 to 1 after the mode. Received: {text!r}. Write for example {mode}:0.5.") from None
+    return Degraded(mode, *values, channel=channel if is_named else None)
+
+
+def parse_length(text: str) -> tuple[float, str]:
+    """Parses a length such as `1d`, `6h`, `90min`, `30s`, or a number of samples.
+
+    Returns:
+        The number and its unit, for example `(86400.0, "s")` or `(5000.0, "samples")`.
+    """
+    found = _LENGTH.fullmatch(text.casefold())
+    length = float(found["number"]) if found else 0.0
+    if not 0 < length < float("inf"):
+        raise InputError(f"Expected a length such as 1d, 6h, 90min, 30s or 5000 (samples). Received: {text[:80]!r}.")
+    return (length * _SECONDS[found["unit"]], "s") if found["unit"] else (length, "samples")
+
+
+def parse_num_samples(text: str, interval_s: float) -> int:
+    """Converts a length in the form of `parse_length` to a number of samples, one every `interval_s` seconds."""
+    length, unit = parse_length(str(text))
+    samples = length if unit == "samples" else length / interval_s
+    if not 0.5 <= samples <= _MOST_SAMPLES:
+        raise InputError(
+            f"Expected a length of 1 to {_MOST_SAMPLES:,} samples, one every {interval_s:g} s. Received: {str(text)[:80]!r}, which is "
+            f"{samples:,.10g} samples. Write several series, each with its own --seed."
+        )
+    return max(1, round(samples))
+
+
+def parse_start(start: "str | pd.Timestamp") -> "pd.Timestamp":
+    """Converts a time such as `2024-01-01`, from 1700 to 2200, to UTC. A time without a time zone is taken as UTC."""
+    import pandas as pd
+
+    try:
+        time = pd.to_datetime(start, utc=True, format="ISO8601").as_unit("ns")
+    except (ValueError, TypeError, OverflowError, AttributeError):
+        time = pd.NaT
+    if pd.isna(time) or not 1700 <= time.year <= 2200:
+        raise InputError(f"Expected a start such as 2024-01-01 or 2024-01-01T12:00, from 1700 to 2200. Received: {str(start)[:80]!r}.")
+    return time
 
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """An event at a given place.
-
-    Args:
-        kind: Kind of the event.
-        severity: Severity, or None if it is not given.
-        begin: A sample number, or a time.
-        length: A length in the form of `labelled_windows.parse_length`.
-    """
+    """An event at a given place, as it was written."""
 
     kind: str
     severity: float | None
-    begin: str
+    begin: str  # a sample number, or a time
     length: str
 
     def samples(self, index: "pd.Index", interval_s: float) -> tuple[int, int]:
@@ -38,11 +87,8 @@ class Place:
         Args:
             index: Index of the series: times in UTC, or anything else for a series without times.
             interval_s: Sampling interval in seconds.
-
-        Raises:
-            InputError: If the place is a time outside the series, or in a gap of it.
         """
-        length = num_samples(self.length, interval_s)
+        length = parse_num_samples(self.length, interval_s)
         if self.begin.isdecimal():
             return int(self.begin[:12]), length
         time = parse_start(self.begin)
@@ -57,20 +103,18 @@ class Place:
         return first, length
 
 
-def parse_place(text: str) -> Place:
-    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`. The kind itself is not checked.
+def parse_place(text: str, severity: float | None = None) -> Place:
+    """Parses `KIND[:SEVERITY]@BEGIN/LENGTH`, such as `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`. The kind is not checked.
 
     Args:
-        text: The place, for example `ramp:4@5000/200` or `stuck:1@2024-01-05T12:00/2h`.
-
-    Raises:
-        InputError: If the text has another form.
+        text: The place.
+        severity: What a place without a severity gets.
     """
-    found = _FORM.fullmatch(text)
+    found = _PLACE.fullmatch(text)
     try:
         if not found:
             raise ValueError
-        severity = float(found["severity"]) if found["severity"] else None
+        severity = float(found["severity"]) if found["severity"] else severity
     except ValueError:
         raise InputError(
             f"Expected KIND[:SEVERITY]@BEGIN/LENGTH, such as stuck:1@5000/200 or drift:0.5@2024-01-05T12:00/2h. Received: {text[:80]!r}."
@@ -79,49 +123,16 @@ def parse_place(text: str) -> Place:
     return Place(found["kind"], severity, found["begin"], found["length"])
 
 
-def num_samples(text: str, interval_s: float) -> int:
-    """Converts the length of an event to samples, at least one.
-
-    Args:
-        text: The length, in the form of `labelled_windows.parse_length`.
-        interval_s: Sampling interval in seconds.
-
-    Raises:
-        InputError: If the length is less than a sample.
-    """
-    length, unit = parse_length(str(text))
-    samples = length if unit == "samples" else length / interval_s
-    if not 0.5 <= samples < 1e9:
-        raise InputError(f"Expected a length of at least one sample, one every {interval_s:g} s. Received: {str(text)[:40]!r}.")
-    return max(1, round(samples))
-
-
 def length_limits(limits: Sequence[str], interval_s: float) -> tuple[int, int]:
-    """Converts the least and the greatest length of events to samples.
-
-    Args:
-        limits: The two lengths.
-        interval_s: Sampling interval in seconds.
-
-    Raises:
-        InputError: If the first is greater than the second.
-    """
-    shortest, longest = (num_samples(text, interval_s) for text in limits)
+    """Converts the least and the greatest length of events to samples, one every `interval_s` seconds."""
+    shortest, longest = (parse_num_samples(text, interval_s) for text in limits)
     if shortest > longest:
         raise InputError(f"Expected lengths with the least first. Received: {limits[0]}:{limits[1]}.")
     return shortest, longest
 
 
 def split_limits(name: str, text: str) -> tuple[str, str]:
-    """Splits `least:greatest`; one value stands for both.
-
-    Args:
-        name: Name of the option, for messages.
-        text: Its value.
-
-    Raises:
-        InputError: If there are more than two values, or an empty one.
-    """
+    """Splits `least:greatest`, the value of the option `--name`; one value stands for both."""
     least, colon, greatest = text.partition(":")
     if not least or (colon and not greatest) or ":" in greatest:
         raise InputError(f"Expected --{name} as one value, or as least:greatest. Received: --{name} {text}.")

@@ -1,6 +1,6 @@
 """The plan of a large data set: its scenarios, the checksums of its models, its seed, and its division into shards.
 
-A plan is made without loading a network. Two plans with the same `key` describe the same shards.
+A plan is made without loading a network. Two plans with the same `plan_key` describe the same shards.
 """
 
 import dataclasses
@@ -15,7 +15,7 @@ from typing import Any
 
 from enhsim_tf.common.atomic_files import sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.mix import MOST_MODELS, MOST_WINDOWS, Mix, ModelShare
+from enhsim_tf.datasets.mix import MOST_WINDOWS, Mix
 from enhsim_tf.simulator.model_folder import channels_of
 from enhsim_tf.simulator.saving import MANIFEST, check_saved, settings_of
 
@@ -29,22 +29,12 @@ _VERSIONS = ("numpy", "pyarrow")
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """A saved simulator that a plan uses.
+    """A saved simulator that a plan uses."""
 
-    Args:
-        name: Label of its windows in the column `model`.
-        folder: Folder of the simulator. The content of the data set does not depend on it.
-        share: Share of the windows that it generates.
-        sha256: Checksum of its manifest, which contains the checksums of its files.
-        window: Length of a window in samples.
-        interval_s: Sampling interval in seconds.
-        channels: Names of the channels.
-    """
-
-    name: str
-    folder: Path
-    share: float
-    sha256: str
+    name: str  # label of its windows in the column `model`
+    folder: Path  # the content of the data set does not depend on it
+    share: float  # of the windows
+    sha256: str  # of its manifest, which contains the checksums of its files
     window: int
     interval_s: float
     channels: tuple[str, ...] = ("",)
@@ -52,27 +42,16 @@ class Model:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """The plan of a data set.
-
-    Args:
-        mix: Scenarios and their shares.
-        models: The simulators; all have the same window length and sampling interval.
-        seed: Master seed of the data set.
-        num_windows: Total number of windows.
-        shard: Windows per shard; the last shard may have fewer.
-
-    Raises:
-        InputError: If the models have different windows or intervals, or if a number is out of range.
-    """
+    """The plan of a data set. Its models have the same window length, sampling interval and channels."""
 
     mix: Mix
     models: tuple[Model, ...]
     seed: int
     num_windows: int
-    shard: int
+    shard: int  # windows per shard; the last one may have fewer
 
     def __post_init__(self):
-        first = self.models[0]
+        first, most = self.models[0], MOST_VALUES // (self.window * len(self.channels))
         for model in self.models:
             if model.window != first.window or abs(model.interval_s / first.interval_s - 1) > 1e-3:
                 raise InputError(
@@ -83,16 +62,14 @@ class Plan:
                 raise InputError(
                     f"Expected models of the same channels: {', '.join(first.channels)[:120]}. Received: {', '.join(model.channels)[:120]} in {model.name!r}."
                 )
-            for channel in (part.channel for part in self.mix.scenarios):
-                if channel not in (None, *model.channels):
-                    raise InputError(
-                        f"Expected a channel, one of: {', '.join(model.channels)[:200]}. Received: {channel!r} in the scenario."
-                    )
+            other = [part.channel for part in self.mix.scenarios if part.channel not in (None, *model.channels)]
+            if other:
+                names = ", ".join(model.channels)[:200]
+                raise InputError(f"Expected a channel, one of: {names}. Received: {other[0]!r} in the scenario.")
         if not 1 <= self.num_windows <= MOST_WINDOWS:
             raise InputError(f"Expected 1 to {MOST_WINDOWS:,} windows. Received: {self.num_windows:,}.")
-        values = self.window * len(self.channels)
-        if self.shard * values > MOST_VALUES:
-            raise InputError(f"Expected shards of at most {MOST_VALUES // values:,} such windows. Received: shard: {self.shard:,}.")
+        if self.shard > most:
+            raise InputError(f"Expected shards of at most {most:,} such windows. Received: shard: {self.shard:,}.")
         if self.num_shards > _MOST_SHARDS:
             raise InputError(f"Expected at most {_MOST_SHARDS:,} shards. Received: {self.num_shards:,}. Make them larger with `shard:`.")
 
@@ -117,40 +94,29 @@ class Plan:
 
     def settings(self) -> dict[str, Any]:
         """Returns all settings on which the content depends, in plain JSON types. Paths are not among them."""
-        return {
+        scenarios = [dataclasses.asdict(part) for part in self.mix.scenarios]
+        settings = {
             "windows": self.num_windows,
             "shard": self.shard,
             "seed": self.seed,
             "window": self.window,
             "interval_s": self.models[0].interval_s,
-            **({"channels": list(self.channels)} if len(self.channels) > 1 else {}),
+            **({"channels": self.channels} if len(self.channels) > 1 else {}),
             "nominal": self.mix.nominal,
-            "scenarios": [
-                {"mode": part.mode, "share": part.share, "severity": list(part.severity), "onset": list(part.onset)}
-                | ({} if part.channel is None else {"channel": part.channel})
-                for part in self.mix.scenarios
-            ],
+            "scenarios": [{name: value for name, value in each.items() if value is not None} for each in scenarios],
             "models": [{"name": model.name, "share": model.share, "sha256": model.sha256} for model in self.models],
             "versions": {name: importlib.metadata.version(name) for name in _VERSIONS},
         }
-
-    @property
-    def key(self) -> str:
-        """Checksum of all settings except the number of windows. Shards with equal key, number and size have identical bytes."""
-        return plan_key(self.settings())
+        return json.loads(json.dumps(settings))
 
 
 def plan_key(settings: Mapping[str, Any]) -> str:
-    """Returns the `Plan.key` for given settings.
-
-    Args:
-        settings: Settings of a plan, as returned by `Plan.settings`.
-    """
+    """Returns the checksum of all settings except the number of windows. Shards with equal key, number and size have identical bytes."""
     others = {name: value for name, value in settings.items() if name != "windows"}
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
 
-def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) -> Plan:
+def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int, name: str | None = None) -> Plan:
     """Makes the plan of a data set.
 
     Args:
@@ -158,34 +124,27 @@ def make_plan(mix: Mix, folder: str | os.PathLike, seed: int, num_windows: int) 
         folder: Folder of the models.
         seed: Master seed of the data set.
         num_windows: Total number of windows.
-
-    Raises:
-        InputError: If a model is missing or damaged, if the models have different windows or intervals, or if scenarios are asked of a model
-            of recorded runs, which are nominal.
+        name: Name of the only model. None: that of its folder.
     """
     folder = Path(folder).absolute()
-    shares = mix.models or (ModelShare(folder.name, ".", 1.0),)
-    if len(shares) > MOST_MODELS:
-        raise InputError(f"Expected at most {MOST_MODELS} models. Received: {len(shares)}.")
-    models = tuple(_model_of(share, folder / share.folder, mix) for share in shares)
-    return Plan(
-        mix, models, seed, num_windows, mix.shard or max(1, min(_SHARD, _SHARD_VALUES // (models[0].window * len(models[0].channels))))
-    )
+    models = tuple(_model_of(each.name, folder / each.folder, each.share, mix) for each in mix.models)
+    models = models or (_model_of(name or folder.name, folder, 1.0, mix),)
+    values = models[0].window * len(models[0].channels)
+    return Plan(mix, models, seed, num_windows, mix.shard or max(1, min(_SHARD, _SHARD_VALUES // values)))
 
 
-def _model_of(share: ModelShare, folder: Path, mix: Mix) -> Model:
+def _model_of(name: str, folder: Path, share: float, mix: Mix) -> Model:
     """Reads checksum, window length and interval of a saved simulator without loading its networks."""
     check_saved(folder)
     settings = settings_of(folder)
-    interval_s, window = settings.get("interval_s"), settings.get("window")
+    interval_s, window, alignment = (settings.get(each) for each in ("interval_s", "window", "alignment"))
     if type(interval_s) not in (int, float) or not 0 < interval_s <= sys.float_info.max:
         raise InputError(f"Expected interval_s to be a number above 0 in settings.json. Received: {str(interval_s)[:40]} in {folder}.")
     if type(window) is not int or not 2 <= window <= MOST_VALUES:
         raise InputError(f"Expected window to be a number of samples in settings.json. Received: {str(window)[:40]} in {folder}.")
-    alignment = settings.get("alignment")
     if mix.scenarios and isinstance(alignment, dict) and alignment.get("kind") == "runs":
         raise InputError(
             f"Expected no scenario of a model of recorded runs. Received: {mix.scenarios[0].mode} for {folder}. "
             "Simulate it and give the run: generate MODEL_DIR --coarse fault_run.csv."
         )
-    return Model(share.name, folder, share.share, sha256(folder / MANIFEST), window, float(interval_s), channels_of(folder))
+    return Model(name, folder, share, sha256(folder / MANIFEST), window, float(interval_s), channels_of(folder))

@@ -2,8 +2,6 @@
 
 Each shard has a random seed of its own, and enhancers always compute batches of the same size. The bytes of a shard are
 therefore the same in every worker and in every order of generation.
-
-The columns are those of `labelled_windows.window_columns`, and `model` if the plan has several models.
 """
 
 import functools
@@ -17,9 +15,8 @@ import numpy as np
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.atomic_files import replace_file, sha256
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.datasets.label_columns import NOMINAL
-from enhsim_tf.datasets.labelled_windows import value_names, window_arrays, window_columns
-from enhsim_tf.datasets.plan import FORMAT, Plan
+from enhsim_tf.datasets.label_columns import NOMINAL, parquet_options, window_schema, window_table
+from enhsim_tf.datasets.plan import FORMAT, Plan, plan_key
 from enhsim_tf.simulator.saving import MANIFEST
 
 if TYPE_CHECKING:
@@ -34,7 +31,7 @@ _ROW_GROUP = 4_096
 
 
 class Record(NamedTuple):
-    """The record of a finished shard: its number, its number of windows, and the checksum of its file."""
+    """A finished shard: its number, its number of windows, and the checksum of its file."""
 
     shard: int
     rows: int
@@ -42,7 +39,7 @@ class Record(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Properties of the windows of a shard, as arrays with one value per window. Scenario 0 is nominal."""
+    """Properties of the windows of a shard, one value per window. Scenario 0 is nominal."""
 
     model: np.ndarray
     scenario: np.ndarray
@@ -53,23 +50,12 @@ class Rows(NamedTuple):
 
 
 def shard_file(shard: int) -> str:
-    """Returns the file name of a shard.
-
-    Args:
-        shard: Number of the shard.
-    """
+    """Returns the file name of a shard."""
     return f"shard-{shard:06d}.parquet"
 
 
 def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.random.Generator]:
-    """Draws the properties of the windows of a shard.
-
-    The number of windows of each scenario and of each model is its share of the shard, rounded up or down at random. The
-    order of the windows is random.
-
-    Args:
-        plan: Plan of the data set.
-        shard: Number of the shard.
+    """Draws the properties of the windows of a shard. Each scenario and each model has its share of the windows, rounded at random.
 
     Returns:
         The properties, the random generator of the scenarios, and the random generator of the noise.
@@ -86,32 +72,18 @@ def draw_rows(plan: Plan, shard: int) -> tuple[Rows, np.random.Generator, np.ran
 
 
 def systematic(shares: Sequence[float], num_rows: int, rng: np.random.Generator) -> np.ndarray:
-    """Assigns rows to categories by systematic sampling: each category gets its share of the rows, rounded up or down.
-
-    Args:
-        shares: Share of each category; the shares add up to one.
-        num_rows: Number of rows.
-        rng: Random generator.
-
-    Returns:
-        The category of each row in random order, integers of shape `(num_rows,)`.
-    """
+    """Assigns rows to categories in random order by systematic sampling: each category gets its share, rounded up or down."""
     edges = np.cumsum(shares) / np.sum(shares)
     points = (rng.random() + np.arange(num_rows)) / num_rows
     return rng.permutation(np.minimum(np.searchsorted(edges, points, side="right"), np.flatnonzero(shares)[-1]))
 
 
 def make_windows(plan: Plan, simulators: Sequence["EnhancedSimulator"], shard: int) -> tuple[np.ndarray, np.ndarray, Rows]:
-    """Generates the windows of a shard.
-
-    Args:
-        plan: Plan of the data set.
-        simulators: The loaded models of the plan.
-        shard: Number of the shard.
+    """Generates the windows of a shard with the loaded models of the plan.
 
     Returns:
-        The windows, float32 of shape `(rows, samples, channels)`, a boolean array of the same shape that marks the samples that a scenario
-        has changed, and the properties of the windows.
+        The windows, float32 of shape `(rows, samples, channels)`, a boolean array of the same shape that marks the changed samples, and the
+        properties of the windows.
     """
     rows, happening, noise = draw_rows(plan, shard)
     shape = (len(rows.start), plan.window, len(plan.channels))
@@ -141,41 +113,27 @@ def _scenario_of(plan: Plan, rows: Rows, row: int) -> Degraded | None:
     return Degraded(part.mode, float(rows.severity[row]), float(rows.onset[row]), part.channel)
 
 
-def shard_schema(settings: dict[str, Any], key: str) -> "pa.Schema":
-    """Returns the Parquet schema of the shards of a data set, with format, key and sampling interval in its metadata.
-
-    Args:
-        settings: Settings of the plan, as returned by `Plan.settings`.
-        key: Key of the plan.
-    """
+def shard_schema(settings: dict[str, Any]) -> "pa.Schema":
+    """Returns the Parquet schema of the shards of a data set, from `Plan.settings`."""
     import pyarrow as pa
 
-    columns = window_columns(settings["window"], settings.get("channels", ("",)))
+    schema = window_schema(settings["window"], settings.get("channels", ("",)))
     if len(settings["models"]) > 1:
-        columns["model"] = pa.string()
-    return pa.schema(columns).with_metadata({"format": FORMAT, "settings": key, "interval_s": repr(settings["interval_s"])})
+        schema = schema.append(pa.field("model", pa.string()))
+    return schema.with_metadata({"format": FORMAT, "settings": plan_key(settings), "interval_s": repr(settings["interval_s"])})
 
 
 class ShardMaker:
-    """Generates shards in one process. The models are loaded once; each call writes one file.
-
-    Args:
-        plan: Plan of the data set.
-        folder: Output folder.
-    """
+    """Generates shards in one process. The models are loaded once; each call writes one file to the folder."""
 
     def __init__(self, plan: Plan, folder: str | os.PathLike):
         self.plan, self.folder = plan, Path(folder).absolute()
-        self.settings, self.key = plan.settings(), plan.key  # computed on the main machine; workers on other machines must agree
+        self.settings = plan.settings()  # computed on the main machine; workers on other machines must agree
 
     @functools.cached_property
     def simulators(self) -> list["EnhancedSimulator"]:
-        """The loaded models of the plan.
-
-        Raises:
-            InputError: If a model is damaged or differs from that of the plan, or if this machine has other library versions.
-        """
-        if self.plan.key != self.key:
+        """The loaded models of the plan, if they are still the same, and the libraries of this machine too."""
+        if self.plan.settings() != self.settings:
             versions = ", ".join(f"{name} {version}" for name, version in self.settings["versions"].items())
             raise InputError(
                 f"Expected every machine to have {versions}. Received: other versions on {os.uname().nodename}. Install these."
@@ -190,34 +148,20 @@ class ShardMaker:
         return simulators
 
     def __call__(self, shard: int) -> Record:
-        """Generates a shard and writes its file atomically.
-
-        Args:
-            shard: Number of the shard.
-
-        Returns:
-            The record of the shard.
-
-        Raises:
-            InputError: If a model cannot be used, or if the file cannot be written.
-        """
+        """Generates a shard, writes its file atomically, and returns its record."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
         windows, masks, rows = make_windows(self.plan, self.simulators, shard)
         modes = np.array([NOMINAL, *(part.mode for part in self.plan.mix.scenarios)], object)
-        columns = window_arrays(windows, masks, modes[rows.scenario], rows.severity)
+        table, path = window_table(windows, masks, self.plan.channels, modes[rows.scenario], rows.severity), self.folder / shard_file(shard)
         if len(self.plan.models) > 1:
-            columns.append(pa.array(np.array([model.name for model in self.plan.models], object)[rows.model], pa.string()))
-        table = pa.table(columns, schema=shard_schema(self.settings, self.key))
-        names = [name for name in ("scenario", "model") if name in table.column_names]
-        # stores bytes of equal significance together: signs and exponents compress well, mantissas of noise do not
-        encoding = {f"{name}.list.element": "BYTE_STREAM_SPLIT" for name in value_names("window", self.plan.channels)}
-        options = {"use_dictionary": names, "column_encoding": encoding, "write_statistics": names}
-        path = self.folder / shard_file(shard)
+            names = np.array([model.name for model in self.plan.models], object)
+            table = table.append_column("model", pa.array(names[rows.model], pa.string()))
         try:
             with replace_file(path) as temporary:
-                pq.write_table(table, temporary, row_group_size=_ROW_GROUP, compression="zstd", **options)
+                options = parquet_options(table.schema)
+                pq.write_table(table.cast(shard_schema(self.settings)), temporary, row_group_size=_ROW_GROUP, **options)
                 return Record(shard, table.num_rows, sha256(temporary))
         except (OSError, pa.ArrowException) as error:
             reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:120]

@@ -16,8 +16,7 @@ import pytest
 from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
-from enhsim_tf.cli.options import channels_by_model, cleaning_options
-from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
+from enhsim_tf.cli.options import cleaning_options
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
@@ -25,6 +24,7 @@ from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.simulator import fit_many
 from enhsim_tf.simulator.model_folder import channels_of, models_of
 from enhsim_tf.simulator.options import FitOptions
+from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from tests.known_simulators import of_waves
 
@@ -67,7 +67,7 @@ def world(tmp_path_factory):
     pd.DataFrame({"note": ["a", "b"]}).to_csv(folder / "words.csv", index=False)
     table(50)[["utc", "volts"]].to_csv(folder / "short.csv", index=False)
     pd.DataFrame({"volts": np.ones(1_500), "amps": np.arange(1_500) % 2 * 0.0}).to_csv(folder / "still.csv", index=False)
-    np.save(folder / "volts.npy", table()["volts"])
+    (folder / "mix.yaml").write_text("windows: 10\nseed: 1\nmodels: [{folder: volts}]\n")
     for name in ("volts", "amps"):
         small(name).save(folder / "models" / name)
     small("volts").save(folder / "single" / "volts")
@@ -84,13 +84,53 @@ def files(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
+def coarse_run(num_samples=1_500, seed=0):
+    """A recorded run of somebody's own simulator."""
+    rng = np.random.default_rng(seed)
+    volts, watts = (np.convolve(each, np.hanning(12), "same") for each in rng.standard_normal((2, num_samples)))
+    times = pd.date_range("2024-01-01", periods=num_samples, freq="10s")
+    return pd.DataFrame({"utc": times, "volts": volts.round(4), "watts": (100 * watts).round(2)})
+
+
+def clean_celsius(run):
+    return 20 + 2 * run["volts"] + 0.01 * np.roll(run["watts"], 1)
+
+
+def telemetry_of(run, seed=1):
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(len(run))
+    return pd.DataFrame({"utc": run["utc"], "celsius": (clean_celsius(run) + noise).round(4)})
+
+
+def fault_run():
+    run, late = coarse_run(300, seed=5), np.arange(300) >= 100
+    run.loc[late, "watts"] *= 0.5
+    return run.assign(scenario=np.where(late, "weak", "nominal"), severity=0.5 * late, mask=late)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A read-only folder with telemetry, recorded runs, a simulator that was fitted to one, and what the fit said."""
+    folder, run = tmp_path_factory.mktemp("runs"), coarse_run()
+    frames = {"run": run, "old": telemetry_of(run), "fault": fault_run(), "new": telemetry_of(fault_run(), seed=9), "short": run.iloc[:20]}
+    for name, frame in (frames | {"later": run.assign(utc=run["utc"] + pd.Timedelta("400D"))}).items():
+        frame.to_csv(folder / f"{name}.csv", index=False)
+    chosen = ["--window", "32", "--num-windows", "300", "--noise", "residual-windows"]
+    ended = shell("fit", "old.csv", "--coarse", "run.csv", "--out", "models", *chosen, cwd=folder)
+    assert (ended.returncode, ended.stderr) == (0, ""), ended.stderr
+    (folder / "said.txt").write_text(ended.stdout)
+    return folder
+
+
 @pytest.fixture
-def told(world, tmp_path, monkeypatch, capfd):
+def told(world, tmp_path, monkeypatch, capfd, request):
     """Runs the command in this process and in a temporary folder; returns exit code, stdout and the lines of stderr."""
 
     def run(*arguments):
         monkeypatch.chdir(tmp_path)
-        code = main([str(argument).replace("WORLD", str(world)) for argument in arguments])
+        arguments = [str(argument).replace("WORLD", str(world)) for argument in arguments]
+        if any("RUNS" in argument for argument in arguments):
+            arguments = [argument.replace("RUNS", str(request.getfixturevalue("runs"))) for argument in arguments]
+        code = main(arguments)
         out, error = capfd.readouterr()
         return code, out, error.splitlines()
 
@@ -107,9 +147,7 @@ def shell(*arguments, cwd, **options):
 # help
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--help"], *([name, "--help"] for name in ("fit", "generate", "score", "update", "inject")), ["scrore"], []]
-)
+@pytest.mark.parametrize("arguments", [["--help"], ["score", "--help"], ["scrore"], []])
 def test_help_and_wrong_options_import_nothing_slow(arguments):
     script = (
         "import sys\nfrom enhsim_tf.__main__ import main\ncode = 0\n"
@@ -196,23 +234,6 @@ def test_generate_writes_training_data_with_a_fitted_simulator(fitted, told, tmp
     assert 10 < np.stack(frame["window"]).mean() < 30  # in the telemetry's unit
 
 
-def test_a_constant_level_has_a_range_too(told, tmp_path):
-    of_waves([ConstantLevel(20.0, 1.0)], 60, levels=np.array([[[20.0, 1.0]]])).save(tmp_path / "models" / "level")
-    code, out, errors = told(
-        "generate", "models", "--windows", 10, "--scenario", "drift:1", "--scenario", "gain_loss:1", "--out", "x.parquet"
-    )
-    assert (code, errors) == (0, []) and "drift at 1: 100% of such" in out and "gain_loss at 1: 0% of such" in out
-
-
-def test_generate_writes_a_series_with_times(fitted, told, tmp_path):
-    arguments = ["generate", fitted[0], "--continuous", "6h", "--start", "2025-01-01", "--scenario", "stuck:1:0.75", "--out", "day.parquet"]
-    code, out, errors = told(*arguments)
-    assert (code, errors) == (0, []) and "2,160 samples, one every 10 s" in out
-    frame = pd.read_parquet(tmp_path / "day.parquet")
-    assert (pd.DatetimeIndex(frame["time"]) == pd.date_range("2025-01-01", periods=2_160, freq="10s", tz="UTC")).all()
-    assert (frame["scenario"] == "stuck").any() and not frame["mask"][: 1_620 - 4].any()  # changes fade in over a sixteenth of a window
-
-
 def test_generate_writes_a_series_with_several_events(fitted, told, tmp_path):
     arguments = ["generate", fitted[0], "--continuous", "2000", "--scenario", "stuck:1", "--scenario", "drift:1", "--number", "3"]
     arguments += ["--length", "30:60", "--at", "gain_loss:1@2025-01-01T01:00/10min", "--start", "2025-01-01"]
@@ -283,28 +304,14 @@ def test_a_simulator_of_several_channels_has_one_file(told, tmp_path):
 
 
 def test_inject_writes_labelled_telemetry(told, tmp_path):
-    arguments = (
-        "inject",
-        "WORLD/one.csv",
-        "--kinds",
-        "all",
-        "--length",
-        "20:60",
-        "--at",
-        "level_shift:8@2024-01-01T02:00/5min",
-        "--seed",
-        3,
-    )
-    code, out, errors = told(*arguments, "--out", "labelled.parquet")
+    place = ["--at", "level_shift:8@2024-01-01T02:00/5min"]
+    code, out, errors = told("inject", "WORLD/one.csv", "--kinds", "all", "--length", "20:60", *place, "--seed", 3, "--out", "x.parquet")
     assert code == 0 and not errors and "9 anomalies" in out and "noise sd 0.19" in out
-    frame = pd.read_parquet(tmp_path / "labelled.parquet")
+    frame = pd.read_parquet(tmp_path / "x.parquet")
     assert list(frame) == ["time", "value", "scenario", "severity", "onset", "end", "mask"]
-    assert frame.loc[frame["severity"] == 8, "time"].min() == pd.Timestamp("2024-01-01T02:00Z") and set(frame["scenario"]) == {
-        "nominal",
-        *INJECTIONS,
-    }
-    nominal = table()["volts"].to_numpy(np.float32)
-    np.testing.assert_array_equal(frame["mask"], frame["value"].to_numpy() != nominal)
+    assert frame.loc[frame["severity"] == 8, "time"].min() == pd.Timestamp("2024-01-01T02:00Z")
+    assert set(frame["scenario"]) == {"nominal", *INJECTIONS}
+    np.testing.assert_array_equal(frame["mask"], frame["value"].to_numpy() != table()["volts"].to_numpy(np.float32))
 
 
 def test_inject_writes_one_timeeval_file_or_one_file_for_each_channel(told, tmp_path):
@@ -312,6 +319,9 @@ def test_inject_writes_one_timeeval_file_or_one_file_for_each_channel(told, tmp_
     assert code == 0 and not errors and list(pd.read_csv(tmp_path / "joint.csv")) == ["timestamp", "volts", "amps", "is_anomaly"]
     code, _, errors = told("inject", "WORLD/two.csv", "--kinds", "ramp", "--timeeval", "--out", "single")
     assert code == 0 and not errors and sorted(path.name for path in (tmp_path / "single").iterdir()) == ["amps.csv", "volts.csv"]
+    code, out, errors = told("inject", "WORLD/two.csv", "--kinds", "delay", "--out", "both.parquet")
+    assert code == 0 and not errors and "delay of " in out and "volts, amps: " in out
+    assert list(pd.read_parquet(tmp_path / "both.parquet"))[-2:] == ["mask volts", "mask amps"]
 
 
 def test_a_single_channel_and_a_single_simulator_match_whatever_their_names(told, tmp_path):
@@ -319,6 +329,8 @@ def test_a_single_channel_and_a_single_simulator_match_whatever_their_names(told
     code, out, errors = told(*command, "--false-alarm-rate", "1e-4")  # smaller than the generated windows support
     assert (code, errors) == (0, []) and "set to flag 0.1% of nominal samples" in out
     assert len(pd.read_parquet(tmp_path / "scores.parquet")) == 1_500
+    code, out, errors = told(*command[:3], "--detector", "limit-check", "--windows", 30, "--out", "scores.parquet")
+    assert (code, errors) == (0, []) and "left out: amps" in out
 
 
 def test_a_simulator_that_fails_does_not_stop_the_others(told, tmp_path):
@@ -338,22 +350,11 @@ def test_every_channel_that_cannot_be_fitted_is_reported_in_one_line(told, tmp_p
     assert not list((tmp_path / "models").iterdir())
 
 
-def test_channels_are_found_by_name_and_the_others_are_left_out(world, refused, capsys):
-    each, joint, single = (models_of(world / name) for name in ("models", "joint", "single"))
-    assert channels_by_model(["volts", "note"], each) == {"volts": {"volts": "volts"}}
-    assert "left out: note" in capsys.readouterr().out
-    assert channels_by_model(["amps", "note", "volts"], joint) == {"volts~amps": {"volts": "volts", "amps": "amps"}}
-    assert channels_by_model(["anything"], single) == {"volts": {"volts": "anything"}}
-    for names, models in ((["note", "other"], each), (["volts"], joint)):
-        with refused("volts", "amps", names[0]):
-            channels_by_model(names, models)
-
-
 def test_a_defect_that_one_channel_meets_is_reported_in_one_line(monkeypatch):
     monkeypatch.setattr(fit_many, "_cleaned", lambda *arguments: {}["defect"])
     outcome = fit_many.fit_or_say(fit_many.Job({"volts": None}, Path("x"), FitOptions(), Cleaning()))
-    assert "KeyError" in outcome.failed["volts"] and "'defect'" in outcome.failed["volts"] and not outcome.reports
-    assert len(outcome.failed["volts"].splitlines()) == 1
+    line = outcome.failed["volts"]
+    assert not outcome.reports and len(line.splitlines()) == 1 and "KeyError" in line and "'defect'" in line
 
 
 def test_several_sources_and_what_reading_takes_are_options():
@@ -362,6 +363,67 @@ def test_several_sources_and_what_reading_takes_are_options():
     chosen = cleaning_options(options, 3)
     assert options.source == ["a.csv", "b.csv"] and parse(["inject", "a.csv", "--out", "y"]).source == "a.csv"
     assert (chosen.missing_values, chosen.label_column, chosen.no_header) == (("-999.9", "9999"), ("x",), True)
+
+
+# a simulator of one's own
+
+COPIES = ["generate", "RUNS/models", "--coarse", "RUNS/fault.csv", "--out", "x.parquet"]
+
+
+def test_the_fit_reports_the_pairing_and_the_candidates(runs):
+    said = (runs / "said.txt").read_text()
+    assert "delay: none found" in said and "enhancers, error on held-out blocks" in said and "Used: ridge" in said
+    assert {path.name for path in (runs / "models" / "celsius").iterdir()} >= {"manifest.json", "report.json", "report.png", "arrays.npz"}
+
+
+def test_options_of_a_fit_with_a_run(told, tmp_path):
+    chosen = ["--enhancer", "level-and-gain", "--coarse-column", "volts", "--delay", "10", "--noise", "residual-windows", "--window", "32"]
+    code, out, errors = told("fit", "RUNS/old.csv", "--coarse", "RUNS/run.csv", "--out", "m", *chosen)
+    assert (code, errors) == (0, []) and "delay: 10 s as given" in out and "Used: level and gain" in out
+    assert EnhancedSimulator.load(tmp_path / "m" / "celsius").alignment.columns == ("volts",)
+
+
+def test_copies_of_a_run_keep_its_labels(told, tmp_path):
+    code, out, errors = told(*COPIES, "--copies", 4)
+    covered = next(line for line in out.splitlines() if "the training range covers" in line)
+    assert (code, errors) == (0, []) and "(nominal " in covered and "4 copies of 300 samples" in out.splitlines()[-1]
+    frame, run = pd.read_parquet(tmp_path / "x.parquet"), fault_run()
+    assert len(frame) == 1_200 and list(frame.columns) == ["copy", "time", "value", "out_of_range", "scenario", "severity", "mask"]
+    for _, copy in frame.groupby("copy"):
+        assert np.sqrt(np.mean((copy["value"].to_numpy() - clean_celsius(run))[5:-5] ** 2)) < 0.2
+        assert copy["scenario"].tolist() == run["scenario"].tolist() and copy["mask"].tolist() == run["mask"].tolist()
+    assert told("generate", "RUNS/models", "--windows", 5, "--out", "w.parquet")[0] == 0, "nominal windows need no run"
+
+
+def test_scores_are_those_of_the_difference(told, tmp_path):
+    score = ["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/fault.csv", "--windows", 300, "--out", "scores.csv"]
+    code, out, errors = told(*score)
+    assert (code, errors) == (0, []) and "of 300 scored samples" in out and "events.csv" in out and "false alarms per day" in out
+    frame = pd.read_csv(tmp_path / "scores.csv")
+    assert list(frame.columns)[1:] == ["value", "enhanced", "score", "flag", "out_of_range"] and len(frame) == 300
+    assert np.corrcoef(frame["value"], frame["enhanced"])[0, 1] > 0.98
+    assert list(pd.read_csv(tmp_path / "scores.events.csv").columns)[:3] == ["begin", "end", "peak"]
+
+
+def test_an_update_with_a_run(told, tmp_path):
+    code, out, errors = told("update", "RUNS/models", "RUNS/old.csv", "--coarse", "RUNS/run.csv", "--out", "new")
+    assert (code, errors) == (0, []) and "updated with 1,500 samples" in out
+    assert EnhancedSimulator.load(tmp_path / "new" / "celsius").trained["updates"][0]["num_samples"] == 1_500
+
+
+@pytest.mark.parametrize(("change", "word"), [({"watts": None}, "without 'watts'"), ({"value": 1.0}, "'value'")])
+def test_bad_fault_runs(told, tmp_path, change, word):
+    fault_run().assign(**change).dropna(axis="columns").to_csv(tmp_path / "bad.csv", index=False)
+    code, out, errors = told("generate", "RUNS/models", "--coarse", "bad.csv", "--out", "out/x.parquet")
+    assert (code, out, len(errors)) == (2, "", 1) and errors[0].startswith("error: Expected ") and word in errors[0]
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_a_coarse_run_is_not_overwritten(told, tmp_path):
+    fault_run().to_parquet(tmp_path / "x.parquet")
+    before = (tmp_path / "x.parquet").read_bytes()
+    code, _, errors = told("generate", "RUNS/models", "--coarse", "x.parquet", "--out", "x.parquet")
+    assert code == 2 and "differ" in errors[0] and (tmp_path / "x.parquet").read_bytes() == before
 
 
 # examples of the README and of the page on telemetry of one's own
@@ -404,32 +466,28 @@ FIT = ["fit", "WORLD/one.csv", "--out", "models"]
 GENERATE = ["generate", "WORLD/single", "--out", "x.parquet"]
 INJECT = ["inject", "WORLD/one.csv", "--out", "x.csv"]
 SCORE = ["score", "WORLD/single", "WORLD/one.csv", "--out", "x.parquet"]
+OF_RUNS = "generate MODEL_DIR --coarse"
 WRONG = {
     "no command": ([], "{fit,generate,verify,score,update,inject}"),
     "unknown command": (["train"], "'train'"),
     "fit without a source": (["fit", "--out", "models"], "SOURCE"),
-    "fit without a place": (["fit", "WORLD/one.csv"], "--out"),
     "source that is not there": (["fit", "nothing.csv", "--out", "models"], "nothing.csv"),
     "source of unknown kind": (["fit", "WORLD/models/volts/settings.json", "--out", "models"], "settings.json"),
-    "source that is a folder": (["fit", "WORLD/empty", "--out", "models"], "empty"),
-    "source without numbers": (["fit", "WORLD/words.csv", "--out", "models"], "words.csv"),
-    "column that is not there": ([*FIT, "--column", "current"], "'current'"),
     "time column that is not there": ([*FIT, "--time", "when"], "'when'"),
-    "interval that is no number": ([*FIT, "--interval", "often"], "'often'"),
-    "seed below zero": ([*FIT, "--seed", "-1"], "--seed -1"),
     "seed too large": ([*GENERATE, "--windows", "5", "--seed", str(2**31)], str(2**31)),
-    "no training windows": ([*FIT, "--num-windows", "0"], "window"),
     "no workers": ([*FIT, "--workers", "0"], "worker"),
-    "workers that are no number": ([*FIT, "--workers", "two"], "'two'"),
-    "more workers than there can be": (["fit", "WORLD/two.csv", "--separately", "--workers", "513", "--out", "models"], "513"),
-    "unknown engine": ([*FIT, "--engine", "slurm"], "'slurm'"),
     "fit into a file": (["fit", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv"),
     "fit into a foreign folder": (["fit", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
-    "fit into a model": (["fit", "WORLD/one.csv", "--out", "WORLD/single/volts"], "a model itself"),
+    "no windows of a large data set": ([*GENERATE, "--workers", "1"], "--windows"),
+    "a large series": ([*GENERATE, "--workers", "1", "--continuous", "1d"], "--continuous"),
+    "too large a data set": ([*GENERATE, "--workers", "1", "--windows", "20_000_000_000"], "windows"),
+    "scenarios in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--scenario", "stuck:0.5"], "--scenario"),
+    "windows in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--windows", "9"], "10 in the scenario file"),
+    "seeds in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--seed", "0"], "seed"),
+    "models in two places": ([*GENERATE, "--scenarios", "WORLD/mix.yaml", "--channel", "volts"], "--channel"),
+    "an onset at the end of a window": ([*GENERATE, "--workers", "1", "--windows", "9", "--scenario", "stuck:0.5:0.9995"], "0.9995"),
     "neither windows nor a length": (GENERATE, "--windows"),
-    "windows and a length": ([*GENERATE, "--windows", "5", "--continuous", "1d"], "--continuous"),
     "no windows": ([*GENERATE, "--windows", "0"], "--windows 0"),
-    "windows that are no number": ([*GENERATE, "--windows", "many"], "'many'"),
     "unknown mode": ([*GENERATE, "--windows", "5", "--scenario", "rust:0.5"], "'rust:0.5'"),
     "share out of range": ([*GENERATE, "--windows", "5", "--scenario", "stuck:0.5", "--nominal-share", "2"], "2.0"),
     "share without scenarios": ([*GENERATE, "--windows", "5", "--nominal-share", "0.5"], "--nominal-share"),
@@ -437,7 +495,7 @@ WRONG = {
     "fewer windows than scenarios": ([*GENERATE, "--windows", "2", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"], "2 scenarios"),
     "two scenarios in a series": (
         [*GENERATE, "--continuous", "1d", "--scenario", "stuck:0.5", "--scenario", "drift:0.5"],
-        "at most one --scenario",
+        "--number",
     ),
     "events of windows": ([*GENERATE, "--windows", "5", "--scenario", "stuck:1", "--number", "3"], "--continuous"),
     "events of no mode": ([*GENERATE, "--continuous", "1d", "--number", "3"], "--number 3"),
@@ -445,34 +503,42 @@ WRONG = {
     "windows for TimeEval": ([*GENERATE, "--windows", "5", "--timeeval"], "--continuous"),
     "start without a series": ([*GENERATE, "--windows", "5", "--start", "2024-01-01"], "--start"),
     "models that are not there": (["generate", "nowhere", "--windows", "5", "--out", "x.parquet"], "nowhere"),
-    "models of a name no file can have": (["generate", "x" * 300, "--windows", "5", "--out", "x.parquet"], "xxx"),
-    "models that are none": (["generate", "WORLD/empty", "--windows", "5", "--out", "x.parquet"], "empty"),
     "models that are damaged": (["generate", "WORLD/damaged", "--windows", "5", "--out", "x.parquet"], "arrays.npz"),
     "channel that was not fitted": ([*GENERATE, "--windows", "5", "--channel", "amps"], "'amps'"),
     "one file for two channels": (["generate", "WORLD/models", "--windows", "5", "--out", "x.parquet"], "2 files"),
-    "training data as text": (["generate", "WORLD/single", "--windows", "5", "--out", "x.csv"], "x.csv"),
-    "output below a file": (["generate", "WORLD/single", "--windows", "5", "--out", "WORLD/one.csv/x.parquet"], "one.csv"),
     "output of a name no file can have": (["generate", "WORLD/single", "--windows", "5", "--out", "x" * 300 + ".parquet"], "long"),
-    "score without a source": (["score", "WORLD/single", "--out", "x.parquet"], "SOURCE"),
     "unknown detector": ([*SCORE, "--detector", "oracle"], "'oracle'"),
     "rate of nothing": ([*SCORE, "--false-alarm-rate", "0"], "false_alarm_rate"),
-    "rate above half": ([*SCORE, "--false-alarm-rate", "0.6"], "0.6"),
-    "too few windows to learn from": ([*SCORE, "--windows", "9"], "num_windows=9"),
     "another rate": (["score", "WORLD/single", "WORLD/faster.csv", "--out", "x.parquet"], "every 7 s"),
     "scores in place of the telemetry": (["score", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/one.csv"], "one.csv for both"),
     "score a channel of two": (["score", "WORLD/joint", "WORLD/one.csv", "--out", "x.parquet"], "volts, amps"),
     "update into a foreign folder": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/foreign"], "something else"),
     "update where a simulator is": (["update", "WORLD/single", "WORLD/one.csv", "--out", "WORLD/models"], "--replace"),
-    "update with too much held out": (["update", "WORLD/single", "WORLD/one.csv", "--held-out", "0.9"], "0.9"),
+    "a delay without a run": ([*FIT, "--delay", "3"], "--delay only together with --coarse"),
+    "a column of no run": ([*FIT, "--coarse-column", "volts"], "--coarse-column only"),
+    "copies without a run": ([*GENERATE, "--copies", "3", "--windows", "2"], "--copies only"),
+    "windows of a run": ([*COPIES, "--windows", "2"], "--windows without --coarse"),
+    "scenarios of a run": ([*COPIES, "--scenario", "stuck:0.5"], "--scenario without --coarse"),
+    "no copies": ([*COPIES, "--copies", "0"], "1 copy or more"),
+    "a scenario of a model of runs": (
+        ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--out", "x.parquet"],
+        OF_RUNS,
+    ),
+    "one in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--scenario", "stuck:0.5", "--out", "x.parquet"], OF_RUNS),
+    "an event in a series of it": (["generate", "RUNS/models", "--continuous", "1h", "--at", "stuck@10/20", "--out", "x.parquet"], OF_RUNS),
+    "one in a large data set of it": (
+        ["generate", "RUNS/models", "--windows", "4", "--scenario", "stuck:0.5", "--workers", "1", "--out", "x"],
+        OF_RUNS,
+    ),
+    "a run shorter than a window": (["generate", "RUNS/models", "--coarse", "RUNS/short.csv", "--out", "x.parquet"], "32 samples"),
+    "scores without a run": (["score", "RUNS/models", "RUNS/new.csv", "--out", "x.parquet"], "Expected --coarse"),
+    "an update without a run": (["update", "RUNS/models", "RUNS/new.csv", "--out", "x"], "Expected --coarse"),
+    "a run of another time": (["score", "RUNS/models", "RUNS/new.csv", "--coarse", "RUNS/later.csv", "--out", "x.parquet"], "in time"),
     "inject nothing": (INJECT, "--kinds"),
     "inject an unknown kind": ([*INJECT, "--kinds", "ramp,rust"], "'rust'"),
     "inject at a severity that is none": ([*INJECT, "--kinds", "ramp", "--severity", "high"], "--severity high"),
-    "inject a range of three": ([*INJECT, "--kinds", "ramp", "--length", "1:2:3"], "--length 1:2:3"),
-    "inject without noise": (["inject", "WORLD/words.csv", "--kinds", "ramp", "--out", "x.csv"], "words.csv"),
     "inject into the telemetry itself": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "WORLD/one.csv"], "for both"),
-    "inject into a picture": (["inject", "WORLD/one.csv", "--kinds", "ramp", "--out", "x.png"], "x.png"),
     "inject TimeEval's table as Parquet": ([*INJECT[:-1], "x.parquet", "--kinds", "ramp", "--timeeval"], "x.parquet"),
-    "scores as a picture": (["score", "WORLD/single", "WORLD/one.csv", "--out", "x.png"], "x.png"),
 }
 
 
@@ -485,14 +551,6 @@ def test_invalid_use_gives_one_line_and_changes_no_file(told, world, tmp_path, c
     assert (code, len(errors)) == (2, 1) and out in ("", "reading ...\n"), errors
     assert errors[0].startswith("error: ") and "Expected " in errors[0] and "Received: " in errors[0] and word in errors[0]
     assert files(world) == before and not files(tmp_path)
-
-
-@pytest.mark.parametrize("case", ["source that is not there", "models that are damaged"])
-def test_invalid_use_in_a_new_process(world, tmp_path, case):
-    arguments = [argument.replace("WORLD", str(world)) for argument in WRONG[case][0]]
-    ended = shell(*arguments, cwd=tmp_path)
-    assert (ended.returncode, len(ended.stderr.splitlines())) == (2, 1) and ended.stdout in ("", "reading ...\n"), ended.stderr
-    assert not list(tmp_path.iterdir())
 
 
 # conditions of the machine
@@ -509,17 +567,6 @@ def test_an_output_that_is_a_folder_is_refused(told, tmp_path):
     (tmp_path / "sets" / "volts.parquet").mkdir(parents=True)
     code, _, errors = told("generate", "WORLD/single", "--windows", 5, "--out", "sets")
     assert code == 2 and "a folder of that name" in errors[0]
-
-
-def test_a_full_disk_gives_one_line(told, monkeypatch):
-    from enhsim_tf.datasets import labelled_windows
-
-    def fail(*arguments):
-        raise OSError(28, "No space left on device", "x.parquet")
-
-    monkeypatch.setattr(labelled_windows, "write_windows_labelled", fail)
-    code, _, errors = told("generate", "WORLD/single", "--windows", 5, "--out", "x.parquet")
-    assert code == 2 and len(errors) == 1 and "No space left on device" in errors[0]
 
 
 def test_a_closed_pipe_ends_the_command_without_a_message(world, tmp_path):

@@ -14,7 +14,7 @@ import pytest
 from enhsim_tf.common.parallel import engines
 from enhsim_tf.common.parallel import ray as ray_engine
 from enhsim_tf.common.parallel.local import ProcessesDiedError
-from tests.faults.small_data_set import PlainMaker, die_at_thirteen, meet, plan, refuse, threads_and_square, threads_of
+from tests.small_data_set import PlainMaker, die_at_thirteen, meet, plan, refuse, threads_and_square, threads_of
 
 with_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="the optional extra ray is not installed")
 

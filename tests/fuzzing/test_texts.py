@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from enhsim_tf.cli.arguments import parse
 from enhsim_tf.common.parallel.engines import parse_workers
-from enhsim_tf.datasets.labelled_windows import parse_num_samples, parse_scenario, parse_start
-from enhsim_tf.datasets.scenario_file import read_mix
+from enhsim_tf.datasets.mix import read_mix
+from enhsim_tf.datasets.places import parse_num_samples, parse_scenario, parse_start
 from enhsim_tf.simulator.model_folder import folder_of
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.influx_store import parse_location

@@ -17,6 +17,7 @@ from enhsim_tf.datasets.shard import shard_file
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.noise.window_bootstrap import WindowBootstrap
 from tests.known_simulators import of_waves
+from tests.small_data_set import PlainMaker
 
 PLAN = Plan(
     Mix(0.5, (ScenarioShare("stuck", 0.5, (0.2, 0.9), (0.0, 0.5)),)), (Model("model", Path("nowhere"), 1.0, "0" * 64, 60, 2.0),), 3, 20, 10
@@ -67,12 +68,7 @@ def settings_for(channel: str) -> bytes:
 
 
 def write_model(folder: Path, **changed: bytes) -> Path:
-    """Writes a saved simulator with some files changed and correct checksums.
-
-    Args:
-        folder: Where to.
-        **changed: Content by file name, with `_` instead of the dot.
-    """
+    """Writes a saved simulator with some files changed, named with `_` instead of the dot, and correct checksums."""
     files = saved_model() | {name.replace("_", ".", 1): content for name, content in changed.items()}
     if "manifest_json" not in changed:
         checksums = {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items()) if name != "manifest.json"}
@@ -86,8 +82,6 @@ def write_model(folder: Path, **changed: bytes) -> Path:
 @functools.cache
 def data_set() -> dict[str, bytes]:
     """The files of a small finished data set."""
-    from tests.faults.small_data_set import PlainMaker
-
     with tempfile.TemporaryDirectory() as folder:
         records = [PlainMaker(PLAN, folder)(number) for number in range(2)]
         files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
@@ -96,12 +90,7 @@ def data_set() -> dict[str, bytes]:
 
 
 def write_data_set(folder: Path, **changed: bytes) -> Path:
-    """Writes a finished data set with some files changed.
-
-    Args:
-        folder: Where to.
-        **changed: Contents of `manifest`, `journal` and `shard`, which is the first.
-    """
+    """Writes a finished data set with other contents of `manifest`, `journal` or `shard`, which is the first."""
     names = {"manifest": MANIFEST, "journal": JOURNAL, "shard": shard_file(0)}
     folder.mkdir(parents=True)
     for name, content in (data_set() | {names[name]: content for name, content in changed.items()}).items():

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from enhsim_tf.reproduce import main
@@ -17,26 +18,21 @@ def _wave(num_samples=4_000):
     return np.sin(np.arange(num_samples) / 15) + 0.1 * np.random.default_rng(0).standard_normal(num_samples)
 
 
-def _table(path, **columns):
-    import pandas as pd
-
-    table = pd.DataFrame(columns)
-    table.to_csv(path, index=False) if path.suffix == ".csv" else table.to_parquet(path)
+def _table(path):
+    pd.DataFrame({"a": _wave(), "t": [*range(3_999), "soon"]}).to_csv(path, index=False)
 
 
-def _array(values, **options):
-    return lambda path: np.save(path, values, **options)
+def _array(values):
+    return lambda path: np.save(path, values)
 
 
 BAD_FILES = {  # what else a file may hold is tried in tests/telemetry and tests/fuzzing
     "missing": ("x.npy", lambda path: None, []),
-    "a folder": ("x.npy", lambda path: path.mkdir(), []),
     "no rows": ("x.csv", lambda path: path.write_text("value\n"), []),
     "constant": ("x.npy", _array(np.full(4_000, 3.0)), []),
     "too short": ("x.npy", _array(_wave(999)), []),
     "which column": ("x.npy", _array(np.zeros((4_000, 2))), []),
-    "time column": ("x.csv", lambda path: _table(path, a=_wave()), ["--time", "utc"]),
-    "a word among the times": ("x.csv", lambda path: _table(path, a=_wave(), t=[*range(3_999), "soon"]), ["--column", "a", "--time", "t"]),
+    "a word among the times": ("x.csv", _table, ["--column", "a", "--time", "t"]),
 }
 
 
@@ -45,7 +41,8 @@ def told(tmp_path, capfd):
     """Runs the command in this process and returns its exit code, its output and the lines of its errors."""
 
     def run(*arguments):
-        code = main(["--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), *map(str, arguments)])
+        places = ["--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
+        code = main([*places, "--budget", "smoke", *map(str, arguments)])
         out, error = capfd.readouterr()
         return code, out, error.splitlines()
 
@@ -56,16 +53,12 @@ def told(tmp_path, capfd):
 def refused_line(told, tmp_path):
     """Runs the command and checks that it refuses: exit code 2, one line, and no file written. Returns the line."""
 
-    def files():
-        return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
-
     def run(*arguments):
-        before = files()
-        code, out, lines = told("--budget", "smoke", *arguments)
-        assert (code, out, len(lines)) == (2, "", 1), lines
-        assert lines[0].startswith("error: Expected ") and "Received: " in lines[0]
-        assert files() == before
-        return lines[0]
+        before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+        code, out, (line,) = told(*arguments)
+        assert (code, out) == (2, "") and line.startswith("error: Expected ") and "Received: " in line
+        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()} == before
+        return line
 
     return run
 
@@ -84,17 +77,11 @@ def test_a_bad_file_is_refused_in_one_line(refused_line, tmp_path, case):
         (["--seed", "-1"], "-1"),
         (["--seed", str(2**32)], str(2**32)),  # the detectors and the classifier accept no larger seed
         (["--only", "fig99"], "fig99"),
-        (["--only", "fig0"], "fig0"),
-        (["--only", ""], "--only"),
         (["--column", "0"], "--telemetry"),
-        (["--time", "t"], "--telemetry"),
         (["--seed", "abc"], "'abc'"),
         (["--budget", "tiny"], "'tiny'"),
-        (["--seed"], "--seed"),
         (["--sed", "3"], "--sed 3"),
-        (["--set", "dropout"], "dropout"),
         (["--set", "no_such=1"], "no_such"),
-        (["--experiment", "robustness"], "--experiment"),
         (["--telemetry"], "--telemetry"),
     ],
 )
@@ -122,35 +109,19 @@ def test_a_smoke_run_is_kept_out_of_figures(refused_line, tmp_path, monkeypatch,
     assert (tmp_path / "figures" / "fig02_source_target.png").read_text() == "full budget"
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["--telemetry", "no/such/file.npy"],
-        ["--out", "README.md/below"],
-    ],
-)
-def test_a_refusal_as_the_shell_sees_it(tmp_path, arguments):
-    defaults = [] if "--out" in arguments else ["--out", tmp_path / "out"]
-    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", *defaults, "--cache", tmp_path / "cache", *arguments]
+def test_a_refusal_as_the_shell_sees_it(tmp_path):
+    places = ["--out", tmp_path / "out", "--cache", tmp_path / "cache"]
+    command = [sys.executable, "-m", "enhsim_tf.reproduce", "--budget", "smoke", *places, "--telemetry", "no/such/file.npy"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1 and done.stderr.startswith("error: Expected ")
     assert not list(tmp_path.iterdir())
 
 
-STRANGE = {
-    "barely long enough": _wave(800),
-    "a ramp without noise": np.arange(3_000.0),
-    "one step": (np.arange(3_000) > 1_500).astype(np.float64),
-    "still in training": np.concatenate([np.ones(2_200), _wave(800)]),
-    "still in the test": np.concatenate([_wave(2_000), np.ones(1_000)]),
-}
-
-
-@pytest.mark.parametrize("case", [pytest.param(name, marks=[pytest.mark.slow] * (name == "barely long enough")) for name in STRANGE])
-def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, case):
-    np.save(tmp_path / "channel.npy", STRANGE[case])
-    code, _, lines = told("--budget", "smoke", *TINY_OPTIONS, "--only", "fig13", "--telemetry", tmp_path / "channel.npy")
+@pytest.mark.parametrize("values", [np.arange(3_000.0), np.concatenate([np.ones(2_200), _wave(800)])], ids=["a ramp", "still in training"])
+def test_an_unusual_channel_gets_its_figures_or_one_error_line_before_training(told, tmp_path, values):
+    np.save(tmp_path / "channel.npy", values)
+    code, _, lines = told(*TINY_OPTIONS, "--only", "fig13", "--telemetry", tmp_path / "channel.npy")
     if code == 0:
         assert not lines and any((tmp_path / "out").glob("fig13*.png"))
     else:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from enhsim_tf.datasets.inject import InjectOptions, inject_channel
-from enhsim_tf.datasets.label_columns import write_table, write_timeeval
+from enhsim_tf.datasets.label_columns import write_table
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.reading.columns import anomalous
 from enhsim_tf.telemetry.sources import read_source
@@ -485,8 +485,7 @@ def test_pandas_objects_are_sources():
 def test_the_files_of_this_tool_are_read_back(tmp_path, form):
     cleaned = clean(pd.Series(VALUES, index=TIMES, name="value"))
     frame = inject_channel(cleaned.parts, InjectOptions(at=("level_shift:4@20/10",), noise_sd=1.0))
-    frame.attrs = {}  # which Parquet would store
-    (write_timeeval if form == "timeeval.csv" else write_table)(tmp_path / form, {"value": frame} if form == "timeeval.csv" else frame)
+    write_table(tmp_path / form, frame, ["value"] if form == "timeeval.csv" else ())
     series = only(read_source(tmp_path / form))
     report = check(series, frame["value"])
     assert series.name == "value" and report.find("labels").count == 10

@@ -1,16 +1,17 @@
 """A command that makes a data set without networks. The tests interrupt it, kill it, limit its resources and start it twice.
 
-`python -m tests.faults.small_data_set OUT`: its simulator is a coarse one with white noise, so that it starts in a second.
+Its simulator is a coarse one with white noise, so that it starts in a second.
 """
 
 import argparse
+import os
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator  # noqa: E402
 from enhsim_tf.common.console import run_command  # noqa: E402
@@ -52,22 +53,16 @@ def plan(num_windows=1_000, shard=50, seed=3, mix=MIX, shares=(1.0,)):
 
 def die_at_thirteen(number):
     """Work that always kills its process at one item."""
-    import os
-
     return number if number != 13 else os._exit(9)
 
 
 def threads_and_square(number):
     """Work that reports how it is executed."""
-    import os
-
     return number**2, os.getpid(), os.environ["TF_NUM_INTRAOP_THREADS"], "tensorflow" in sys.modules
 
 
 def meet(folder, num_processes, number):
     """Work that waits until the given number of processes have started."""
-    import os
-
     (folder / str(os.getpid())).touch()
     while len(os.listdir(folder)) < num_processes:
         time.sleep(0.01)
@@ -76,8 +71,6 @@ def meet(folder, num_processes, number):
 
 def threads_of(number):
     """Thread counts of a process: those of TensorFlow and of linear algebra."""
-    import os
-
     import threadpoolctl
 
     return os.environ["TF_NUM_INTRAOP_THREADS"], {library["num_threads"] for library in threadpoolctl.threadpool_info()}
@@ -93,14 +86,11 @@ def refuse(number):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("out")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--windows", type=int, default=1_000)
+    parser.add_argument("--engine", default="local")
     parser.add_argument("--limit", type=int, help="bytes that a file may have")
     parser.add_argument("--user", type=int, help="whose rights to have, once everything is imported")
     options = parser.parse_args()
     if options.user:
-        import os
-
         os.seteuid(options.user)
     if options.limit:
         import resource
@@ -109,7 +99,7 @@ def main():
     generate.ShardMaker = SlowMaker
 
     def run():
-        generate.generate_data_set(options.out, plan(options.windows), options.workers)
+        generate.generate_data_set(options.out, plan(), 2, options.engine)
         return 0
 
     return run_command(run, "interrupted; what was finished is kept")
