@@ -101,7 +101,7 @@ def test_a_missing_variable_is_named(pretended, monkeypatch, refused, name):
 
 
 def test_a_missing_client_is_named(pretended, monkeypatch, refused):
-    monkeypatch.setitem(sys.modules, "influxdb_client", None)
+    monkeypatch.setitem(sys.modules, "enhsim_tf.telemetry.influx_client", None)
     with refused("pip install influxdb-client"):
         InfluxStore("influxdb://b/m/f")
 
