@@ -264,7 +264,7 @@ def run_for(
     commands = simulator.alignment.commands
     if commands is not None and options.coarse is None:
         from enhsim_tf.coarse_simulator.commands import CommandTraces
-        from enhsim_tf.telemetry.commands import read_commands
+        from enhsim_tf.telemetry.arrays import read_commands
 
         found = read_commands(source)
         if found is None:

@@ -21,7 +21,7 @@ from urllib3.exceptions import HTTPError
 
 from enhsim_tf.common.errors import InputError
 
-FIRST_NS, LAST_NS = -9_223_372_036 * 10**9, 2**63 - 2  # range of times in InfluxDB, nanoseconds since 1970, starting at a whole second
+_FIRST_NS, _LAST_NS = -9_223_372_036 * 10**9, 2**63 - 2  # range of times in InfluxDB, nanoseconds since 1970, starting at a whole second
 VARIABLES = ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG")
 
 _Answer = TypeVar("_Answer")
@@ -77,23 +77,19 @@ class InfluxServer:
         """Runs a Flux query with a small result; returns its rows, or the first `limit` of them."""
         return self._repeat(lambda: [row.values for row in itertools.islice(self._client.query_api().query_stream(query), limit)])
 
-    def points(self, wanted: Mapping[str, str], start_ns: int = FIRST_NS, stop_ns: int = LAST_NS) -> str:
+    def points(self, wanted: Mapping[str, str], start_ns: int = _FIRST_NS, stop_ns: int = _LAST_NS) -> str:
         """Flux for the points of the bucket whose columns have the wanted values, from `start_ns` up to, but not including, `stop_ns`."""
         matches = " and ".join(f"r[{quote(column)}] == {quote(value)}" for column, value in wanted.items()) or "true"
         times = f"start: time(v: {start_ns}), stop: time(v: {stop_ns})"
         return f"from(bucket: {quote(self.bucket)}) |> range({times}) |> filter(fn: (r) => {matches})"
 
-    def stream(
-        self, wanted: Mapping[str, str], start_ns: int = FIRST_NS, stop_ns: int = LAST_NS
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def stream(self, wanted: Mapping[str, str]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Streams the points of one series in chronological order, block by block, so that memory does not grow with their number.
 
         If the connection breaks, the query is repeated from the point after the last one received.
 
         Args:
             wanted: Values of the columns that select the series among the points of the bucket.
-            start_ns: Start of the time range in nanoseconds since 1970 (inclusive).
-            stop_ns: End of the time range in nanoseconds since 1970 (exclusive).
 
         Yields:
             Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
@@ -101,9 +97,9 @@ class InfluxServer:
         Raises:
             InputError: If the server does not answer, the connection keeps breaking, or the values are not numbers.
         """
-        moved = time.monotonic()
-        while start_ns < stop_ns:
-            query = f'{self.points(wanted, start_ns, stop_ns)} |> keep(columns: ["_time", "_value"])'
+        start_ns, moved = _FIRST_NS, time.monotonic()
+        while True:
+            query = f'{self.points(wanted, start_ns)} |> keep(columns: ["_time", "_value"])'
             answer = self._repeat(lambda query=query: self._client.query_api().query_raw(query, dialect=Dialect(annotations=[])))
             with contextlib.closing(answer):
                 try:

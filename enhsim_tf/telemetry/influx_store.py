@@ -1,4 +1,4 @@
-"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline. Implements `TelemetryStore`.
+"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline. It has the methods of `ParquetStore`.
 
 Each series is written under a version tag, the hash of its content. A description that is written last makes this version the
 current one. An interrupted write therefore never leaves a partial series, a repeated write stores the series once, and the old
@@ -109,27 +109,26 @@ class InfluxStore:
     def write(self, telemetry: Telemetry) -> None:
         """Stores a series atomically under its name. An existing series of that name is replaced.
 
-        Args:
-            telemetry: The series.
-
         Raises:
             InputError: If the series has no name, no samples, values that are not finite, or samples less than a nanosecond apart,
                 or if the server does not accept it.
         """
+        from influxdb_client import Point
+
         times, values = _points(telemetry)
         self._check_names(telemetry.name)
         about = {key: getattr(telemetry, key) for key in _DESCRIBED} | {"num_samples": len(values), "location": str(self.location)}
         about |= {key: float(about[key]) for key in ("interval_s", "offset_s")}
         version = hashlib.sha256(json.dumps(about).encode() + values.tobytes()).hexdigest()[:16]
         tags = dict(self.location.tags) | {_CHANNEL: _as_tag(telemetry.name), _VERSION: version}
-        begin = f"{_escape(self.location.measurement, ', ')}{_tag_set(tags)} {_escape(self.location.field)}="
+        point = {"measurement": self.location.measurement, "tags": tags, "fields": {self.location.field: True}}
+        begin = Point.from_dict(point).to_line_protocol().removesuffix("true")
         for first in range(0, len(values), self.batch_size):
             # float32 to float64 is exact, and so is the shortest decimal form of the float64
             batch = zip(*(array[first : first + self.batch_size].tolist() for array in (values, times)), strict=True)
             self.server.send("\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch]))
-        text = json.dumps(about | {_VERSION: version}).replace("\\", "\\\\").replace('"', '\\"')
-        key = {"key": self._hash(telemetry.name), "store": self._hash()}
-        self.server.send(f'{_ABOUT}{_tag_set(key)} about="{text}" {_ABOUT_NS}')
+        point = {"measurement": _ABOUT, "tags": {"key": self._hash(telemetry.name), "store": self._hash()}, "time": _ABOUT_NS}
+        self.server.send(Point.from_dict(point | {"fields": {"about": json.dumps(about | {_VERSION: version})}}).to_line_protocol())
         rows = self.server.ask(f"{self.server.points(self._wanted({_CHANNEL: tags[_CHANNEL]}))} |> first()")
         for old in {row[_VERSION] for row in rows if _VERSION in row and _tags_of(row) == tags | {_VERSION: row[_VERSION]}} - {version}:
             if re.fullmatch(r"[0-9a-f]{16}", old):  # otherwise it is a tag of another program with the same name
@@ -138,17 +137,14 @@ class InfluxStore:
     def read(self, name: str) -> Telemetry:
         """Reads the series stored under `name`.
 
-        Args:
-            name: Name of the series.
-
-        Returns:
-            The series.
-
         Raises:
             InputError: If there is no such series, if samples are missing from it, or if the server does not answer.
         """
-        wanted, about = self._of_series(name)
-        blocks = [(np.empty(0, np.int64), np.empty(0)), *self.server.stream(wanted)]
+        about = self._abouts({"key": self._hash(name)}).get(name)
+        if about is None:
+            raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
+        stream = self.server.stream(self._wanted({_CHANNEL: _as_tag(name), _VERSION: about[_VERSION]}))
+        blocks = [(np.empty(0, np.int64), np.empty(0)), *stream]
         times, values = (np.concatenate(arrays)[: about["num_samples"]] for arrays in zip(*blocks, strict=True))
         telemetry = Telemetry(values.astype(np.float32), **{key: about[key] for key in _DESCRIBED})
         found = np.append(times == nanoseconds(telemetry), False).argmin()  # number of leading points with the expected times
@@ -170,25 +166,22 @@ class InfluxStore:
         """
         self.server.ask(f"{self.server.points({}, 0, 1)} |> limit(n: 1)")
 
-    def chunks(
-        self, name: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Streams the stored points of a series in chronological order, in blocks of some ten thousand points.
-
-        Args:
-            name: Name of a series stored by `write`. None: the only series at the location, whichever program wrote it.
-            start_ns: Start of the time range in nanoseconds since 1970 (inclusive). None: the first point.
-            stop_ns: End of the time range in nanoseconds since 1970 (exclusive). None: after the last point.
+    def chunks(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Streams the points of the only series at the location, whichever program wrote it, in blocks of some ten thousand points.
 
         Yields:
-            Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
+            Times in nanoseconds since 1970 (int64), which increase, and values (float64), two arrays of the same length.
 
         Raises:
-            InputError: If there is no such series, more than one, or one without numbers, or if the server does not answer.
+            InputError: If there is no series, more than one, or one without numbers, or if the server does not answer.
         """
-        wanted = self._only_series() if name is None else self._of_series(name)[0]
-        limits = {"start_ns": start_ns, "stop_ns": stop_ns}
-        yield from self.server.stream(wanted, **{key: int(limit) for key, limit in limits.items() if limit is not None})
+        rows = self.server.ask(f"{self.server.points(self._wanted())} |> first()", _SHOWN)
+        found = [str(dataclasses.replace(self.location, tags=tuple(sorted(_tags_of(row).items())))) for row in rows]
+        if len(found) > 1:
+            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {' or '.join(found)}.")
+        if not found:
+            raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
+        yield from self.server.stream(self._wanted())
 
     def _check_names(self, name: str) -> None:
         """Raises an `InputError` for names that line protocol cannot express, and for tags that the store uses itself."""
@@ -219,23 +212,6 @@ class InfluxStore:
         """The columns that points of this location have, and further tags."""
         place = self.location
         return {"_measurement": place.measurement, "_field": place.field} | dict(place.tags) | (tags or {})
-
-    def _of_series(self, name: str) -> tuple[dict[str, str], dict[str, Any]]:
-        """The columns that the points of a stored series have, and its description."""
-        about = self._abouts({"key": self._hash(name)}).get(name)
-        if about is None:
-            raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
-        return self._wanted({_CHANNEL: _as_tag(name), _VERSION: about[_VERSION]}), about
-
-    def _only_series(self) -> dict[str, str]:
-        """The columns that the points of the only series at this location have."""
-        rows = self.server.ask(f"{self.server.points(self._wanted())} |> first()", _SHOWN)
-        found = [str(dataclasses.replace(self.location, tags=tuple(sorted(_tags_of(row).items())))) for row in rows]
-        if len(found) > 1:
-            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {' or '.join(found)}.")
-        if not found:
-            raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
-        return self._wanted()
 
 
 def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
@@ -281,12 +257,3 @@ def _encode(part: str) -> str:
 def _as_tag(name: str) -> str:
     """Encodes a name as a tag value. Characters that InfluxDB does not allow there are percent-encoded."""
     return "".join(sign if sign.isprintable() and sign not in "%\\" else urllib.parse.quote(sign) for sign in name)
-
-
-def _escape(name: str, characters: str = ",= ") -> str:
-    """Escapes a name for line protocol with backslashes before `characters`."""
-    return re.sub(f"[{characters}]", lambda found: f"\\{found[0]}", name)
-
-
-def _tag_set(tags: dict[str, str]) -> str:
-    return "".join(f",{_escape(key)}={_escape(value)}" for key, value in sorted(tags.items()))

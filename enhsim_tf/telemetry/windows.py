@@ -14,12 +14,7 @@ _LEAST_SHARE = 0.25  # of the windows outside a block that must remain where tho
 
 
 def num_window_starts(parts: Sequence[Sized], window: int) -> int:
-    """Returns the number of samples at which a complete window can start.
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-    """
+    """Returns the number of samples at which a complete window can start, over contiguous parts of one series."""
     return sum(max(0, len(part) - window + 1) for part in parts)
 
 
@@ -61,36 +56,9 @@ def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) 
     return np.unique(np.linspace(0, num_starts - 1, min(num_windows, num_starts)).astype(np.int64))
 
 
-def disjoint_starts(num_samples: int, window: int) -> np.ndarray:
-    """Starts of consecutive windows of one series that do not overlap, which are used as the independent units of statistical tests.
-
-    Args:
-        num_samples: Length of the series.
-        window: Window length in samples.
-
-    Returns:
-        Integer array of shape `(windows,)`.
-    """
-    return np.arange(num_samples // window) * window
-
-
 def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows out of a series.
-
-    Args:
-        values: Series of shape `(samples,)`.
-        starts: First sample of each window, shape `(windows,)`.
-        window: Window length in samples.
-
-    Returns:
-        Array of shape `(windows, window)` with the dtype of `values`.
-    """
+    """Cuts windows that begin at the samples `starts` out of a series; returns an array of shape `(windows, window)`."""
     return np.lib.stride_tricks.sliding_window_view(values, window)[starts]
-
-
-def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
-    """The number of possible starts before each part that is long enough, and that of all."""
-    return np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
 
 
 def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +69,7 @@ def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> 
         starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
         window: Number of samples in a window.
     """
-    firsts = _first_starts(parts, window)
+    firsts = np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
     which = np.searchsorted(firsts, starts, "right") - 1
     return which, np.asarray(starts) - firsts[which]
 

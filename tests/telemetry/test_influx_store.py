@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.telemetry import influx_client
-from enhsim_tf.telemetry.influx_client import VARIABLES, quote
+from enhsim_tf.telemetry.influx_client import VARIABLES
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
 from enhsim_tf.telemetry.series import Telemetry
 from tests.telemetry.round_trips import BEYOND, series
@@ -47,10 +47,6 @@ def test_invalid_locations_are_refused(rest, refused):
         parse_location("http://b/m/f")
 
 
-def test_flux_strings_end_where_they_should():
-    assert quote('a"b\\c${d}\n') == '"a\\x22b\\x5cc\\x24{d}\\x0a"'
-
-
 class Answer(io.BytesIO):
     """The answer of a server, as urllib3 gives it."""
 
@@ -58,12 +54,6 @@ class Answer(io.BytesIO):
 
 
 HEAD, ROW = b",result,table,_time,_value\r\n", b",_result,0,1970-01-01T00:00:01.%09dZ,%s\r\n"
-
-
-def test_an_answer_is_parsed_to_the_nanosecond():
-    ((times, values),) = influx_client._blocks(Answer(HEAD + ROW % (7, b"1e-45") + ROW % (8, b"-3") + b"\r\n"))
-    assert times.tolist() == [10**9 + 7, 10**9 + 8] and values.tolist() == [1e-45, -3]
-    assert list(influx_client._blocks(Answer(b"\r\n"))) == list(influx_client._blocks(Answer(b""))) == []
 
 
 ODD = {
@@ -95,9 +85,6 @@ def test_a_missing_variable_is_named(pretended, monkeypatch, refused, name):
     monkeypatch.setenv(name, " ")
     with refused(f"no {name}"):
         InfluxStore("influxdb://b/m/f")
-    monkeypatch.delenv(name)
-    with refused(f"no {name}"):
-        InfluxStore("influxdb://b/m/f")
 
 
 def test_a_missing_client_is_named(pretended, monkeypatch, refused):
@@ -117,7 +104,7 @@ def test_a_missing_client_is_named(pretended, monkeypatch, refused):
         "http://a:0",
         "http://a b",
         "http://a\n",
-        "http://user:secret-token@localhost",
+        "http://u:secret@b",
     ],
 )
 def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
@@ -177,16 +164,10 @@ def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refu
     with http.server.HTTPServer(("127.0.0.1", 0), Silent) as other:
         threading.Thread(target=other.serve_forever, daemon=True).start()
         monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{other.server_port}")
-        for status in (200, 404):
+        for status, words in ((200, "something else"), (404, "something else"), (302, "(302)")):
             answers.append(status)
-            with refused("something else", "INFLUXDB_V2_URL"):
+            with refused(words):
                 InfluxStore("influxdb://b/m/f").check()
-        answers.append(302)
-        with refused("(302)"):
-            InfluxStore("influxdb://b/m/f").check()
-        monkeypatch.setenv("INFLUXDB_V2_URL", f"https://127.0.0.1:{other.server_port}")
-        with refused("SSL"):
-            InfluxStore("influxdb://b/m/f").check()
         other.shutdown()
 
 
