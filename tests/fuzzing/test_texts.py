@@ -135,15 +135,9 @@ def test_what_once_failed_is_used_or_refused(read, text):
     judge(read, text)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("read", READERS)
-def test_texts(read):
-    seeds = READERS[read]
-    judge(read, seeds[0])
-
-    @tried(60)
-    @given(changed([seed.encode() for seed in seeds]).map(lambda data: data.decode("utf-8", "surrogateescape")) | st.text(max_size=60))
-    def each(text):
-        judge(read, text)
-
-    each()
+@tried(60)
+@given(st.data())
+def test_texts(read, data):
+    seeds = changed([seed.encode() for seed in READERS[read]]).map(lambda seed: seed.decode("utf-8", "surrogateescape"))
+    judge(read, data.draw(seeds | st.text(max_size=60)))
