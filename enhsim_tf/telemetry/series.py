@@ -57,12 +57,7 @@ class Telemetry:
 
 
 def nanoseconds(telemetry: Telemetry, first: int = 0, stop: int | None = None) -> np.ndarray:
-    """Computes the time of each sample in integer nanoseconds.
-
-    Args:
-        telemetry: The series.
-        first: First sample to compute.
-        stop: End of the samples to compute (exclusive), which may lie beyond the series. None: the end of the series.
+    """Computes the times of the samples from `first` up to, but not including, `stop`, which may lie beyond the series (None: its end).
 
     Returns:
         Nanoseconds since 1970 in UTC, int64 array of shape `(samples,)`. If the source has no times, nanoseconds since sample 0.

@@ -22,20 +22,13 @@ from tests.fuzzing.readers import all_of, changed, judge, tried
 SCENARIOS = b"""\
 windows: 1000
 seed: 3
-shard: 100
 nominal: 0.5
-scenarios:
-  - mode: stuck
-    share: 0.3
-    severity: [0.2, 0.9]
-    onset: [0.0, 0.5]
-  - {mode: drift, share: 0.2, severity: 0.5}
+scenarios: [{mode: stuck, share: 0.3, severity: [0.2, 0.9], onset: [0.0, 0.5]}, {mode: drift, share: 0.2, severity: 0.5}]
 models:
-  - folder: vehicle-1/volts
+  - folder: "vehicle-1/volts"
     name: first
     share: 0.75
-  - folder: "vehicle-2/volts"
-    share: 0.25
+  - {folder: vehicle-2/volts, share: 0.25}
 """
 
 

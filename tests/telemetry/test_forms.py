@@ -468,11 +468,6 @@ def test_whole_and_fractional_seconds_are_read_in_one_column(tmp_path):
     assert (index[0] - START.tz_localize(None), index[1] - index[0]) == (pd.Timedelta("250ms"), pd.Timedelta("59.75s"))
 
 
-def test_text_of_windows_is_read_with_its_signs(tmp_path):
-    (tmp_path / "a.csv").write_bytes(table("Zeit;Preis in €", MINUTES, VALUES, separator=";").encode("cp1252"))
-    assert list(read_source(tmp_path / "a.csv")) == ["Preis in €"]
-
-
 def test_a_year_and_a_month_are_the_first_day_of_the_month():
     frame = pd.DataFrame({"year": 1990 + np.arange(N) // 12, "month": 1 + np.arange(N) % 12, "v": VALUES})
     assert only(read_source(frame)).index[-1] == pd.Timestamp("1994-12-01")

@@ -13,13 +13,9 @@ from enhsim_tf.telemetry import influx_client
 from enhsim_tf.telemetry.influx_client import VARIABLES
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
 from enhsim_tf.telemetry.series import Telemetry
-from tests.telemetry.round_trips import BEYOND, series
+from tests.telemetry.round_trips import BEYOND, wheel
 
 ROOT = Path(__file__).parents[2]
-
-
-def _series(number=1_000, seed=0, **about):
-    return series(number, seed, **({"name": "wheel"} | about))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +110,7 @@ def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
     assert "secret" not in str(caught)
 
 
-@pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read("x"), lambda store: store.write(_series()), list])
+@pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read("x"), lambda store: store.write(wheel()), list])
 def test_a_server_that_is_down_is_reported_at_once(pretended, refused, use):
     store = InfluxStore("influxdb://b/m/f", max_retry_s=3_600)
     with refused("http://127.0.0.1:9", "no answer"):
@@ -130,21 +126,21 @@ def test_a_nonnumeric_client_variable_is_refused(pretended, monkeypatch, refused
 def test_series_that_influxdb_cannot_store_are_refused(pretended, refused):
     store = InfluxStore("influxdb://b/m/f")
     for wrong, word in (
-        (_series(0), "0 samples"),
-        (_series(name=""), "name=''"),
+        (wheel(0), "0 samples"),
+        (wheel(name=""), "name=''"),
         (Telemetry(np.array([1, np.nan, 2], np.float32)), "sample 1"),
         (Telemetry(np.array([1, np.inf], np.float32)), "inf"),
-        (_series(interval_s=1e-10), "nanosecond"),
-        *((_series(**about), "time") for about in BEYOND),
-        (_series(start="yesterday"), "yesterday"),
-        (_series(name="\ud800"), "Unicode"),
+        (wheel(interval_s=1e-10), "nanosecond"),
+        *((wheel(**about), "time") for about in BEYOND),
+        (wheel(start="yesterday"), "yesterday"),
+        (wheel(name="\ud800"), "Unicode"),
         (np.zeros(3), "ndarray"),
     ):
         with refused(word):
             store.write(wrong)
     for place in ("m%0A/f", "%23m/f", "m%5C/f", "m/_f", "m/f?channel=a", "m/f?version=a", "m/f?time=a", "m/f?_t=a", "m/f?t=%5C"):
         with refused("another location"):
-            InfluxStore(f"influxdb://b/{place}").write(_series())
+            InfluxStore(f"influxdb://b/{place}").write(wheel())
 
 
 def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refused):

@@ -97,6 +97,7 @@ def test_times_rounded_to_milliseconds_are_regular(tmp_path, interval_s):
     times = (np.arange(400) * interval_s).round(3 if interval_s > 0.1 else 4)
     read = read_telemetry(write(tmp_path / "a.csv", pd.DataFrame({"v": np.arange(400) % 7, "t": times})), "v", "t")
     assert np.abs(read.time_s - times).max() < 0.05 * interval_s and read.values.tolist() == (np.arange(400) % 7).tolist()
+    assert (read.name, read.start[:19], read.has_time, read.time_unit) == ("a", "1970-01-01T00:00:00", True, "s")
 
 
 def test_what_is_no_file_is_refused(tmp_path, refused):
@@ -104,36 +105,6 @@ def test_what_is_no_file_is_refused(tmp_path, refused):
     for name in ("absent.csv", "folder.csv"):
         with refused(name):
             read_telemetry(tmp_path / name)
-
-
-def test_array_round_trip(tmp_path):
-    values = np.random.default_rng(0).normal(size=(20, 3))
-    read = read_telemetry(write(tmp_path / "wheel.npy", values), column="2")
-    assert (read.values == values[:, 2].astype(np.float32)).all() and read.values.dtype == np.float32
-    assert (read.name, read.interval_s, read.start, read.has_time, read.time_unit) == ("wheel", 1.0, None, False, "samples")
-    for arguments in ({}, {"column": "0"}):
-        assert (read_telemetry(write(tmp_path / "one.npy", values[:, 1]), **arguments).values == values[:, 1].astype(np.float32)).all()
-    assert (read_telemetry(write(tmp_path / "one.npy", values[:, :1])).values == values[:, 0].astype(np.float32)).all()
-
-
-@pytest.mark.parametrize(
-    ("times", "start"),
-    [
-        (pd.date_range("2020-03-01T06:00:00", periods=20, freq="250ms"), "2020-03-01T06:00:00+00:00"),
-        (pd.date_range("2020-03-01T06:00:00", periods=20, freq="250ms", tz="Europe/Berlin"), "2020-03-01T05:00:00+00:00"),
-        (np.arange(20) * 0.25, "1970-01-01T00:00:00+00:00"),
-        (1_583_042_400 + np.arange(20) * 0.25, "2020-03-01T06:00:00+00:00"),
-    ],
-    ids=["date-times", "with a zone", "seconds", "seconds since 1970"],
-)
-def test_table_round_trip_with_time(tmp_path, times, start):
-    values = np.random.default_rng(1).normal(size=20).astype(np.float32)
-    table = pd.DataFrame({"other": 0.0, "value": values, "when": times})
-    read = read_telemetry(write(tmp_path / "wheel.parquet", table), column="value", time="when")
-    assert (read.values == values).all()
-    assert read.interval_s == pytest.approx(0.25, rel=1e-6)
-    assert (read.start, read.offset_s, read.has_time, read.time_unit) == (start, 0.0, True, "s")
-    assert read.time_s == pytest.approx(np.arange(20) * 0.25)
 
 
 def test_parts_keep_the_clock():

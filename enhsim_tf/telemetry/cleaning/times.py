@@ -234,14 +234,18 @@ def _infer_unit(values: np.ndarray, what: str) -> str:
                         f"Give time_format {form!r}, or 's' (--time-format)."
                     )
     refuse_days(values, what)
-    for unit in ("s", "ms", "us", "ns"):
-        low, high = (bound * 1e9 / UNITS_NS[unit] for bound in _YEARS_S)
-        if (unit == "s" and size < low) or low <= size <= high:
-            return unit
+    unit = "s" if size < _YEARS_S[0] else epoch_unit(size)
+    if unit is not None:
+        return unit
     raise InputError(
         f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in {what}, which are not from 1980 to 2100 in any of "
         "these units. Give time_format, such as 'ms' (--time-format)."
     )
+
+
+def epoch_unit(size: float) -> str | None:
+    """Returns the unit in which a number is a time since 1970 from the years 1979 to 2103, or None."""
+    return next((unit for unit in ("s", "ms", "us", "ns") if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None)
 
 
 def date_forms(text: pd.Series) -> list[str]:

@@ -37,7 +37,9 @@ def read_table_channels(
     source: Path | Sequence[Path] | pd.DataFrame | pd.Series, columns: list[str] | None, time: str | None, options: Cleaning
 ) -> dict[str, pd.Series]:
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
-    what = "the table" if isinstance(source, pd.DataFrame | pd.Series) else getattr(source, "name", None) or f"{source[0].name} ..."
+    what = "the table"
+    if not isinstance(source, pd.DataFrame | pd.Series):
+        what = source.name if isinstance(source, Path) else f"{source[0].name} ..."
     table = _without_repeats(read_table(source, options), columns, time, options, what)
     for name, cells in table.frame.items():
         if cells.dtype == object and len(cells) and isinstance(cells.iloc[0], list | np.ndarray):
@@ -100,7 +102,8 @@ def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | No
     """Refuses names that occur twice, unless other columns were asked for, and names of options that do not occur."""
     names = table.frame.columns
     repeated = set(names[names.duplicated()])
-    named = [*(options.label_column or ()), *(options.series_column or ()), *(options.value_column or ()), *([time] if time else ())]
+    times = () if time is None else (time,)
+    named = [*(options.label_column or ()), *(options.series_column or ()), *(options.value_column or ()), *times]
     for name in [*(columns or ()), *named]:
         if name in repeated or name in named and name not in names and name != NO_TIME:
             received = f"{name!r} more than once in {what}" if name in repeated else repr(name)

@@ -132,17 +132,12 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
 
 def _parse(stream: io.BytesIO | io.StringIO, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
     width, begin = len(dialect.names), stream.tell()
-    options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False}
+    options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False, "low_memory": False}
     options |= {"skip_blank_lines": dialect.separator == BLANKS, "decimal": decimal or ".", "skipinitialspace": dialect.separator != "\t"}
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # otherwise lines longer than the header are cut
-        warnings.simplefilter("error", pd.errors.DtypeWarning)
         try:
-            try:
-                return pd.read_csv(stream, **options)
-            except pd.errors.DtypeWarning:  # numbers and text in one column: read as a whole, which is slower, all become text
-                stream.seek(begin)
-                return pd.read_csv(stream, low_memory=False, **options)
+            return pd.read_csv(stream, **options)
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=range(width), dtype=object)
         except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
