@@ -222,9 +222,7 @@ def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused)
 
 @pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("first", 4.0), ("last", 6.0)])
 def test_one_of_several_values_at_the_same_time_is_taken(refused, how, value):
-    values, times = np.insert(VALUES, 11, [4.0, 6.0]), np.insert(np.arange(N), 11, [11, 11])
-    values = np.delete(values, 13)  # removes the original row 11, so that only the two inserted values have its time
-    series = pd.Series(values, index=TIMES[np.delete(times, 13)], name="volts")
+    series = pd.concat([CLEAN.iloc[:11], with_times(TIMES[[11, 11]], [4.0, 6.0]), CLEAN.iloc[12:]])
     cleaned = cleaned_of(series, same_time=how)
     as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
     (finding,) = repairs(cleaned.report)
@@ -241,23 +239,23 @@ def test_a_missing_value_at_a_repeated_time_is_ignored():
         assert cleaned.report.find("same time").count == 1 and cleaned.report.find("missing values") is None
 
 
-@pytest.mark.parametrize("length", [5, 6])
-def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
-    missing = np.arange(100, 100 + length)
-    for series in (CLEAN.drop(TIMES[missing]), set_rows(missing, np.nan, float), set_rows(missing, np.inf, float)):
-        cleaned = cleaned_of(series)
-        if length == 5:
-            as_one(cleaned, linear(missing))
-            assert cleaned.report.find("gaps filled").samples_filled == 5
-        else:
-            before, after = cleaned.parts
-            np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
-            np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
-            assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
-            found = cleaned.report.find("gaps")
-            assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
-    assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=6).parts) == 1
-    assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
+GAP = np.arange(100, 106)
+
+
+@pytest.mark.parametrize(
+    "series", [CLEAN.drop(TIMES[GAP]), set_rows(GAP, np.nan, float), set_rows(GAP, np.inf, float)], ids=["-", "NaN", "inf"]
+)
+def test_a_gap_of_more_than_max_fill_splits_the_series(series):
+    cleaned = cleaned_of(series)
+    before, after = cleaned.parts
+    np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
+    np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
+    assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
+    found = cleaned.report.find("gaps")
+    assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
+    filled = cleaned_of(series, max_fill=6)
+    as_one(filled, linear(GAP))
+    assert filled.report.find("gaps filled").samples_filled == 6
 
 
 def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
@@ -308,13 +306,9 @@ def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
     """Each sample of the stretch is replaced by five rows around its time whose mean equals the sample."""
     offsets, differences = np.array([-0.4, -0.2, 0.0, 0.2, 0.4]), np.array([1.0, -2.0, 0.5, 2.0, -1.5])
     inside = np.arange(where + 1, where + 51)
-    fine = pd.Series(
-        (VALUES[inside, None] + differences).ravel(),
-        index=START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s"),
-        name="volts",
-    )
-    series = pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index()
-    cleaned = cleaned_of(series)
+    times = START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s")
+    fine = with_times(times, (VALUES[inside, None] + differences).ravel())
+    cleaned = cleaned_of(pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index())
     as_one(cleaned, off=1e-5)
     assert cleaned.report.find("averaged").rows_left_out == 50 * 4 and cleaned.report.find("other rates").count >= 50 * 5
 

@@ -80,7 +80,7 @@ def as_column(values: Any, what: str) -> pd.Series:
         return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
     except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not support
         reason = (str(error).splitlines() or [""])[0]
-        raise InputError(f"Expected numbers. Received: {type(values).__name__} from {what} ({reason}). Give an array of numbers.") from None
+        raise InputError(f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). Name one column.") from None
 
 
 def is_text(values: pd.Series) -> bool:

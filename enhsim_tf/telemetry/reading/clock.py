@@ -54,12 +54,10 @@ class Clock:
     Args:
         columns: Columns that make it up; none if samples are counted.
         cells: Their content, one cell per row, to be parsed as times.
-        form: The unit or kind that the name tells, as for `Cleaning.time_format`, or None.
     """
 
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
-    form: str | None = None
 
 
 def words_of(name: str) -> list[str]:
@@ -183,19 +181,19 @@ def _refuse_unknown(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapp
             )
 
 
-def named_clock(clock: Clock, what: str, stated: str | None, units: Mapping[str, str]) -> Clock:
-    """Returns a clock of one column of numbers with its unit: the stated one, that of its name, or that of the line of units.
+def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
+    """Returns the unit or kind of days that the name of a clock's one column or the line of units states, or None.
 
     Raises an `InputError` if the column holds days whose kind is not known.
     """
-    if len(clock.columns) != 1 or stated is not None:
-        return dataclasses.replace(clock, form=stated)
+    if len(clock.columns) != 1:
+        return None
     name = clock.columns[0]
     form = _name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
     if form is None and pd.api.types.is_numeric_dtype(clock.cells.dtype) and re.search(r"dat(?:e|um)", name.casefold()):
         values = clock.cells.to_numpy(np.float64, na_value=np.nan)
         refuse_days(values[np.isfinite(values)], f"{name!r} of {what}", even_whole=True)
-    return dataclasses.replace(clock, form=form)
+    return form
 
 
 def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]) -> set[str]:

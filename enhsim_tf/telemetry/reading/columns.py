@@ -11,7 +11,7 @@ import pandas as pd
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, named_clock, words_of
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, unit_of, words_of
 from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
@@ -81,11 +81,11 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
         clock = find_clock(frame, free, {name: values for name, values in numbers.items() if name not in roles}, what)
     else:
         clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
-    clock = named_clock(clock, what, options.time_format, table.units)
     times = None
     if clock.columns:
+        form = options.time_format or unit_of(clock, table.units, what)
         of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-        times = parse_times(clock.cells, of_what, options.on_bad_times == "drop", clock.form, table.places)
+        times = parse_times(clock.cells, of_what, options.on_bad_times == "drop", form, table.places)
     take("clock", clock.columns)
     take("further clocks", further_clocks(clock, times, numbers, kinds))
     counted = [name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])]
@@ -95,11 +95,10 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
     words = tuple(name for name, kind in kinds.items() if kind == "words" and not roles.get(name))
     if columns is None:
         take("columns left out", [name for name in kinds if name not in channels])
-    left_out = {
-        role: [name for name in kinds if roles.get(name) == role]
-        for role in dict.fromkeys(roles.values())
-        if role not in ("", "clock", "series")
-    }
+    left_out: dict[str, list[str]] = {}
+    for name in kinds:
+        if roles.get(name, "") not in ("", "clock", "series"):
+            left_out.setdefault(roles[name], []).append(name)
     return Layout(clock, times, tuple(channels), tuple(left_out.get("labels", ())), words, left_out)
 
 
