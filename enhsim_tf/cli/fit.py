@@ -19,7 +19,7 @@ def run_fit(options: argparse.Namespace) -> int:
     workers = parse_workers(options.workers, options.engine)
     cleaning = cleaning_options(options, options.window or 32, "missing")
     from enhsim_tf.simulator.fit_many import CoarseRun, fit_channels  # imported here, because pandas is slow to import
-    from enhsim_tf.telemetry.commands import read_commands
+    from enhsim_tf.telemetry.arrays import read_commands
     from enhsim_tf.telemetry.sources import read_source
 
     speaks = not options.json

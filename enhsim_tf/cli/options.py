@@ -164,7 +164,7 @@ def run_for(simulator: "EnhancedSimulator", options: argparse.Namespace, cleanin
     commands = simulator.alignment.commands
     if commands is not None and options.coarse is None:
         from enhsim_tf.coarse_simulator.commands import CommandTraces
-        from enhsim_tf.telemetry.commands import read_commands
+        from enhsim_tf.telemetry.arrays import read_commands
 
         found = read_commands(options.source)
         if found is None:

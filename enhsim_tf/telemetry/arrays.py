@@ -1,5 +1,11 @@
-"""Reads arrays as channels without times."""
+"""Reads arrays as channels without times, and the commands that some of them hold.
 
+In telemanom's SMAP and MSL data, column 0 of an array is the value, and each of the 24 or 54 other columns is 1 at the samples at which
+one command was sent and 0 at all others.
+"""
+
+import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +15,18 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.common.size_limits import MAX_COLUMNS, load_npy
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding
-from enhsim_tf.telemetry.commands import has_commands
 from enhsim_tf.telemetry.reading.clock import NO_TIME
 
+_NUM_COLUMNS = (25, 55)  # of the published arrays with commands: SMAP, MSL
 
-def _load(path: Path) -> np.ndarray:
-    """Reads a `.npy` file of one or two dimensions, without pickle, so that its content cannot run code."""
+
+def read_array_channels(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
+    """Reads the columns of an array; see `sources.read_source`, which calls it. `options` has no effect, since there are no times.
+
+    Of an array with commands, only column 0 is read, unless columns are named.
+    """
+    if time not in (None, NO_TIME):
+        raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
     try:
         array = load_npy(path)
     except ValueError as error:
@@ -24,17 +36,6 @@ def _load(path: Path) -> np.ndarray:
     if array.ndim not in (1, 2) or array.dtype.names:
         shape = "fields" if array.dtype.names else array.shape
         raise InputError(f"Expected an array of shape (samples,) or (samples, columns). Received: {shape} in {path.name}. Reshape it.")
-    return array
-
-
-def read_array_channels(path: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
-    """Reads the columns of an array; see `sources.read_source`, which calls it. `options` has no effect, since there are no times.
-
-    Of an array in the layout of `commands`, only column 0 is read, unless columns are named.
-    """
-    if time not in (None, NO_TIME):
-        raise InputError(f"Expected time with a table only. Received: time={time!r} with {path.name}. Leave it out.")
-    array = _load(path)
     array = array.reshape(len(array), -1) if array.size else array.reshape(0, 1)
     if columns is None and array.shape[1] > MAX_COLUMNS:
         raise InputError(f"Expected at most {MAX_COLUMNS:,} columns. Received: {array.shape[1]:,} in {path.name}. Name those to be read.")
@@ -44,10 +45,33 @@ def read_array_channels(path: Path, columns: list[str] | None, time: str | None,
             raise InputError(
                 f"Expected a column of {path.name}, a number from 0 to {len(known) - 1}. Received: {column!r}. Name one of these."
             )
+    is_first_only = columns is None and _has_commands(array)
     names = {column: path.stem if len(known) == 1 else f"{path.stem}.{column}" for column in known}
-    if columns is None and has_commands(array):
-        series = pd.Series(array[:, 0], name=names["0"])
+    found = {names[each]: pd.Series(array[:, int(each)], name=names[each]) for each in (["0"] if is_first_only else columns or known)}
+    if is_first_only:
         text = f"columns 1 to {len(known) - 1} hold only 0 and 1 and were taken as commands, not as channels: {len(known) - 1}"
-        series.attrs["findings"] = [Finding("commands", len(known) - 1, text).to_dict()]
-        return {names["0"]: series}
-    return {names[column]: pd.Series(array[:, int(column)], name=names[column]) for column in columns or known}
+        found[names["0"]].attrs["findings"] = [Finding("commands", len(known) - 1, text).to_dict()]
+    return found
+
+
+def read_commands(source: str | os.PathLike, columns: Sequence[str] | None = None) -> np.ndarray | None:
+    """Reads the commands of a source of telemetry of which `columns` (None: all) are read as channels.
+
+    Returns:
+        float32 array of shape `(samples, commands)`, or None if the source is not an array of this layout, or if a column of commands is
+        read as a channel: it would be explained by itself.
+    """
+    path = Path(source)
+    if any(str(each) != "0" for each in columns or ()) or path.suffix.lower() != ".npy" or not path.is_file():
+        return None
+    try:
+        array = load_npy(path)
+    except ValueError:  # the reader of the channels says what is wrong with the file
+        return None
+    return array[:, 1:].astype(np.float32) if _has_commands(array) else None
+
+
+def _has_commands(array: np.ndarray) -> bool:
+    """Whether an array has the published layout: 25 or 55 columns, of which all after the first hold only zeros and ones."""
+    has_layout = array.ndim == 2 and array.shape[1] in _NUM_COLUMNS and array.dtype.kind in "fiu" and len(array)
+    return bool(has_layout) and bool(np.isin(array[:, 1:], (0, 1)).all())

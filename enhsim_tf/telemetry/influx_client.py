@@ -1,4 +1,4 @@
-"""Requests to an InfluxDB 2 server through its official client.
+"""Requests to an InfluxDB 2 server through its official client, an optional extra that this module imports.
 
 Temporary failures are retried; every other failure raises an `InputError` of one line. Only the client holds the token: no message,
 log or pickled copy of these objects contains it.
@@ -9,22 +9,25 @@ import itertools
 import os
 import re
 import time
-import urllib.parse
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from influxdb_client import Dialect, InfluxDBClient
+from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
+from influxdb_client.client.write_api import SYNCHRONOUS
+from influxdb_client.rest import ApiException
+from urllib3.exceptions import HTTPError
 
 from enhsim_tf.common.errors import InputError
 
-if TYPE_CHECKING:
-    from influxdb_client import InfluxDBClient
-
-FIRST_NS, LAST_NS = -9_223_372_036 * 10**9, 2**63 - 2  # range of times in InfluxDB, nanoseconds since 1970, starting at a whole second
+_FIRST_NS, _LAST_NS = -9_223_372_036 * 10**9, 2**63 - 2  # range of times in InfluxDB, nanoseconds since 1970, starting at a whole second
 VARIABLES = ("INFLUXDB_V2_URL", "INFLUXDB_V2_TOKEN", "INFLUXDB_V2_ORG")
 
 _Answer = TypeVar("_Answer")
+_URL = r"https?://(?:[\w.-]+|\[[\da-fA-F:.]+\])(?::[1-9]\d{0,4})?(?:/[!-~]*)?"  # without a name or a password
 _ALL_TIME = "1677-09-21T00:12:44Z", "2262-04-11T23:47:16.854775806Z"
+_REFUSALS = (ApiException, FluxQueryException, FluxCsvParserException)
 _MAY_PASS = (408, 429, 500, 502, 503, 504)  # HTTP status codes of a server that is busy or still starting
 _TIMEOUT_MS = 60_000  # timeout of a request if INFLUXDB_V2_TIMEOUT is not set; a disk may be slow
 
@@ -38,23 +41,23 @@ class InfluxServer:
             answered, there are no retries.
 
     Raises:
-        InputError: If a variable is missing or cannot be used, or if the client is not installed.
+        InputError: If a variable is missing or cannot be used.
     """
 
     def __init__(self, bucket: str, max_retry_s: float = 60.0):
-        self.bucket, self.max_retry_s = bucket, max_retry_s
-        self.url, self.organisation = _variables()
+        self.bucket, self.max_retry_s, self._has_answered = bucket, max_retry_s, False
+        self.url, self.organisation = _check_variables()
         try:
-            import influxdb_client  # noqa: F401 - checks that it is installed
-        except ImportError:
+            self._client = InfluxDBClient.from_env_properties()
+        except ValueError:
             raise InputError(
-                "Expected the package influxdb-client. Received: it is not installed. Run python -m pip install influxdb-client."
+                "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. Received: others. Correct them."
             ) from None
-        self._opened: InfluxDBClient | None = None
-        self._has_answered = False
+        if "INFLUXDB_V2_TIMEOUT" not in os.environ:
+            self._client.api_client.configuration.timeout = _TIMEOUT_MS
 
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_opened": None}  # another process opens its own connection, so the token is not pickled
+    def __reduce__(self) -> tuple:
+        return InfluxServer, (self.bucket, self.max_retry_s)  # a copy opens its own connection, so the token is not pickled
 
     def send(self, lines: str) -> None:
         """Writes points. The request can be repeated safely, because writing a point twice stores it once.
@@ -64,28 +67,29 @@ class InfluxServer:
         Args:
             lines: Points in line protocol, with times in nanoseconds.
         """
-        from influxdb_client.client.write_api import SYNCHRONOUS
-
-        record = lines.encode()
-        self._repeat(lambda client: client.write_api(SYNCHRONOUS).write(self.bucket, record=record, write_precision="ns"))
+        self._repeat(lambda: self._client.write_api(SYNCHRONOUS).write(self.bucket, record=lines.encode(), write_precision="ns"))
 
     def delete(self, predicate: str) -> None:
         """Deletes all points that match a predicate, at any time."""
-        self._repeat(lambda client: client.delete_api().delete(*_ALL_TIME, predicate, self.bucket, self.organisation))
+        self._repeat(lambda: self._client.delete_api().delete(*_ALL_TIME, predicate, self.bucket, self.organisation))
 
     def ask(self, query: str, limit: int | None = None) -> list[Mapping[str, Any]]:
         """Runs a Flux query with a small result; returns its rows, or the first `limit` of them."""
-        return self._repeat(lambda client: [record.values for record in itertools.islice(client.query_api().query_stream(query), limit)])
+        return self._repeat(lambda: [row.values for row in itertools.islice(self._client.query_api().query_stream(query), limit)])
 
-    def stream(self, steps: str, start_ns: int, stop_ns: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def points(self, wanted: Mapping[str, str], start_ns: int = _FIRST_NS, stop_ns: int = _LAST_NS) -> str:
+        """Flux for the points of the bucket whose columns have the wanted values, from `start_ns` up to, but not including, `stop_ns`."""
+        matches = " and ".join(f"r[{quote(column)}] == {quote(value)}" for column, value in wanted.items()) or "true"
+        times = f"start: time(v: {start_ns}), stop: time(v: {stop_ns})"
+        return f"from(bucket: {quote(self.bucket)}) |> range({times}) |> filter(fn: (r) => {matches})"
+
+    def stream(self, wanted: Mapping[str, str]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Streams the points of one series in chronological order, block by block, so that memory does not grow with their number.
 
         If the connection breaks, the query is repeated from the point after the last one received.
 
         Args:
-            steps: Flux that selects the series among the points of the bucket, `|> filter(...)`.
-            start_ns: Start of the time range in nanoseconds since 1970 (inclusive).
-            stop_ns: End of the time range in nanoseconds since 1970 (exclusive).
+            wanted: Values of the columns that select the series among the points of the bucket.
 
         Yields:
             Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
@@ -93,17 +97,13 @@ class InfluxServer:
         Raises:
             InputError: If the server does not answer, the connection keeps breaking, or the values are not numbers.
         """
-        from influxdb_client import Dialect
-        from urllib3.exceptions import HTTPError
-
-        dialect, moved = Dialect(annotations=[]), time.monotonic()
-        while start_ns < stop_ns:
-            query = f'{self.points(start_ns, stop_ns)} {steps} |> keep(columns: ["_time", "_value"])'
-            answer = self._repeat(lambda client, query=query: client.query_api().query_raw(query, dialect=dialect))
+        start_ns, moved = _FIRST_NS, time.monotonic()
+        while True:
+            query = f'{self.points(wanted, start_ns)} |> keep(columns: ["_time", "_value"])'
+            answer = self._repeat(lambda query=query: self._client.query_api().query_raw(query, dialect=Dialect(annotations=[])))
             with contextlib.closing(answer):
-                blocks = _blocks(answer)
                 try:
-                    for times, values in blocks:
+                    for times, values in _blocks(answer):
                         yield times, values
                         start_ns, moved = int(times[-1]) + 1, time.monotonic()
                     return
@@ -115,40 +115,15 @@ class InfluxServer:
                 )
             time.sleep(0.1)
 
-    def points(self, start_ns: int = FIRST_NS, stop_ns: int = LAST_NS) -> str:
-        """The Flux expression for all points of the bucket from `start_ns` (inclusive) to `stop_ns` (exclusive)."""
-        return f"from(bucket: {quote(self.bucket)}) |> range(start: time(v: {start_ns}), stop: time(v: {stop_ns}))"
-
-    def _client(self) -> "InfluxDBClient":
-        if self._opened is None:
-            from influxdb_client import InfluxDBClient
-
-            _variables()  # check again: they may have changed
-            try:
-                self._opened = InfluxDBClient.from_env_properties()
-            except ValueError:
-                raise InputError(
-                    "Expected numbers in INFLUXDB_V2_TIMEOUT and INFLUXDB_V2_CONNECTION_POOL_MAXSIZE. Received: others. Correct them."
-                ) from None
-            if "INFLUXDB_V2_TIMEOUT" not in os.environ:
-                self._opened.api_client.configuration.timeout = _TIMEOUT_MS
-        return self._opened
-
-    def _repeat(self, request: Callable[["InfluxDBClient"], _Answer]) -> _Answer:
+    def _repeat(self, request: Callable[[], _Answer]) -> _Answer:
         """Repeats a request until it succeeds; raises an `InputError` if it cannot succeed or takes longer than `max_retry_s`."""
-        from influxdb_client.client.flux_csv_parser import FluxCsvParserException, FluxQueryException
-        from influxdb_client.rest import ApiException
-        from urllib3.exceptions import HTTPError
-
-        client, refusals = self._client(), (ApiException, FluxQueryException, FluxCsvParserException)
         until, pause_s = time.monotonic() + self.max_retry_s, 0.1
         while True:
             try:
-                answer = request(client)
-            except (*refusals, HTTPError, OSError) as error:
-                status = getattr(error, "status", None)
-                may_pass = status in _MAY_PASS or not isinstance(error, refusals)
-                words = self._in_words(error, status, isinstance(error, refusals))
+                answer = request()
+            except (*_REFUSALS, HTTPError, OSError) as error:
+                may_pass = not isinstance(error, _REFUSALS) or getattr(error, "status", None) in _MAY_PASS
+                words = self._in_words(error)
             else:
                 self._has_answered = True
                 return answer
@@ -157,14 +132,14 @@ class InfluxServer:
             time.sleep(pause_s)
             pause_s = min(2 * pause_s, 5.0)
 
-    def _in_words(self, error: Exception, status: int | None, is_refusal: bool) -> str:
-        said = str(getattr(error, "message", None) if status else getattr(error, "reason", error))
-        said = " ".join(said.replace(os.environ.get(VARIABLES[1]) or "\n", "***").split())[:300]
+    def _in_words(self, error: Exception) -> str:
+        status = getattr(error, "status", None)
+        said = " ".join(str(getattr(error, "message", None) if status else getattr(error, "reason", error)).split())[:300]
         if status == 401:
             return f"Expected a token that {self.url} knows. Received: another in {VARIABLES[1]}. Copy it again."
-        if type(error).__name__ == "FluxCsvParserException" or (status == 404 and "not" not in said):
+        if isinstance(error, FluxCsvParserException) or (status == 404 and "not" not in said):
             return f"Expected an InfluxDB 2 server at {self.url}. Received: an answer of something else. Correct {VARIABLES[0]}."
-        if not is_refusal:
+        if not isinstance(error, _REFUSALS):
             waited = f" for {self.max_retry_s:g} s" if self._has_answered else ""
             return f"Expected an InfluxDB 2 server at {self.url}. Received: no answer{waited}. Start it or correct {VARIABLES[0]}."
         return (
@@ -173,29 +148,24 @@ class InfluxServer:
         )
 
 
-def _variables() -> tuple[str, str]:
+def quote(text: str) -> str:
+    """Quotes a text as a Flux string. Characters that could end it or start an interpolated expression are escaped as hex codes."""
+    return '"' + re.sub(r'[\\"$\x00-\x1f\x7f]', lambda found: f"\\x{ord(found[0]):02x}", text) + '"'
+
+
+def _check_variables() -> tuple[str, str]:
     """Checks the environment variables that the client reads, whose own errors would show the token; returns URL and organisation."""
     missing = [name for name in VARIABLES if not os.environ.get(name, "").strip()]
     if missing:
         raise InputError(f"Expected the variables {', '.join(VARIABLES)}. Received: no {' and no '.join(missing)}. Set them.")
     url, token, organisation = (os.environ[name] for name in VARIABLES)
-    try:
-        parts = urllib.parse.urlsplit(url)
-        usable = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0 and url.isprintable() and " " not in url
-    except ValueError:
-        usable = False
-    if not usable or parts.username or parts.password:
+    if not re.fullmatch(_URL, url):
         raise InputError(
             "Expected INFLUXDB_V2_URL like http://localhost:8086, without a name or a password. Received: another. Correct it."
         )
     if not (token.isascii() and token.isprintable()):
         raise InputError("Expected INFLUXDB_V2_TOKEN of printable ASCII. Received: a line break or other characters in it. Copy it again.")
     return url.rstrip("/"), organisation
-
-
-def quote(text: str) -> str:
-    """Quotes a text as a Flux string. Characters that could end it or start an interpolated expression are escaped as hex codes."""
-    return '"' + re.sub(r'[\\"$\x00-\x1f\x7f]', lambda found: f"\\x{ord(found[0]):02x}", text) + '"'
 
 
 def _blocks(answer: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:

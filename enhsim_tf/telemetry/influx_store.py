@@ -1,4 +1,4 @@
-"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline. Implements `TelemetryStore`.
+"""A telemetry store in InfluxDB 2, the kind of database at the end of the paper's pipeline. It has the methods of `ParquetStore`.
 
 Each series is written under a version tag, the hash of its content. A description that is written last makes this version the
 current one. An interrupted write therefore never leaves a partial series, a repeated write stores the series once, and the old
@@ -16,13 +16,11 @@ from typing import Any
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.influx_client import FIRST_NS, LAST_NS, InfluxServer, quote
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry, nanoseconds
 
 SCHEME = "influxdb://"
 _ABOUT, _ABOUT_NS = "enhsim_tf_series", 4_102_444_800 * 10**9  # descriptions have a time in the year 2100, beyond any retention period
 _CHANNEL, _VERSION = "channel", "version"  # tags of the series written by this class
-_IS_VERSION = re.compile(r"[0-9a-f]{16}")
 _DESCRIBED = [field.name for field in dataclasses.fields(Telemetry) if field.name != "values"]
 _SHOWN = 3  # number of series listed in a message
 
@@ -96,10 +94,13 @@ class InfluxStore:
     """
 
     def __init__(self, location: str | InfluxLocation, batch_size: int = 5_000, max_retry_s: float = 60.0):
-        self.location = parse_location(str(location))
-        if batch_size < 1 or not max_retry_s >= 0:
-            raise InputError(f"Expected batch_size >= 1 and max_retry_s >= 0. Received: {batch_size} and {max_retry_s}. Correct them.")
-        self.batch_size = batch_size
+        self.location, self.batch_size = parse_location(str(location)), batch_size
+        try:
+            from enhsim_tf.telemetry.influx_client import InfluxServer
+        except ImportError:
+            raise InputError(
+                "Expected the package influxdb-client. Received: it is not installed. Run python -m pip install influxdb-client."
+            ) from None
         self.server = InfluxServer(self.location.bucket, max_retry_s)
 
     def __repr__(self) -> str:
@@ -108,62 +109,54 @@ class InfluxStore:
     def write(self, telemetry: Telemetry) -> None:
         """Stores a series atomically under its name. An existing series of that name is replaced.
 
-        Args:
-            telemetry: The series.
-
         Raises:
             InputError: If the series has no name, no samples, values that are not finite, or samples less than a nanosecond apart,
                 or if the server does not accept it.
         """
+        from influxdb_client import Point
+
         times, values = _points(telemetry)
         self._check_names(telemetry.name)
-        version, about = self._describe(telemetry, values)
+        about = {key: getattr(telemetry, key) for key in _DESCRIBED} | {"num_samples": len(values), "location": str(self.location)}
+        about |= {key: float(about[key]) for key in ("interval_s", "offset_s")}
+        version = hashlib.sha256(json.dumps(about).encode() + values.tobytes()).hexdigest()[:16]
         tags = dict(self.location.tags) | {_CHANNEL: _as_tag(telemetry.name), _VERSION: version}
-        begin = f"{_escape(self.location.measurement, ', ')}{_tag_set(tags)} {_escape(self.location.field)}="
+        point = {"measurement": self.location.measurement, "tags": tags, "fields": {self.location.field: True}}
+        begin = Point.from_dict(point).to_line_protocol().removesuffix("true")
         for first in range(0, len(values), self.batch_size):
             # float32 to float64 is exact, and so is the shortest decimal form of the float64
             batch = zip(*(array[first : first + self.batch_size].tolist() for array in (values, times)), strict=True)
             self.server.send("\n".join([f"{begin}{value!r} {time_ns}" for value, time_ns in batch]))
-        text = about.replace("\\", "\\\\").replace('"', '\\"')
-        key = {"key": self._hash(telemetry.name), "store": self._hash()}
-        self.server.send(f'{_ABOUT}{_tag_set(key)} about="{text}" {_ABOUT_NS}')
-        rows = self.server.ask(f"{self.server.points()} {self._filter({_CHANNEL: tags[_CHANNEL]})} |> first()")
+        point = {"measurement": _ABOUT, "tags": {"key": self._hash(telemetry.name), "store": self._hash()}, "time": _ABOUT_NS}
+        self.server.send(Point.from_dict(point | {"fields": {"about": json.dumps(about | {_VERSION: version})}}).to_line_protocol())
+        rows = self.server.ask(f"{self.server.points(self._wanted({_CHANNEL: tags[_CHANNEL]}))} |> first()")
         for old in {row[_VERSION] for row in rows if _VERSION in row and _tags_of(row) == tags | {_VERSION: row[_VERSION]}} - {version}:
-            if _IS_VERSION.fullmatch(old):  # otherwise it is a tag of another program with the same name
+            if re.fullmatch(r"[0-9a-f]{16}", old):  # otherwise it is a tag of another program with the same name
                 self.server.delete(f'{_VERSION}="{old}"')
 
     def read(self, name: str) -> Telemetry:
         """Reads the series stored under `name`.
 
-        Args:
-            name: Name of the series.
-
-        Returns:
-            The series.
-
         Raises:
             InputError: If there is no such series, if samples are missing from it, or if the server does not answer.
         """
-        about = self._about(name)
-        described = Telemetry(np.empty(0, np.float32), **{key: about[key] for key in _DESCRIBED})
-        found, pieces, num_samples = 0, [described.values], about["num_samples"]
-        for times, values in self.server.stream(self._of_series(name, about), FIRST_NS, LAST_NS):
-            as_expected = nanoseconds(described, found, min(found + len(times), num_samples))
-            agree = np.append(times[: len(as_expected)] == as_expected, False).argmin()  # number of leading points with the expected times
-            with np.errstate(over="ignore"):  # points of other programs may be beyond float32
-                pieces.append(values[:agree].astype(np.float32))
-            found += agree
-            if agree < len(times):
-                break
-        if found < num_samples:
+        about = self._abouts({"key": self._hash(name)}).get(name)
+        if about is None:
+            raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
+        stream = self.server.stream(self._wanted({_CHANNEL: _as_tag(name), _VERSION: about[_VERSION]}))
+        blocks = [(np.empty(0, np.int64), np.empty(0)), *stream]
+        times, values = (np.concatenate(arrays)[: about["num_samples"]] for arrays in zip(*blocks, strict=True))
+        telemetry = Telemetry(values.astype(np.float32), **{key: about[key] for key in _DESCRIBED})
+        found = np.append(times == nanoseconds(telemetry), False).argmin()  # number of leading points with the expected times
+        if found < about["num_samples"]:
             raise InputError(
-                f"Expected {num_samples:,} samples of {name!r}. Received: a gap before sample {found}. Write the series again."
+                f"Expected {about['num_samples']:,} samples of {name!r}. Received: a gap before sample {found}. Write the series again."
             )
-        return dataclasses.replace(described, values=np.concatenate(pieces))
+        return telemetry
 
     def names(self) -> list[str]:
         """The sorted names of the stored series."""
-        return sorted(self._abouts())
+        return sorted(self._abouts({"store": self._hash()}))
 
     def check(self) -> None:
         """Checks the connection to the server with an empty query.
@@ -171,36 +164,24 @@ class InfluxStore:
         Raises:
             InputError: If the server does not answer, does not accept the token, or has no such organisation or bucket.
         """
-        self.server.ask(f"{self.server.points(0, 1)} |> limit(n: 1)")
+        self.server.ask(f"{self.server.points({}, 0, 1)} |> limit(n: 1)")
 
-    def versions(self) -> dict[str, str]:
-        """The content hash of each stored series, by name. Equal series have equal hashes."""
-        return {name: about[_VERSION] for name, about in sorted(self._abouts().items())}
-
-    def chunks(
-        self, name: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Streams the stored points of a series in chronological order, in blocks of some ten thousand points.
-
-        Args:
-            name: Name of a series stored by `write`. None: the only series at the location, whichever program wrote it.
-            start_ns: Start of the time range in nanoseconds since 1970 (inclusive). None: the first point.
-            stop_ns: End of the time range in nanoseconds since 1970 (exclusive). None: after the last point.
+    def chunks(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Streams the points of the only series at the location, whichever program wrote it, in blocks of some ten thousand points.
 
         Yields:
-            Times in nanoseconds since 1970 (int64) and values (float64), two arrays of the same length.
+            Times in nanoseconds since 1970 (int64), which increase, and values (float64), two arrays of the same length.
 
         Raises:
-            InputError: If there is no such series, more than one, or one without numbers, or if the server does not answer.
+            InputError: If there is no series, more than one, or one without numbers, or if the server does not answer.
         """
-        start = FIRST_NS if start_ns is None else max(int(start_ns), FIRST_NS)
-        stop = LAST_NS if stop_ns is None else min(int(stop_ns), LAST_NS)
-        if name is not None:
-            chosen = self._of_series(name, self._about(name))
-        else:
-            self._check_one_series()
-            chosen = self._filter()
-        yield from self.server.stream(chosen, start, stop)
+        rows = self.server.ask(f"{self.server.points(self._wanted())} |> first()", _SHOWN)
+        found = [str(dataclasses.replace(self.location, tags=tuple(sorted(_tags_of(row).items())))) for row in rows]
+        if len(found) > 1:
+            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {' or '.join(found)}.")
+        if not found:
+            raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
+        yield from self.server.stream(self._wanted())
 
     def _check_names(self, name: str) -> None:
         """Raises an `InputError` for names that line protocol cannot express, and for tags that the store uses itself."""
@@ -218,43 +199,19 @@ class InfluxStore:
         except UnicodeError:
             raise InputError(f"Expected a name of Unicode characters. Received: {name!r}. Choose another.") from None
 
-    def _describe(self, telemetry: Telemetry, values: np.ndarray) -> tuple[str, str]:
-        about = {key: getattr(telemetry, key) for key in _DESCRIBED} | {"num_samples": len(values), "location": str(self.location)}
-        about |= {key: float(about[key]) for key in ("interval_s", "offset_s")}
-        version = hashlib.sha256(json.dumps(about).encode() + values.tobytes()).hexdigest()[:16]
-        return version, json.dumps(about | {_VERSION: version})
-
     def _hash(self, *names: str) -> str:
         return hashlib.sha256(json.dumps([str(self.location), *names]).encode()).hexdigest()[:16]
 
-    def _abouts(self, *names: str) -> dict[str, dict[str, Any]]:
-        """Descriptions by name: of all series, or of the series `names` only."""
-        which = f'r.key == "{self._hash(*names)}"' if names else f'r.store == "{self._hash()}"'
-        steps = f'|> filter(fn: (r) => r._measurement == "{_ABOUT}" and r._field == "about" and {which}) |> keep(columns: ["_value"])'
-        rows = self.server.ask(f"{self.server.points(_ABOUT_NS, _ABOUT_NS + 1)} {steps}")
+    def _abouts(self, which: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+        """Descriptions by name, of the series whose description has a tag."""
+        wanted = {"_measurement": _ABOUT, "_field": "about"} | which
+        rows = self.server.ask(self.server.points(wanted, _ABOUT_NS, _ABOUT_NS + 1))
         return {about["name"]: about for about in (_description(row.get("_value")) for row in rows)}
 
-    def _about(self, name: str) -> dict[str, Any]:
-        about = self._abouts(name).get(name)
-        if about is None:
-            raise InputError(f"Expected a series of this store: {', '.join(self.names()) or 'it is empty'}. Received: {name!r}.")
-        return about
-
-    def _filter(self, tags: dict[str, str] | None = None) -> str:
+    def _wanted(self, tags: Mapping[str, str] | None = None) -> dict[str, str]:
+        """The columns that points of this location have, and further tags."""
         place = self.location
-        wanted = {"_measurement": place.measurement, "_field": place.field} | dict(place.tags) | (tags or {})
-        return f"|> filter(fn: (r) => {' and '.join(f'r[{quote(key)}] == {quote(value)}' for key, value in wanted.items())})"
-
-    def _of_series(self, name: str, about: dict[str, Any]) -> str:
-        return self._filter({_CHANNEL: _as_tag(name), _VERSION: about[_VERSION]})
-
-    def _check_one_series(self) -> None:
-        rows = self.server.ask(f"{self.server.points()} {self._filter()} |> first()", _SHOWN)
-        found = [str(dataclasses.replace(self.location, tags=tuple(sorted(_tags_of(row).items())))) for row in rows]
-        if len(found) > 1:
-            raise InputError(f"Expected one series at {self.location}. Received: several. Name one by its tags: {' or '.join(found)}.")
-        if not found:
-            raise InputError(f"Expected points at {self.location}. Received: none. Correct the measurement, the field or the tags.")
+        return {"_measurement": place.measurement, "_field": place.field} | dict(place.tags) | (tags or {})
 
 
 def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
@@ -275,16 +232,12 @@ def _points(telemetry: Telemetry) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _description(text: Any) -> dict[str, Any]:
-    """Parses a description written by `write`.
-
-    Raises:
-        InputError: If it is something else, since other programs can write there too.
-    """
+    """Parses a description written by `write`; refuses anything else, since other programs can write there too."""
+    kinds = {"name": str, "unit": str, _VERSION: str, "start": str | None, "interval_s": float, "offset_s": float, "num_samples": int}
     try:
         about = json.loads(text)
-        is_good = all(isinstance(about[key], str) for key in ("name", "unit", _VERSION)) and isinstance(about["start"], str | None)
-        is_good = is_good and all(type(about[key]) is float and np.isfinite(about[key]) for key in ("interval_s", "offset_s"))
-        is_good = is_good and type(about["num_samples"]) is int and 1 <= about["num_samples"] < 2**53
+        is_good = all(isinstance(about[key], kind) for key, kind in kinds.items()) and 1 <= about["num_samples"] < 2**53
+        is_good = is_good and np.isfinite([about["interval_s"], about["offset_s"]]).all()
     except (ValueError, TypeError, KeyError, RecursionError):
         is_good = False
     if not is_good:
@@ -304,12 +257,3 @@ def _encode(part: str) -> str:
 def _as_tag(name: str) -> str:
     """Encodes a name as a tag value. Characters that InfluxDB does not allow there are percent-encoded."""
     return "".join(sign if sign.isprintable() and sign not in "%\\" else urllib.parse.quote(sign) for sign in name)
-
-
-def _escape(name: str, characters: str = ",= ") -> str:
-    """Escapes a name for line protocol with backslashes before `characters`."""
-    return re.sub(f"[{characters}]", lambda found: f"\\{found[0]}", name)
-
-
-def _tag_set(tags: dict[str, str]) -> str:
-    return "".join(f",{_escape(key)}={_escape(value)}" for key, value in sorted(tags.items()))

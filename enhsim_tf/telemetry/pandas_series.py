@@ -16,9 +16,6 @@ _MAX_ROUNDING = 0.05  # largest distance of a time from the regular grid, in int
 def to_series(telemetry: Telemetry) -> pd.Series:
     """Converts telemetry to a pandas Series.
 
-    Args:
-        telemetry: The telemetry.
-
     Returns:
         The series, with a `DatetimeIndex` in UTC, or with a `RangeIndex` of sample numbers if the telemetry has no times. The
         unit is in `series.attrs["unit"]`.

@@ -1,13 +1,11 @@
-"""Storage of telemetry: the "storage and retrieval system" of the paper's section 2.
+"""The "storage and retrieval system" of the paper's section 2: a folder of Parquet files, which keeps values, times, unit and name unchanged.
 
-`TelemetryStore` is the interface of all stores, and `ParquetStore`, a folder of Parquet files, is the default implementation. A
-store keeps values, times, unit and name unchanged.
+`influx_store` has the same methods `write`, `read` and `names`.
 """
 
 import os
 import urllib.parse
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -17,19 +15,6 @@ from enhsim_tf.common.size_limits import check_parquet, short_reason
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 
 _DAY_NS = 86_400 * 10**9
-
-
-class TelemetryStore(Protocol):
-    """The interface of all stores."""
-
-    def write(self, telemetry: Telemetry) -> None:
-        """Stores a series under its name. An existing series of that name is replaced."""
-
-    def read(self, name: str) -> Telemetry:
-        """Reads the series stored under `name`. Raises an `InputError` if there is none."""
-
-    def names(self) -> list[str]:
-        """The sorted names of the stored series."""
 
 
 class ParquetStore:
@@ -47,9 +32,6 @@ class ParquetStore:
     def write(self, telemetry: Telemetry) -> None:
         """Stores a series atomically under its name. An existing series of that name is replaced.
 
-        Args:
-            telemetry: The series.
-
         Raises:
             InputError: If the series has no name or no samples, or its folder holds other files.
         """
@@ -65,13 +47,8 @@ class ParquetStore:
             raise InputError(f"Expected a place for the series. Received: {channel}, {what}. Name another folder for the store.")
         make_folder(self.folder)
         times = nanoseconds(telemetry)
-        described = {
-            "name": telemetry.name,
-            "unit": telemetry.unit,
-            "start": telemetry.start or "",
-            "interval_s": repr(telemetry.interval_s),
-            "offset_s": repr(telemetry.offset_s),
-        }
+        described = {"name": telemetry.name, "unit": telemetry.unit, "start": telemetry.start or ""}
+        described |= {key: repr(getattr(telemetry, key)) for key in ("interval_s", "offset_s")}
         table = pa.table({"time": pa.array(times, pa.timestamp("ns", "UTC")), "value": pa.array(telemetry.values, pa.float32())})
         table = table.replace_schema_metadata(described)
         days = times // _DAY_NS
@@ -83,12 +60,6 @@ class ParquetStore:
 
     def read(self, name: str) -> Telemetry:
         """Reads the series stored under `name`.
-
-        Args:
-            name: Name of the series.
-
-        Returns:
-            The series.
 
         Raises:
             InputError: If there is no such series, or if samples are missing from it.

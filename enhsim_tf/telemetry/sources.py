@@ -1,24 +1,26 @@
 """Reads telemetry from tables, arrays, the folder of a store, or InfluxDB, as one raw pandas Series per channel.
 
 Values are returned as they are in the source, and times are parsed but neither sorted nor dropped; that is done by `cleaning`.
-Findings made while reading are stored in `series.attrs["findings"]` and become part of the cleaning report. `registry` lists
-the readers of all sources.
+Findings made while reading are stored in `series.attrs["findings"]` and become part of the cleaning report.
 """
 
 import dataclasses
 import importlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning
-from enhsim_tf.telemetry.pandas_series import from_series
+from enhsim_tf.telemetry.pandas_series import from_series, to_series
+from enhsim_tf.telemetry.parquet_store import ParquetStore
 from enhsim_tf.telemetry.reading.channels import read_table_channels
 from enhsim_tf.telemetry.reading.clock import NO_TIME
-from enhsim_tf.telemetry.registry import ADDRESSES, FILES, FOLDER, SOURCES
+from enhsim_tf.telemetry.reading.files import files_of
+from enhsim_tf.telemetry.registry import FILES, SOURCES
 from enhsim_tf.telemetry.series import Telemetry, check_values
 
 Source = str | os.PathLike | Sequence[str | os.PathLike] | pd.DataFrame | pd.Series
@@ -61,9 +63,8 @@ def read_source(
             raise InputError(f"Expected tables that exist, as several sources are files of one table. Received: {wrong}. Give one source.")
         return read_table_channels(paths if len(paths) > 1 else paths[0], columns, time, options)
     source = os.fspath(source)
-    for form, reader in ADDRESSES.items():
-        if source.startswith(form[: form.index("//") + 2]):
-            return _function(reader)(source, columns, time, options)
+    if source.startswith("influxdb://"):
+        return _read_influx(source, columns, time)
     path, channel = Path(source), None
     if not _exists(path) and "#" in source:
         folder, channel = source.rsplit("#", 1)
@@ -71,12 +72,13 @@ def read_source(
     if not _exists(path):
         raise InputError(f"Expected a source of telemetry. Received: {source}, which does not exist. Give {SOURCES}.")
     if path.is_dir():
-        return _function(FOLDER)(path, columns if channel is None else [channel], time, options)
+        return _read_folder(path, columns if channel is None else [channel], time, options)
     if channel is not None:
         raise InputError(f"Expected folder#channel with a store's folder only. Received: {source}. Name the column of a file instead.")
     if path.suffix.lower() not in FILES:
         raise InputError(f"Expected a source of telemetry. Received: {path.name}. Give {SOURCES}.")
-    return _function(FILES[path.suffix.lower()])(path, columns, time, options)
+    module, reader = FILES[path.suffix.lower()].split(":")
+    return getattr(importlib.import_module(module), reader)(path, columns, time, options)
 
 
 def _exists(path: Path) -> bool:
@@ -86,10 +88,38 @@ def _exists(path: Path) -> bool:
         return False
 
 
-def _function(path: str) -> Callable[..., dict[str, pd.Series]]:
-    """Imports a reader, since some of them need packages that are optional."""
-    module, name = path.split(":")
-    return getattr(importlib.import_module(module), name)
+def _read_influx(source: str, columns: list[str] | None, time: str | None) -> dict[str, pd.Series]:
+    """Reads the series written by an `InfluxStore`, or otherwise the one series at the address, named after its field."""
+    from enhsim_tf.telemetry.influx_store import InfluxStore  # the client is an optional extra
+
+    if time is not None:
+        raise InputError(f"Expected time with a table only. Received: time={time!r} with {source}. Leave it out.")
+    store = InfluxStore(source)
+    names = store.names()
+    if names:
+        return {name: to_series(store.read(name)) for name in (names if columns is None else columns)}
+    if columns is not None:
+        raise InputError(f"Expected the field in the address alone. Received: columns={columns} with {source}. Leave them out.")
+    times, values = (np.concatenate(blocks) for blocks in zip(*store.chunks(), strict=True))
+    field = store.location.field
+    return {field: pd.Series(values, index=pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC", name="time"), name=field)}
+
+
+def _read_folder(folder: Path, columns: list[str] | None, time: str | None, options: Cleaning) -> dict[str, pd.Series]:
+    """Reads the tables in a folder, or the series of a `ParquetStore`."""
+    if (folder / "labeled_anomalies.csv").is_file():
+        raise InputError(
+            f"Expected a store's folder. Received: {folder}, which holds labelled channels. Name one array, such as train/T-1.npy, and column 0."
+        )
+    if files_of(folder):  # a store has only folders inside
+        return read_table_channels(folder, columns, time, options)
+    if time is not None:
+        raise InputError(f"Expected time with a table only. Received: time={time!r} with the store {folder}. Leave it out.")
+    store = ParquetStore(folder)
+    names = store.names() if columns is None else columns
+    if not names:
+        raise InputError(f"Expected a store with at least one series. Received: the folder {folder} without any. Give {SOURCES}.")
+    return {name: to_series(store.read(name)) for name in names}
 
 
 def read_telemetry(path: str | os.PathLike, column: str | None = None, time: str | None = None, min_samples: int = 2) -> Telemetry:

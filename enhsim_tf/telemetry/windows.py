@@ -1,7 +1,8 @@
 """Windows of a series: splitting by time, the starts of windows, and cutting windows.
 
 The start of a window is the index of its first sample. In a series of several parts, starts are counted over the samples at which a
-complete window can start, part after part, so that they are the sample numbers if there is one part.
+complete window can start, part after part, so that they are the sample numbers if there is one part. In all functions, `parts` are
+contiguous parts of one series, `window` is the number of samples in a window, and `starts` has the shape `(windows,)`.
 """
 
 from collections.abc import Sequence, Sized
@@ -14,12 +15,7 @@ _LEAST_SHARE = 0.25  # of the windows outside a block that must remain where tho
 
 
 def num_window_starts(parts: Sequence[Sized], window: int) -> int:
-    """Returns the number of samples at which a complete window can start.
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-    """
+    """Returns the number of samples at which a complete window can start."""
     return sum(max(0, len(part) - window + 1) for part in parts)
 
 
@@ -27,15 +23,6 @@ def random_window_starts(parts: Sequence[Sized], window: int, num_windows: int, 
     """Draws window starts uniformly from all samples at which a complete window can start, with replacement.
 
     In the paper, the "beginning and end" of windows "are offset by a random amount" (section 2.2).
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-        num_windows: Number of windows.
-        rng: Random number generator.
-
-    Returns:
-        Integers below `num_window_starts`, shape `(num_windows,)`.
 
     Raises:
         InputError: If every part is shorter than a window.
@@ -50,58 +37,19 @@ def random_window_starts(parts: Sequence[Sized], window: int, num_windows: int, 
 
 
 def evenly_spaced_starts(parts: Sequence[Sized], window: int, num_windows: int) -> np.ndarray:
-    """Returns window starts that are evenly spaced over the series, in the order of time.
-
-    Args:
-        parts: Contiguous parts of one series.
-        window: Number of samples in a window.
-        num_windows: Maximum number of starts. A series with fewer possible starts returns each of them once.
-    """
+    """Returns window starts that are evenly spaced over the series, in the order of time; if fewer than `num_windows` are possible, all."""
     num_starts = num_window_starts(parts, window)
     return np.unique(np.linspace(0, num_starts - 1, min(num_windows, num_starts)).astype(np.int64))
 
 
-def disjoint_starts(num_samples: int, window: int) -> np.ndarray:
-    """Starts of consecutive windows of one series that do not overlap, which are used as the independent units of statistical tests.
-
-    Args:
-        num_samples: Length of the series.
-        window: Window length in samples.
-
-    Returns:
-        Integer array of shape `(windows,)`.
-    """
-    return np.arange(num_samples // window) * window
-
-
 def cut_windows(values: np.ndarray, starts: np.ndarray, window: int) -> np.ndarray:
-    """Cuts windows out of a series.
-
-    Args:
-        values: Series of shape `(samples,)`.
-        starts: First sample of each window, shape `(windows,)`.
-        window: Window length in samples.
-
-    Returns:
-        Array of shape `(windows, window)` with the dtype of `values`.
-    """
+    """Cuts windows that begin at the samples `starts` out of a series; returns an array of shape `(windows, window)`."""
     return np.lib.stride_tricks.sliding_window_view(values, window)[starts]
 
 
-def _first_starts(parts: Sequence[Sized], window: int) -> np.ndarray:
-    """The number of possible starts before each part that is long enough, and that of all."""
-    return np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
-
-
 def places_in_parts(parts: Sequence[Sized], starts: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where each window lies: the number of its part, among those that are long enough, and its first sample there.
-
-    Args:
-        parts: Contiguous parts of one series.
-        starts: Start of each window, as an index into the `num_window_starts` possible starts, counted over all parts.
-        window: Number of samples in a window.
-    """
-    firsts = _first_starts(parts, window)
+    """Returns where each window lies: the number of its part, among those that are long enough, and its first sample there."""
+    firsts = np.cumsum([0] + [len(part) - window + 1 for part in parts if len(part) >= window])
     which = np.searchsorted(firsts, starts, "right") - 1
     return which, np.asarray(starts) - firsts[which]
 
@@ -112,13 +60,9 @@ def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[
     Training windows that overlap the time of the held-out block are left out, if at least a quarter of the windows outside
     the block remains.
 
-    Args:
-        starts: Position of each window, in samples, shape `(windows,)`.
-        num_blocks: Number of blocks; at most as many as windows.
-        window: Length of a window in samples.
-
     Returns:
-        `(training, held_out)` for each block: indices of windows in the order of time. Empty for a single window.
+        `(training, held_out)` for each of `num_blocks` blocks, or of as many as there are windows: indices of windows in the order of
+        time. Empty for a single window.
     """
     order = np.argsort(starts, kind="stable")
     if len(order) < 2:
@@ -134,10 +78,6 @@ def time_blocks(starts: np.ndarray, num_blocks: int, window: int) -> list[tuple[
 
 def disjoint_rows(starts: np.ndarray, window: int) -> np.ndarray:
     """Chooses windows that share no sample: each is the first that begins after the end of the one before it.
-
-    Args:
-        starts: Position of each window, in samples, shape `(windows,)`.
-        window: Length of a window in samples.
 
     Returns:
         Indices of the chosen windows, in the order of time.
@@ -157,12 +97,9 @@ def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_s
 
     Args:
         scores: Score of each window, shape `(windows,)`.
-        begins: First sample of each window, in ascending order. It starts at 0, with steps of at most `window`.
+        begins: First sample of each window, in ascending order from 0, with steps of at most `window`.
         window: Number of samples in a window.
-        num_samples: Length of the series.
-
-    Returns:
-        Scores of shape `(num_samples,)`.
+        num_samples: Length of the series, and of the result.
     """
     steps = np.zeros((2, num_samples + 1))
     for sign, places in ((1, begins), (-1, begins + window)):

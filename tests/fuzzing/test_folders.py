@@ -3,6 +3,7 @@
 import hashlib
 import json
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -34,16 +35,12 @@ def test_folders_as_they_were_written_are_accepted():
     assert judge(load_model, saved_model()["arrays.npz"]) and judge(read_data_set, {})
 
 
+@pytest.mark.parametrize("file", ["manifest.json", "settings.json"])
 @tried(60)
-@given(changed_json([saved_model()["manifest.json"]]) | changed([saved_model()["manifest.json"]]))
-def test_manifests_of_models(data):
-    judge(read_model, "manifest_json", data)
-
-
-@tried(60)
-@given(changed_json([saved_model()["settings.json"]]) | changed([saved_model()["settings.json"]]))
-def test_settings_of_models(data):
-    judge(read_model, "settings_json", data)
+@given(st.data())
+def test_manifests_and_settings_of_models(file, data):
+    seeds = [saved_model()[file]]
+    judge(read_model, file.replace(".", "_"), data.draw(changed_json(seeds) | changed(seeds)))
 
 
 @tried(60)

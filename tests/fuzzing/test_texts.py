@@ -22,20 +22,13 @@ from tests.fuzzing.readers import all_of, changed, judge, tried
 SCENARIOS = b"""\
 windows: 1000
 seed: 3
-shard: 100
 nominal: 0.5
-scenarios:
-  - mode: stuck
-    share: 0.3
-    severity: [0.2, 0.9]
-    onset: [0.0, 0.5]
-  - {mode: drift, share: 0.2, severity: 0.5}
+scenarios: [{mode: stuck, share: 0.3, severity: [0.2, 0.9], onset: [0.0, 0.5]}, {mode: drift, share: 0.2, severity: 0.5}]
 models:
-  - folder: vehicle-1/volts
+  - folder: "vehicle-1/volts"
     name: first
     share: 0.75
-  - folder: "vehicle-2/volts"
-    share: 0.25
+  - {folder: vehicle-2/volts, share: 0.25}
 """
 
 
@@ -135,15 +128,9 @@ def test_what_once_failed_is_used_or_refused(read, text):
     judge(read, text)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("read", READERS)
-def test_texts(read):
-    seeds = READERS[read]
-    judge(read, seeds[0])
-
-    @tried(60)
-    @given(changed([seed.encode() for seed in seeds]).map(lambda data: data.decode("utf-8", "surrogateescape")) | st.text(max_size=60))
-    def each(text):
-        judge(read, text)
-
-    each()
+@tried(60)
+@given(st.data())
+def test_texts(read, data):
+    seeds = changed([seed.encode() for seed in READERS[read]]).map(lambda seed: seed.decode("utf-8", "surrogateescape"))
+    judge(read, data.draw(seeds | st.text(max_size=60)))

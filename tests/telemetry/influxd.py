@@ -10,11 +10,7 @@ import time
 import urllib.request
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-WITHOUT = (
-    "no InfluxDB 2 server: put influxd on the PATH or name it in ENHSIM_TF_INFLUXD (.ci/influxd/build makes one); or start "
-    "`docker run influxdb:2`, set INFLUXDB_V2_URL, INFLUXDB_V2_TOKEN and INFLUXDB_V2_ORG, and ENHSIM_TF_INFLUXDB=running"
-)
+WITHOUT = "no InfluxDB 2 server: put influxd on the PATH or name it in ENHSIM_TF_INFLUXD (.ci/influxd/build makes one)"
 
 
 def find_influxd():
@@ -24,33 +20,28 @@ def find_influxd():
     return next((str(place) for place in places if place and os.access(place, os.X_OK)), None)
 
 
-def _free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class Server:
-    """A server started by the tests: its URL, organisation and token, and methods to start and kill it."""
+    """A server started by the tests: its URL, organisation and token, and methods to start, kill and end it."""
 
     def __init__(self, program, folder):
-        self.program, self.folder, self.process = program, Path(folder), None
-        self.url, self.org, self.token = f"http://127.0.0.1:{_free_port()}", "proving ground", secrets.token_urlsafe(24)
-        self.start()
         from influxdb_client import InfluxDBClient, OnboardingRequest, SetupService
 
+        self.program, self.folder, self.process = program, Path(folder), None
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.url = f"http://127.0.0.1:{probe.getsockname()[1]}"
+        self.org, self.token = "proving ground", secrets.token_urlsafe(24)
+        self.start()
+        setup = {"username": "tester", "password": secrets.token_urlsafe(12), "org": self.org, "bucket": "first", "token": self.token}
         with InfluxDBClient(self.url) as client:
-            request = OnboardingRequest(
-                username="tester", password=secrets.token_urlsafe(12), org=self.org, bucket="first", token=self.token
-            )
-            SetupService(client.api_client).post_setup(onboarding_request=request)
+            SetupService(client.api_client).post_setup(onboarding_request=OnboardingRequest(**setup))
 
     def start(self):
         options = {"bolt-path": "bolt", "sqlite-path": "sqlite", "engine-path": "engine"}
         words = [f"--{name}={self.folder / file}" for name, file in options.items()]
         words += [f"--http-bind-address={self.url.removeprefix('http://')}", "--reporting-disabled", "--log-level=error"]
-        environment = os.environ | {"HOME": str(self.folder)}
         with open(self.folder / "log", "ab") as log:
+            environment = os.environ | {"HOME": str(self.folder)}
             self.process = subprocess.Popen([self.program, *words], stdout=log, stderr=log, env=environment)
         until = time.monotonic() + 60
         while True:
@@ -65,16 +56,5 @@ class Server:
         self.process.wait()
 
     def end(self):
-        """Terminates the server, and kills it if that takes too long."""
         self.process.terminate()
-        try:
-            self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.kill()
-
-
-class Running:
-    """A running server that the environment variables name. The tests do not kill it."""
-
-    def __init__(self):
-        self.url, self.token, self.org = (os.environ[f"INFLUXDB_V2_{name}"] for name in ("URL", "TOKEN", "ORG"))
+        self.process.wait(30)

@@ -28,3 +28,8 @@ def same(first: Telemetry, second: Telemetry) -> bool:
 def series(number: int = 1_000, seed: int = 0, **about) -> Telemetry:
     """White noise with the given metadata."""
     return Telemetry(np.random.default_rng(seed).normal(size=number).astype(np.float32), **about)
+
+
+def wheel(number: int = 1_000, seed: int = 0, **about) -> Telemetry:
+    """White noise named "wheel"."""
+    return series(number, seed, **{"name": "wheel"} | about)

@@ -3,7 +3,6 @@
 import datetime
 import decimal
 import json
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -15,7 +14,6 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.clean import Cleaning, clean
 from enhsim_tf.telemetry.cleaning.report import KINDS, finding_from_dict, lines_of
 
-ROOT = Path(__file__).parents[2]
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
 settings.load_profile("repeatable")
 
@@ -65,19 +63,10 @@ def as_one(cleaned, values=VALUES, off=1e-6, begin_off=0.0):
     return part
 
 
-def with_values(change):
-    values = pd.Series(VALUES.copy(), index=TIMES, name="volts")
-    changed = change(values)
-    return values if changed is None else changed
-
-
 def set_rows(rows, bad, kind=object):
-    def change(values):
-        values = values.astype(kind)
-        values.iloc[rows] = bad
-        return values
-
-    return with_values(change)
+    values = CLEAN.astype(kind)
+    values.iloc[rows] = bad
+    return values
 
 
 def with_times(times, values=VALUES):
@@ -94,7 +83,9 @@ RNG = np.random.default_rng(1)
 JITTER = pd.to_timedelta(np.where(np.arange(N) % 5 < 2, RNG.uniform(-0.2, 0.2, N), 0), unit="s")  # most times are undamaged
 SHUFFLED = RNG.permutation(N)
 NANOSECONDS = TIMES.as_unit("ns").asi8
+ISO, ONE_MORE = TIMES.astype(str).to_numpy(object), np.insert(VALUES, 30, 7)
 WORDS = [f"{value:.9f}" for value in VALUES]
+DROPPED = {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])
 
 # name: series, options, {kind of finding: count}, expected values where they are not the clean ones
 REPAIRED = {
@@ -119,21 +110,10 @@ REPAIRED = {
     "periods": (with_times(pd.period_range("2020-03-01", periods=N, freq="s")), {}, {}),
     "time spans since 1970": (with_times(TIMES - pd.Timestamp(0, tz="UTC")), {}, {}),
     "categories": (with_times(pd.CategoricalIndex(TIMES.astype(str)), pd.Categorical(WORDS)), {}, {}),
-    "rows without a time": (
-        with_times(
-            pd.DatetimeIndex(np.insert(TIMES.tz_localize(None).to_numpy(), [5, 5, 9], np.datetime64("NaT"))),
-            np.insert(VALUES, [5, 5, 9], 7),
-        ),
-        {},
-        {"missing times": 3},
-    ),
-    "words among the times, dropped": (
-        with_times(np.insert(TIMES.astype(str).to_numpy(object), 30, "reboot"), np.insert(VALUES, 30, 7)),
-        {"on_bad_times": "drop"},
-        {"bad times": 1},
-    ),
-    "times that nobody lives to see, dropped": (
-        with_times(np.insert(NANOSECONDS / 1e9, 30, 1e18), np.insert(VALUES, 30, 7)),
+    "rows without a time": (with_times(np.insert(ISO, [5, 5, 9], ""), np.insert(VALUES, [5, 5, 9], 7)), {}, {"missing times": 3}),
+    "words among the times, dropped": (with_times(np.insert(ISO, 30, "reboot"), ONE_MORE), {"on_bad_times": "drop"}, {"bad times": 1}),
+    "times that nobody lives to see": (
+        with_times(np.insert(NANOSECONDS / 1e9, 30, 1e18), ONE_MORE),
         {"on_bad_times": "drop"},
         {"bad times": 1},
     ),
@@ -142,21 +122,12 @@ REPAIRED = {
     "empty text": (set_rows([7, 50], ["", " "]), {}, {"missing values": 2, "gaps filled": 2}, linear([7, 50])),
     "words for nothing": (set_rows([7, 50, 90], ["nan", "N/A", "NULL"]), {}, {"missing values": 3, "gaps filled": 3}, linear([7, 50, 90])),
     "rows missing": (CLEAN.drop(TIMES[[7, 8, 50]]), {}, {"gaps filled": 2}, linear([7, 8, 50])),
-    "numbers as text with spaces": (with_values(lambda values: pd.Series([f" {word}\t" for word in WORDS], index=TIMES)), {}, {}),
-    "decimal commas": (
-        with_values(lambda values: pd.Series([word.replace(".", ",") for word in WORDS], index=TIMES)),
-        {},
-        {"decimal comma": N},
-    ),
-    "decimals as objects": (with_values(lambda values: pd.Series([decimal.Decimal(word) for word in WORDS], index=TIMES)), {}, {}),
-    "a unit behind one number, dropped": (
-        set_rows([7], "1.5 V"),
-        {"on_bad_values": "drop"},
-        {"bad values": 1, "gaps filled": 1},
-        linear([7]),
-    ),
-    "beyond float32, dropped": (set_rows([7], 1e39, float), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
-    "beyond float64, dropped": (set_rows([7], 10**400), {"on_bad_values": "drop"}, {"bad values": 1, "gaps filled": 1}, linear([7])),
+    "numbers as text with spaces": (with_times(TIMES, [f" {word}\t" for word in WORDS]), {}, {}),
+    "decimal commas": (with_times(TIMES, [word.replace(".", ",") for word in WORDS]), {}, {"decimal comma": N}),
+    "decimals as objects": (with_times(TIMES, list(map(decimal.Decimal, WORDS))), {}, {}),
+    "a unit behind one number, dropped": (set_rows([7], "1.5 V"), *DROPPED),
+    "beyond float32, dropped": (set_rows([7], 1e39, float), *DROPPED),
+    "beyond float64, dropped": (set_rows([7], 10**400), *DROPPED),
 }
 
 
@@ -177,7 +148,6 @@ BAD_VALUES = {
     "thousands or thousandths": (with_times(TIMES, ["1,500", "2,250"] * (N // 2)), "'1,500' at row 0"),
     "beyond float32": (set_rows([7], 1e39, float), "1e+39 at row 7"),
     "an integer beyond float64": (set_rows([7], 10**400), "at row 7"),
-    "a longer float beyond float64": (with_times(TIMES, np.full(N, np.longdouble(10) ** 400)), "at row 0"),
     "text beyond float64": (set_rows([7], "1e999"), "'1e999' at row 7"),
     "true among numbers": (set_rows([7], True), "True at row 7"),
     "a list among numbers": (with_times(TIMES, pd.Series([[1.0]] * N).array), "[1.0] at row 0"),
@@ -192,17 +162,14 @@ BAD_VALUES = {
     "a table": (CLEAN.to_frame(), "shape (400, 1)"),
     "two axes": (np.zeros((3, 4)), "shape (3, 4)"),
     "a structured array": (np.zeros(3, [("a", float)]), "telemetry"),
-    "one index of two levels": (with_times(pd.MultiIndex.from_product([["a"], TIMES])), "2 levels"),
+    "one index of two levels": (with_times(pd.MultiIndex.from_product([["a"], TIMES])), "MultiIndex"),
 }
 BAD_TIMES = {
     "words": (with_times(["noon"] * N), "'noon' at row 0"),
     "days with two-digit years": (with_times(TIMES.strftime("%d/%m/%y %H:%M:%S")), "time_format"),
     "dates as numbers": (with_times(pd.date_range("2020-03-01", periods=N).strftime("%Y%m%d").astype(int)), "time_format '%Y%m%d'"),
     "numbers of no unit": (with_times(np.arange(N) + 10**10), "time_format"),
-    "numbers, text and dates": (
-        with_times(pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)),
-        "2020-01-01 00:00:00 at row 2",
-    ),
+    "numbers, text and dates": (with_times(pd.Index([1, "2", datetime.datetime(2020, 1, 1), None] * (N // 4), dtype=object)), "at row 2"),
     "intervals": (with_times(pd.interval_range(0, N)), "interval"),
     "date-times in the year 9000": (with_times(pd.DatetimeIndex(np.array(["9000-01-01"] * N, "datetime64[s]"))), "1678 to 2261"),
     "infinite": (with_times(np.where(np.arange(N) == 9, np.inf, np.arange(N))), "inf at row 9"),
@@ -229,18 +196,6 @@ def test_input_that_cannot_be_parsed_is_refused_with_its_place(refused, name):
         clean(series)
 
 
-def test_the_largest_float32_is_a_value_and_what_is_above_it_is_none(refused):
-    largest = float(np.finfo(np.float32).max)
-    assert cleaned_of(set_rows([7], largest, float)).parts[0].values[7] == np.float32(largest)
-    with refused("at row 7"):
-        clean(set_rows([7], np.nextafter(largest, np.inf), float))
-
-
-def test_two_rows_have_an_interval():
-    (part,) = cleaned_of(CLEAN.iloc[:2]).parts
-    assert (len(part), part.interval_s) == (2, 1.0)
-
-
 def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():
     """A jump of 0.4 intervals hides in rounded steps; a line through all rows would have another slope."""
     times = 1.1 * np.arange(N) + np.where(np.arange(N) < 300, 0, 0.45)
@@ -248,24 +203,14 @@ def test_the_interval_is_that_of_the_long_run_before_a_jump_of_the_clock():
     assert cleaned_of(with_times(jittered)).report.interval_s == pytest.approx(1.1, abs=2e-5)
 
 
-BAD_OPTIONS = [
-    {"same_time": "median"},
-    {"on_bad_values": "ignore"},
-    {"on_bad_times": "ignore"},
-    {"interval_s": 0.0},
-    {"interval_s": float("nan")},
-    {"max_jitter": 0.6},
-    {"max_fill": -1},
-    {"min_part": 0},
-    {"time_format": "weeks"},
-    {"decimal": ";"},
-]
+BAD_OPTIONS = {"same_time": "median", "on_bad_values": "ignore", "interval_s": float("nan"), "max_jitter": 0.6, "max_fill": -1}
+BAD_OPTIONS |= {"min_part": 0, "time_format": "weeks", "decimal": ";", "fill": "nearest"}
 
 
-@pytest.mark.parametrize("options", BAD_OPTIONS, ids=str)
-def test_options_out_of_range_are_refused(refused, options):
-    with refused(*(f"{name}={value!r}" for name, value in options.items())):
-        Cleaning(**options)
+@pytest.mark.parametrize("name", BAD_OPTIONS)
+def test_options_out_of_range_are_refused(refused, name):
+    with refused(f"{name}={BAD_OPTIONS[name]!r}"):
+        Cleaning(**{name: BAD_OPTIONS[name]})
 
 
 def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused):
@@ -277,9 +222,7 @@ def test_an_unknown_time_zone_and_an_interval_without_times_are_refused(refused)
 
 @pytest.mark.parametrize(("how", "value"), [("mean", 5.0), ("first", 4.0), ("last", 6.0)])
 def test_one_of_several_values_at_the_same_time_is_taken(refused, how, value):
-    values, times = np.insert(VALUES, 11, [4.0, 6.0]), np.insert(np.arange(N), 11, [11, 11])
-    values = np.delete(values, 13)  # removes the original row 11, so that only the two inserted values have its time
-    series = pd.Series(values, index=TIMES[np.delete(times, 13)], name="volts")
+    series = pd.concat([CLEAN.iloc[:11], with_times(TIMES[[11, 11]], [4.0, 6.0]), CLEAN.iloc[12:]])
     cleaned = cleaned_of(series, same_time=how)
     as_one(cleaned, np.where(np.arange(N) == 11, value, VALUES))
     (finding,) = repairs(cleaned.report)
@@ -296,29 +239,26 @@ def test_a_missing_value_at_a_repeated_time_is_ignored():
         assert cleaned.report.find("same time").count == 1 and cleaned.report.find("missing values") is None
 
 
-@pytest.mark.parametrize("length", [5, 6])
-def test_gaps_are_filled_up_to_max_fill_and_split_the_series_beyond(length):
-    missing = np.arange(100, 100 + length)
-    for series in (CLEAN.drop(TIMES[missing]), set_rows(missing, np.nan, float), set_rows(missing, np.inf, float)):
-        cleaned = cleaned_of(series)
-        if length == 5:
-            as_one(cleaned, linear(missing))
-            assert cleaned.report.find("gaps filled").samples_filled == 5
-        else:
-            before, after = cleaned.parts
-            np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
-            np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
-            assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
-            found = cleaned.report.find("gaps")
-            assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
-    slow = pd.Series(VALUES, START + pd.to_timedelta(10 * np.arange(N), unit="s")).drop(START + pd.to_timedelta(10 * missing, unit="s"))
-    gaps = cleaned_of(slow, max_fill=4).report.find("gaps")
-    assert gaps.details["longest"] == 10 * (length + 1) and gaps.places[0].startswith("row 99,")
-    assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=6).parts) == 1
-    assert len(cleaned_of(CLEAN.drop(TIMES[missing]), max_fill=0).parts) == 2
+GAP = np.arange(100, 106)
 
 
-def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row(refused):
+@pytest.mark.parametrize(
+    "series", [CLEAN.drop(TIMES[GAP]), set_rows(GAP, np.nan, float), set_rows(GAP, np.inf, float)], ids=["-", "NaN", "inf"]
+)
+def test_a_gap_of_more_than_max_fill_splits_the_series(series):
+    cleaned = cleaned_of(series)
+    before, after = cleaned.parts
+    np.testing.assert_array_equal(before.values, VALUES[:100].astype(np.float32))
+    np.testing.assert_array_equal(after.values, VALUES[106:].astype(np.float32))
+    assert (before.offset_s, after.offset_s, after.start) == (0, 106, before.start) and cleaned.longest is after
+    found = cleaned.report.find("gaps")
+    assert (found.count, found.details["longest"]) == (1, 7.0) and "2020-03-01T00:01:39" in found.places[0]
+    filled = cleaned_of(series, max_fill=6)
+    as_one(filled, linear(GAP))
+    assert filled.report.find("gaps filled").samples_filled == 6
+
+
+def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row():
     seconds, values = [0, 7, 8, 30, 31.2, 90], [1.0, 2.0, 2.5, 0.0, 4.0, 5.0]
     series = pd.Series(values, pd.Timestamp("2020-03-01", tz="UTC") + pd.to_timedelta(seconds, unit="s"))
     held = cleaned_of(series, interval_s=1.0, fill="hold")
@@ -331,8 +271,6 @@ def test_telemetry_that_is_sent_on_change_is_held_until_the_next_row(refused):
     np.testing.assert_array_equal(coarser.parts[0].values, np.float32([1, 2.5, 2.5, 4, 4, 4, 4, 4, 4, 5]))
     assert coarser.report.rows_in == coarser.report.rows_used + coarser.report.rows_left_out
     assert cleaned_of(series, interval_s=1.0, fill="hold", max_fill=30).report.find("gaps").count == 1
-    with refused("fill"):
-        Cleaning(fill="nearest")
 
 
 def test_short_parts_are_left_out_and_counted(refused):
@@ -354,29 +292,13 @@ def test_a_jump_of_the_clock_splits_the_series_and_keeps_every_row():
     assert (cleaned.report.find("clock steps").count, cleaned.report.rows_used) == (1, N)
 
 
-def test_the_largest_jitter_is_reported():
-    off = np.zeros(N)
-    off[[20, 30]] = 0.12, -0.2
-    found = cleaned_of(with_times(TIMES + pd.to_timedelta(off, unit="s"))).report.find("jitter")
-    assert found.count == 2 and found.details["largest_s"] == pytest.approx(0.2, abs=1e-6) and found.places[0].startswith("row 30,")
-
-
 @pytest.mark.parametrize("interval", [1 / 3, 0.25, 60.0, 98.5, 1.0003, 1e-4, 3_600.0])
 @pytest.mark.parametrize("unit", ["ns", "us"])
 def test_the_interval_is_that_of_the_rows(interval, unit):
     nanoseconds = np.round(np.arange(5_000) * interval * 1e9).astype(np.int64)
-    cleaned = cleaned_of(
-        with_times(pd.DatetimeIndex(nanoseconds.view("datetime64[ns]"), tz="UTC").as_unit(unit), np.sin(np.arange(5_000) / 9))
-    )
-    (part,) = cleaned.parts
+    times = pd.DatetimeIndex(nanoseconds.view("datetime64[ns]"), tz="UTC").as_unit(unit)
+    (part,) = cleaned_of(with_times(times, np.sin(np.arange(5_000) / 9))).parts
     assert len(part) == 5_000 and part.interval_s * 5_000 == pytest.approx(interval * 5_000, abs=0.1 * interval)
-
-
-def test_the_interval_is_found_despite_jitter_and_gaps():
-    rng = np.random.default_rng(3)
-    times = np.sort(rng.choice(20_000, 9_000, replace=False)) + rng.uniform(-0.2, 0.2, 9_000)
-    cleaned = cleaned_of(with_times(times, np.sin(times)))
-    assert cleaned.report.interval_s == pytest.approx(1, abs=1e-5) and cleaned.report.rows_used > 8_990
 
 
 @pytest.mark.parametrize("where", [0, 150, 340])
@@ -384,13 +306,9 @@ def test_a_finer_stretch_is_averaged_down_to_the_grid(where):
     """Each sample of the stretch is replaced by five rows around its time whose mean equals the sample."""
     offsets, differences = np.array([-0.4, -0.2, 0.0, 0.2, 0.4]), np.array([1.0, -2.0, 0.5, 2.0, -1.5])
     inside = np.arange(where + 1, where + 51)
-    fine = pd.Series(
-        (VALUES[inside, None] + differences).ravel(),
-        index=START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s"),
-        name="volts",
-    )
-    series = pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index()
-    cleaned = cleaned_of(series)
+    times = START + pd.to_timedelta((inside[:, None] + offsets).ravel(), unit="s")
+    fine = with_times(times, (VALUES[inside, None] + differences).ravel())
+    cleaned = cleaned_of(pd.concat([CLEAN.drop(TIMES[inside]), fine]).sort_index())
     as_one(cleaned, off=1e-5)
     assert cleaned.report.find("averaged").rows_left_out == 50 * 4 and cleaned.report.find("other rates").count >= 50 * 5
 
@@ -422,8 +340,6 @@ def test_a_given_interval_averages_the_rows_that_share_it():
     groups = np.round(np.arange(N) / 4).astype(int)  # the nearest grid point, with ties to even
     np.testing.assert_allclose(part.values, [VALUES[groups == group].mean() for group in range(groups[-1] + 1)], atol=1e-6)
     assert (part.interval_s, cleaned.report.find("averaged").rows_left_out) == (4, N - len(part))
-    random = with_times(np.cumsum(np.random.default_rng(5).exponential(size=N)))
-    assert cleaned_of(random, interval_s=5).report.interval_s == 5
 
 
 def test_local_times_are_converted_across_clock_changes():
@@ -472,8 +388,6 @@ def test_properties_of_the_values_are_reported():
     drifting = cleaned_of(with_times(TIMES, VALUES + np.arange(N) / 100)).report.find("changing level")
     assert drifting.count == 10 and drifting.details["low"][-1] - drifting.details["low"][0] == pytest.approx(3.6, abs=1)
     assert cleaned_of(with_times(TIMES, VALUES * np.linspace(1, 5, N))).report.find("changing level") is not None
-    counter = cleaned_of(with_times(TIMES, np.arange(N, dtype=np.uint64) + 2**63)).report.find("resolution")
-    assert counter.count == N, "float64 cannot tell them apart"
     rounded = cleaned_of(with_times(TIMES, VALUES + 1e6)).report.find("resolution")
     assert rounded.details["error"] == pytest.approx(0.03, abs=0.01)  # float32 keeps steps of 1/16 at a million
 
@@ -551,14 +465,10 @@ def test_remaining_samples_keep_their_times(lost, blank, twice, jitter, seed, ma
 
 
 def test_what_channels_share_is_said_once():
-    times = pd.date_range("2024-01-01", periods=602, freq="s", tz="UTC").delete([20, 21])
-    reports = []
-    for name, step in (("volts", 0), ("amperes", 1.0)):
-        values = np.random.default_rng(0).standard_normal(600)
-        values = np.round(values / step) * step if step else values
-        reports.append(clean(pd.Series(values, times, name=name)).report)
+    series = CLEAN.drop(TIMES[[20, 21]])
+    reports = [clean(series).report, clean(series.round().rename("amperes")).report]
     first, *rest = lines_of(reports)
-    assert first.startswith("volts, amperes: 600 rows, 600 used")
+    assert first.startswith("volts, amperes: 398 rows, 398 used")
     shared = [finding.line() for finding in reports[0].findings]
     assert shared and [line for line in rest if line.startswith("volts, amperes: ")] == [f"volts, amperes: {line}" for line in shared]
     assert [line for line in rest if line.startswith("amperes: ")] and not [line for line in rest if line.startswith("volts: ")]

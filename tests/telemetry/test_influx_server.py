@@ -2,7 +2,6 @@
 
 import io
 import logging
-import os
 import pickle
 import subprocess
 import sys
@@ -10,19 +9,19 @@ import threading
 import traceback
 import uuid
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.clean import clean
 from enhsim_tf.telemetry.influx_client import VARIABLES
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore
 from enhsim_tf.telemetry.pandas_series import to_series
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.sources import read_source
 from tests.telemetry import influxd
-from tests.telemetry.round_trips import ROUND_TRIPS, same, series
+from tests.telemetry.round_trips import ROUND_TRIPS, same, wheel
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -43,11 +42,8 @@ HOSTILE = [
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
-    """The server started by the tests, or the running one that the environment variables name; skips if there is none."""
+    """The server started by the tests; skips if there is none."""
     pytest.importorskip("influxdb_client")
-    if os.environ.get("ENHSIM_TF_INFLUXDB") == "running":
-        yield influxd.Running()
-        return
     program = influxd.find_influxd()
     if program is None:
         pytest.skip(influxd.WITHOUT)
@@ -67,8 +63,6 @@ def named(server, monkeypatch):
 @pytest.fixture
 def mortal(named):
     """A server that the test may kill. It runs again after the test."""
-    if not isinstance(named, influxd.Server):
-        pytest.skip("the running server is not ours to kill")
     yield named
     if named.process.poll() is not None:
         named.start()
@@ -112,25 +106,9 @@ def _location(bucket, rest="wheel/speed"):
     return f"influxdb://{bucket.replace(' ', '%20')}/{rest}"
 
 
-def _series(number=1_000, seed=0, **about):
-    return series(number, seed, **({"name": "wheel"} | about))
-
-
-def _count(thing, method):
-    """Records each call of a method in a list."""
-    calls, plain = [], getattr(thing, method)
-
-    def counted(*given):
-        calls.append(given)
-        return plain(*given)
-
-    setattr(thing, method, counted)
-    return calls
-
-
 @pytest.mark.parametrize("about", ROUND_TRIPS.values(), ids=ROUND_TRIPS)
 def test_round_trip_to_the_bit(bucket, about):
-    kept = _series(**about)
+    kept = wheel(**about)
     InfluxStore(_location(bucket)).write(kept)
     store = InfluxStore(_location(bucket))
     assert same(kept, store.read(kept.name)) and store.names() == [kept.name]
@@ -146,31 +124,8 @@ def test_every_finite_float32_comes_back(bucket):
     assert same(kept, store.read("bits"))
 
 
-def test_times_are_exact_nanoseconds(bucket):
-    first = 1_583_020_800_123_456_789
-    times = first + np.array([0, 1, 999, 1_000, 10**9, 10**9 + 1, 86_400 * 10**9 + 100])
-    _put(bucket, "\n".join(f"m f={number}.5 {at}" for number, at in enumerate(times)))
-    store = InfluxStore(_location(bucket, "m/f"))
-    found, values = _all(store.chunks())
-    assert found.dtype == np.int64 and np.array_equal(found, times) and np.array_equal(values, np.arange(7) + 0.5)
-    found, _ = _all(store.chunks(start_ns=first + 1, stop_ns=first + 1_000))
-    assert found.tolist() == [first + 1, first + 999], "the stop is not part of it"
-    assert list(store.chunks(start_ns=first + 2, stop_ns=first + 2)) == []
-    assert list(store.chunks(start_ns=first + 2, stop_ns=first + 900)) == []
-
-
-def test_a_series_written_twice_is_stored_once(bucket):
-    store, kept = InfluxStore(_location(bucket), batch_size=300), _series(1_000)
-    store.write(kept)
-    versions = store.versions()
-    store.write(kept)
-    assert same(kept, store.read("wheel")) and store.versions() == versions
-    (row,) = _flux(f'from(bucket: "{bucket}") |> range(start: 1960-01-01T00:00:00Z) |> filter(fn: (r) => r._field == "speed") |> count()')
-    assert row["_value"] == 1_000
-
-
 def test_a_stored_series_can_be_read_as_a_source_by_name(bucket):
-    first, second = _series(50, name="wheel"), _series(60, 1, name="gyro", start="2020-01-01T00:00:00+00:00", interval_s=0.5, unit="V")
+    first, second = wheel(50, name="wheel"), wheel(60, 1, name="gyro", start="2020-01-01T00:00:00+00:00", interval_s=0.5, unit="V")
     for each in (first, second):
         InfluxStore(_location(bucket)).write(each)
     channels = read_source(_location(bucket))
@@ -179,22 +134,12 @@ def test_a_stored_series_can_be_read_as_a_source_by_name(bucket):
     assert list(read_source(_location(bucket), columns=["gyro"])) == ["gyro"]
 
 
-def test_a_series_of_another_program_can_be_read_and_cleaned(bucket):
-    places = [place for place in range(100) if place != 40]
-    _put(bucket, [f"bus,craft=a volts={place % 7} {10**18 + place * 10**9}" for place in places])
-    (series,) = read_source(_location(bucket, "bus/volts?craft=a")).values()
-    assert (series.index.as_unit("ns").asi8 == [10**18 + place * 10**9 for place in places]).all()
-    cleaned = clean(series)
-    assert [len(part) for part in cleaned.parts] == [100] and cleaned.report.samples_filled == 1
-    assert cleaned.parts[0].values[40] == (39 % 7 + 41 % 7) / 2 and cleaned.parts[0].interval_s == 1.0
-
-
-def test_writing_again_replaces_the_old_series_also_by_an_earlier_one(bucket):
+def test_writing_again_replaces_the_old_series_also_by_an_earlier_or_the_same_one(bucket):
     store = InfluxStore(_location(bucket))
-    long, short = _series(5_000, interval_s=60.0), _series(10, seed=1, interval_s=0.5, unit="V")
-    neighbour = _series(70, seed=2, name="wheel 2")
+    long, short = wheel(5_000, interval_s=60.0), wheel(10, seed=1, interval_s=0.5, unit="V")
+    neighbour = wheel(70, seed=2, name="wheel 2")
     store.write(neighbour)
-    for kept in (long, short, long, short):
+    for kept in (long, short, long, short, short):
         store.write(kept)
         assert same(kept, store.read("wheel"))
         times, values = _all(InfluxStore(_location(bucket, "wheel/speed?channel=wheel")).chunks())
@@ -205,32 +150,28 @@ def test_writing_again_replaces_the_old_series_also_by_an_earlier_one(bucket):
 def test_stores_of_one_bucket_do_not_see_each_other(bucket):
     places = ["a/f", "a/g", "b/f", "a/f?t=1", "a/f?t=2", "a/f?t=1&u=1"]
     for number, place in enumerate(places):
-        InfluxStore(_location(bucket, place)).write(_series(50, seed=number))
+        InfluxStore(_location(bucket, place)).write(wheel(50, seed=number))
     for number, place in enumerate(places):
         store = InfluxStore(_location(bucket, place))
-        assert store.names() == ["wheel"] and same(store.read("wheel"), _series(50, seed=number)), place
-    InfluxStore(_location(bucket, "a/f")).write(_series(20, seed=9))
-    for number, place in enumerate(places[1:], 1):
-        assert same(InfluxStore(_location(bucket, place)).read("wheel"), _series(50, seed=number)), place
+        assert store.names() == ["wheel"] and same(store.read("wheel"), wheel(50, seed=number)), place
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_names_cannot_leave_their_place(bucket, name):
     store = InfluxStore(_location(bucket))
-    kept, other = _series(30, name=name), _series(40, seed=1, name="other")
+    kept, other = wheel(30, name=name), wheel(40, seed=1, name="other")
     store.write(other)
     store.write(kept)
     store.write(kept)
     assert same(kept, store.read(name)) and same(other, store.read("other"))
     assert store.names() == sorted([name, "other"])
-    assert np.array_equal(_all(store.chunks(name))[1], kept.values)
 
 
 def test_places_with_hostile_names(bucket):
     place = InfluxLocation(bucket, 'it\'s "m" ${1}\\n, a=b', 'f"\\g${h}, i=j', (('t"\\u${v}, w=x', 'y"\\z${0}, 1=2'),))
-    InfluxStore(place).write(_series(30))
-    assert same(InfluxStore(str(place)).read("wheel"), _series(30))
-    assert np.array_equal(_all(InfluxStore(place).chunks())[1], _series(30).values)
+    InfluxStore(place).write(wheel(30))
+    assert same(InfluxStore(str(place)).read("wheel"), wheel(30))
+    assert np.array_equal(_all(InfluxStore(place).chunks())[1], wheel(30).values)
 
 
 def test_a_series_of_another_program_is_read_unchanged(bucket):
@@ -242,6 +183,8 @@ def test_a_series_of_another_program_is_read_unchanged(bucket):
     _put(bucket, f"bus,craft=B volts=7 {times[0]}")
     found, read = _all(InfluxStore(_location(bucket, "bus/volts?craft=A")).chunks())
     assert np.array_equal(found, times) and read.tobytes() == values.tobytes(), "float64 as it is kept"
+    ((name, channel),) = read_source(_location(bucket, "bus/volts?craft=A")).items()
+    assert name == "volts" and (channel.index.asi8 == times).all() and (channel == values).all()
     found, read = _all(InfluxStore(_location(bucket, "bus/amperes")).chunks())
     assert np.array_equal(found, times) and np.array_equal(read, np.arange(len(times))), "whole numbers are numbers"
     assert InfluxStore(_location(bucket, "bus/volts?craft=A")).names() == []
@@ -270,34 +213,23 @@ def test_anything_but_one_numeric_series_is_refused(bucket, refused):
 
 
 MILLION = 10**6
-
-
 MEMORY = """
 import os, sys, tracemalloc
 import pyarrow
 from enhsim_tf.telemetry.influx_store import InfluxStore
 
 store = InfluxStore(sys.argv[1])
-for _ in store.chunks("million", stop_ns=10**9 * 1000):  # imports and caches everything once
-    pass
-found = []
-for stop in (10**5, 10**6):
-    tracemalloc.start()
-    count = sum(len(times) for times, values in store.chunks("million", stop_ns=10**9 * stop))
-    found += [count, tracemalloc.get_traced_memory()[1], pyarrow.default_memory_pool().max_memory()]
-    tracemalloc.stop()
-print(*found, flush=True)
+next(store.chunks())  # imports and caches everything once
+tracemalloc.start()
+count = sum(len(times) for times, values in store.chunks())
+print(count, tracemalloc.get_traced_memory()[1] + pyarrow.default_memory_pool().max_memory(), flush=True)
 os._exit(0)  # threads of pyarrow sometimes crash the end of an interpreter that has traced memory
 """
 
 
-@pytest.fixture(scope="module")
-def million():
-    """Distinct integers in random order. Their sum is exact in any order of summation."""
-    return Telemetry(np.random.default_rng(0).permutation(MILLION).astype(np.float32), name="million", start="1970-01-01T00:00:00+00:00")
-
-
-def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, bucket, million):
+def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, bucket):
+    values = np.random.default_rng(0).permutation(MILLION).astype(np.float32)  # integers, whose sum is exact in any order
+    million = Telemetry(values, name="million", start="1970-01-01T00:00:00+00:00")
     store, sent, restarts = InfluxStore(_location(bucket)), [], []
     send = store.server.send
 
@@ -313,41 +245,38 @@ def test_server_restarts_during_a_write_neither_lose_nor_repeat_points(mortal, b
         send(lines)
 
     store.server.send = counted
-    refusals = _count(store.server, "_in_words")
+    store.server._in_words = refusals = Mock(wraps=store.server._in_words)
     store.write(million)
     for thread in restarts:
         thread.join()
     assert len(restarts) == 3 and len(sent) == MILLION // 5_000 + 1
-    assert len(refusals) >= 3, "each time a batch met no server"
+    assert refusals.call_count >= 3, "each time a batch met no server"
 
     points = f'from(bucket: "{bucket}") |> range(start: 1960-01-01T00:00:00Z) |> filter(fn: (r) => r._field == "speed")'
     ((count,), (total,)) = ([row["_value"] for row in _flux(f"{points} |> {what}()")] for what in ("count", "sum"))
     assert (count, total) == (MILLION, MILLION * (MILLION - 1) / 2)
-    times, values = _all(store.chunks("million"))
-    assert np.array_equal(times, 10**9 * np.arange(MILLION)) and values.tobytes() == million.values.astype(np.float64).tobytes()
-    assert np.bitwise_xor.reduce(values.astype(np.int64)) == np.bitwise_xor.reduce(np.arange(MILLION))
+    assert same(million, store.read("million"))
 
     # the same points, read in bounded memory and during a restart
-    done = subprocess.run([sys.executable, "-c", MEMORY, _location(bucket)], cwd=ROOT, capture_output=True, text=True)
+    place = _location(bucket, "wheel/speed?channel=million")
+    done = subprocess.run([sys.executable, "-c", MEMORY, place], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    few, few_bytes, _, many, many_bytes, many_arrow = map(int, done.stdout.split())
-    assert (few, many) == (10**5, MILLION)
-    assert many_bytes < 2 * few_bytes and many_bytes + many_arrow < 16 * MILLION
-
+    count, used_bytes = map(int, done.stdout.split())
+    assert count == MILLION and used_bytes < 28 * MILLION  # a point has about 35 bytes in the answer
     for stop in (mortal.kill, mortal.end):
-        asked = _count(store.server, "points")
-        chunks = store.chunks("million")
+        store = InfluxStore(place)
+        store.server.points = asked = Mock(wraps=store.server.points)
+        chunks = store.chunks()
         parts = [next(chunks)]
         stop()
         mortal.start()
-        parts += chunks
-        assert np.array_equal(np.concatenate([times for times, _ in parts]), times)
-        assert np.array_equal(np.concatenate([values for _, values in parts]), million.values)
-        assert len(asked) >= 3, "for the description, for the points, and for those behind the break"
+        times, values = _all([*parts, *chunks])
+        assert np.array_equal(times, 10**9 * np.arange(MILLION)) and np.array_equal(values, million.values)
+        assert asked.call_count >= 3, "for the series, for the points, and for those behind the break"
 
 
 def test_the_old_series_stays_until_the_new_one_is_complete(mortal, bucket, refused):
-    store, old, new = InfluxStore(_location(bucket), batch_size=100, max_retry_s=0.5), _series(1_000), _series(2_000, seed=1)
+    store, old, new = InfluxStore(_location(bucket), batch_size=100, max_retry_s=0.5), wheel(1_000), wheel(2_000, seed=1)
     store.write(old)
     send, sent = store.server.send, []
 
@@ -368,90 +297,37 @@ def test_the_old_series_stays_until_the_new_one_is_complete(mortal, bucket, refu
     assert np.array_equal(_all(InfluxStore(_location(bucket, "wheel/speed?channel=wheel")).chunks())[1], new.values), "nothing is left"
 
 
-def test_an_unknown_token_organisation_or_bucket_is_named(named, bucket, monkeypatch, refused):
-    def uses(bucket):
-        place = _location(bucket)
-        for use in (
-            lambda store: store.check(),
-            lambda store: store.read("wheel"),
-            lambda store: store.names(),
-            lambda store: store.write(_series()),
-            lambda store: list(store.chunks()),
-        ):
-            yield lambda use=use: use(InfluxStore(place))
-
-    for use in uses("nowhere"):
-        with refused("'nowhere'", "bucket"):
-            use()
-    monkeypatch.setenv("INFLUXDB_V2_TOKEN", "wrong-" + named.token)
-    for use in uses(bucket):
-        with refused("INFLUXDB_V2_TOKEN"):
-            use()
-    monkeypatch.setenv("INFLUXDB_V2_TOKEN", named.token)
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda store: store.check(),
+        lambda store: store.read("wheel"),
+        lambda store: store.write(wheel()),
+        lambda store: list(store.chunks()),
+    ],
+    ids=["check", "read", "write", "chunks"],
+)
+def test_an_unknown_token_organisation_or_bucket_is_named(named, bucket, monkeypatch, refused, use):
+    with refused("'nowhere'", "bucket"):
+        use(InfluxStore(_location("nowhere")))
+    with monkeypatch.context() as patch, refused("INFLUXDB_V2_TOKEN"):
+        patch.setenv("INFLUXDB_V2_TOKEN", "wrong-" + named.token)
+        use(InfluxStore(_location(bucket)))
     monkeypatch.setenv("INFLUXDB_V2_ORG", "of nobody")
-    for use in uses(bucket):
-        with refused("INFLUXDB_V2_ORG", "'of nobody'"):
-            use()
-
-
-def test_a_token_that_may_only_read_is_named(named, bucket, monkeypatch, refused):
-    from influxdb_client import Permission, PermissionResource
-
-    InfluxStore(_location(bucket)).write(_series(20))
-    with _client() as client:
-        organisation = client.organizations_api().find_organizations(org=named.org)[0].id
-        which = PermissionResource(type="buckets", org_id=organisation, id=client.buckets_api().find_bucket_by_name(bucket).id)
-        right = client.authorizations_api().create_authorization(organisation, [Permission("read", which)])
-    monkeypatch.setenv("INFLUXDB_V2_TOKEN", right.token)
-    store = InfluxStore(_location(bucket))
-    assert same(store.read("wheel"), _series(20))
-    with refused("insufficient permissions", bucket):
-        store.write(_series(20, seed=1))
-
-
-def test_points_that_the_bucket_rejects_are_named(named, bucket, refused):
-    from influxdb_client import BucketRetentionRules
-
-    with _client() as client:
-        found = client.buckets_api().find_bucket_by_name(bucket)
-        found.retention_rules = [BucketRetentionRules(type="expire", every_seconds=3_600, shard_group_duration_seconds=3_600)]
-        client.buckets_api().update_bucket(found)
-    with refused("retention", bucket):
-        InfluxStore(_location(bucket)).write(_series(20, start="2001-01-01"))
-    now = np.datetime64("now") - np.timedelta64(60, "s")
-    kept = _series(20, start=f"{now}+00:00")
-    InfluxStore(_location(bucket)).write(kept)
-    assert same(kept, InfluxStore(_location(bucket)).read("wheel")), "the description outlives what is retained"
-
-
-def test_a_field_of_another_type_is_named(bucket, refused):
-    _put(bucket, "wheel speed=1i 0")
-    with refused("type"):
-        InfluxStore(_location(bucket)).write(_series(20))
+    with refused("INFLUXDB_V2_ORG", "'of nobody'"):
+        use(InfluxStore(_location(bucket)))
 
 
 def test_missing_samples_are_noticed(bucket, refused):
     store = InfluxStore(_location(bucket))
-    store.write(_series(1_000, start="2020-01-01"))
+    store.write(wheel(1_000, start="2020-01-01"))
     with _client() as client:
         client.delete_api().delete("2020-01-01T00:08:00Z", "2020-01-01T00:08:00Z", 'channel="wheel"', bucket)
     with refused("'wheel'", "gap before sample 480"):
         store.read("wheel")
 
 
-def _told(error):
-    """Everything that can be printed of an error: message, chained errors and traceback."""
-    seen = []
-    while error is not None:
-        seen += [str(error), repr(error), "".join(traceback.format_exception(error)), repr(vars(error))]
-        error = error.__cause__ or error.__context__
-    return "\n".join(seen)
-
-
-@pytest.mark.parametrize(
-    "token",
-    ["not-the-right-one-0123456789", "lines-0123456789\ntwo-of-them-0123456789", "not-the-end-0123456789\n", "not-latin-€-0123456789"],
-)
+@pytest.mark.parametrize("token", ["not-the-right-one-0123456789", "lines-0123456789\ntwo-of-them-0123456789", "not-latin-€-0123456789"])
 def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, token):
     told = io.StringIO()
     caplog.set_level(logging.DEBUG)
@@ -459,14 +335,14 @@ def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, to
         for given in (token, named.token):
             monkeypatch.setenv("INFLUXDB_V2_URL", url)
             monkeypatch.setenv("INFLUXDB_V2_TOKEN", given)
-            for use in (lambda store: store.write(_series(20)), lambda store: store.read("wheel"), lambda store: list(store.chunks())):
+            for use in (lambda store: store.write(wheel(20)), lambda store: store.read("wheel"), lambda store: list(store.chunks())):
                 store = None
                 try:
                     store = InfluxStore(_location(place), max_retry_s=0)
                     use(store)
                 except InputError as error:
                     assert error.__context__ is None and error.__cause__ is None
-                    told.write(_told(error))
+                    told.write("".join(traceback.format_exception(error)))
                 if store is not None:
                     told.write(f"{store!r} {vars(store)} {store.server!r} {vars(store.server)} {pickle.dumps(store)}")
     said = told.getvalue() + caplog.text + "".join(capfd.readouterr())
@@ -476,8 +352,7 @@ def test_the_token_appears_nowhere(named, bucket, monkeypatch, caplog, capfd, to
 
 
 def test_the_reproduction_runs_through_influxdb(named, bucket, tmp_path, capsys):
-    from enhsim_tf.paper.telemetry import ParquetStore
-    from enhsim_tf.reproduce import InfluxTelemetry, main
+    from enhsim_tf.reproduce import main
 
     place = _location(bucket, "paper/value")
     count = f'from(bucket: "{bucket}") |> range(start: 2019-01-01T00:00:00Z, stop: 2021-01-01T00:00:00Z) |> count()'
@@ -491,11 +366,5 @@ def test_the_reproduction_runs_through_influxdb(named, bucket, tmp_path, capsys)
         assert ("(from the cache)" in capsys.readouterr().out) == (name != "first")
         assert f"store {place} " in (tmp_path / name / "fig14_telemetry_store.svg").read_text(encoding="utf-8")
         assert [row["_value"] for row in _flux(count)] == [120_000], "they are there, and there once"
-    (folder,) = (tmp_path / "cache").glob("telemetry-*")
-    kept = ParquetStore(folder / "telemetry.parquet").read()
-    store = InfluxTelemetry(place)
-    store.write(kept)
-    found = store.read()
-    assert np.array_equal(found.values, kept.values) and (found.interval, found.start) == (kept.interval, kept.start)
     for file in tmp_path.rglob("*"):
         assert not file.is_file() or named.token.encode() not in file.read_bytes()

@@ -10,16 +10,12 @@ import numpy as np
 import pytest
 
 from enhsim_tf.telemetry import influx_client
-from enhsim_tf.telemetry.influx_client import VARIABLES, quote
+from enhsim_tf.telemetry.influx_client import VARIABLES
 from enhsim_tf.telemetry.influx_store import InfluxLocation, InfluxStore, parse_location
 from enhsim_tf.telemetry.series import Telemetry
-from tests.telemetry.round_trips import BEYOND, series
+from tests.telemetry.round_trips import BEYOND, wheel
 
 ROOT = Path(__file__).parents[2]
-
-
-def _series(number=1_000, seed=0, **about):
-    return series(number, seed, **({"name": "wheel"} | about))
 
 
 @pytest.mark.parametrize(
@@ -47,10 +43,6 @@ def test_invalid_locations_are_refused(rest, refused):
         parse_location("http://b/m/f")
 
 
-def test_flux_strings_end_where_they_should():
-    assert quote('a"b\\c${d}\n') == '"a\\x22b\\x5cc\\x24{d}\\x0a"'
-
-
 class Answer(io.BytesIO):
     """The answer of a server, as urllib3 gives it."""
 
@@ -58,12 +50,6 @@ class Answer(io.BytesIO):
 
 
 HEAD, ROW = b",result,table,_time,_value\r\n", b",_result,0,1970-01-01T00:00:01.%09dZ,%s\r\n"
-
-
-def test_an_answer_is_parsed_to_the_nanosecond():
-    ((times, values),) = influx_client._blocks(Answer(HEAD + ROW % (7, b"1e-45") + ROW % (8, b"-3") + b"\r\n"))
-    assert times.tolist() == [10**9 + 7, 10**9 + 8] and values.tolist() == [1e-45, -3]
-    assert list(influx_client._blocks(Answer(b"\r\n"))) == list(influx_client._blocks(Answer(b""))) == []
 
 
 ODD = {
@@ -95,13 +81,10 @@ def test_a_missing_variable_is_named(pretended, monkeypatch, refused, name):
     monkeypatch.setenv(name, " ")
     with refused(f"no {name}"):
         InfluxStore("influxdb://b/m/f")
-    monkeypatch.delenv(name)
-    with refused(f"no {name}"):
-        InfluxStore("influxdb://b/m/f")
 
 
 def test_a_missing_client_is_named(pretended, monkeypatch, refused):
-    monkeypatch.setitem(sys.modules, "influxdb_client", None)
+    monkeypatch.setitem(sys.modules, "enhsim_tf.telemetry.influx_client", None)
     with refused("pip install influxdb-client"):
         InfluxStore("influxdb://b/m/f")
 
@@ -117,7 +100,7 @@ def test_a_missing_client_is_named(pretended, monkeypatch, refused):
         "http://a:0",
         "http://a b",
         "http://a\n",
-        "http://user:secret-token@localhost",
+        "http://u:secret@b",
     ],
 )
 def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
@@ -127,7 +110,7 @@ def test_invalid_addresses_are_refused(pretended, monkeypatch, refused, url):
     assert "secret" not in str(caught)
 
 
-@pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read("x"), lambda store: store.write(_series()), list])
+@pytest.mark.parametrize("use", [lambda store: store.check(), lambda store: store.read("x"), lambda store: store.write(wheel()), list])
 def test_a_server_that_is_down_is_reported_at_once(pretended, refused, use):
     store = InfluxStore("influxdb://b/m/f", max_retry_s=3_600)
     with refused("http://127.0.0.1:9", "no answer"):
@@ -143,21 +126,21 @@ def test_a_nonnumeric_client_variable_is_refused(pretended, monkeypatch, refused
 def test_series_that_influxdb_cannot_store_are_refused(pretended, refused):
     store = InfluxStore("influxdb://b/m/f")
     for wrong, word in (
-        (_series(0), "0 samples"),
-        (_series(name=""), "name=''"),
+        (wheel(0), "0 samples"),
+        (wheel(name=""), "name=''"),
         (Telemetry(np.array([1, np.nan, 2], np.float32)), "sample 1"),
         (Telemetry(np.array([1, np.inf], np.float32)), "inf"),
-        (_series(interval_s=1e-10), "nanosecond"),
-        *((_series(**about), "time") for about in BEYOND),
-        (_series(start="yesterday"), "yesterday"),
-        (_series(name="\ud800"), "Unicode"),
+        (wheel(interval_s=1e-10), "nanosecond"),
+        *((wheel(**about), "time") for about in BEYOND),
+        (wheel(start="yesterday"), "yesterday"),
+        (wheel(name="\ud800"), "Unicode"),
         (np.zeros(3), "ndarray"),
     ):
         with refused(word):
             store.write(wrong)
     for place in ("m%0A/f", "%23m/f", "m%5C/f", "m/_f", "m/f?channel=a", "m/f?version=a", "m/f?time=a", "m/f?_t=a", "m/f?t=%5C"):
         with refused("another location"):
-            InfluxStore(f"influxdb://b/{place}").write(_series())
+            InfluxStore(f"influxdb://b/{place}").write(wheel())
 
 
 def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refused):
@@ -177,16 +160,10 @@ def test_another_service_at_the_address_is_reported(pretended, monkeypatch, refu
     with http.server.HTTPServer(("127.0.0.1", 0), Silent) as other:
         threading.Thread(target=other.serve_forever, daemon=True).start()
         monkeypatch.setenv("INFLUXDB_V2_URL", f"http://127.0.0.1:{other.server_port}")
-        for status in (200, 404):
+        for status, words in ((200, "something else"), (404, "something else"), (302, "(302)")):
             answers.append(status)
-            with refused("something else", "INFLUXDB_V2_URL"):
+            with refused(words):
                 InfluxStore("influxdb://b/m/f").check()
-        answers.append(302)
-        with refused("(302)"):
-            InfluxStore("influxdb://b/m/f").check()
-        monkeypatch.setenv("INFLUXDB_V2_URL", f"https://127.0.0.1:{other.server_port}")
-        with refused("SSL"):
-            InfluxStore("influxdb://b/m/f").check()
         other.shutdown()
 
 

@@ -16,28 +16,7 @@ VALUES = np.sin(np.arange(N) / 5).round(4)
 TABLE = pd.DataFrame({"utc": TIMES, "volts": VALUES, "mode": "nominal", "amps": 2 * VALUES})
 
 
-def lines(*columns, header="utc,volts", separator=","):
-    """CSV text of the given columns."""
-    rows = [separator.join(str(cell) for cell in row) for row in zip(*columns, strict=True)]
-    return "\n".join([header, *rows]) + "\n"
-
-
-ISO = TIMES.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
-COMMAS = [str(value).replace(".", ",") for value in VALUES]
-CSV = {
-    "semicolons": lines(ISO, VALUES, header="utc;volts", separator=";"),
-    "semicolons and decimal commas": lines(ISO, COMMAS, header="utc;volts", separator=";"),
-    "tabs": lines(ISO, VALUES, header="utc\tvolts", separator="\t"),
-    "bars": lines(ISO, VALUES, header="utc|volts", separator="|"),
-    "quoted decimal commas": lines(ISO, [f'"{value}"' for value in COMMAS]),
-    "a byte order mark": "\ufeff" + lines(ISO, VALUES),
-    "comments above": "# written by a recorder\n#units,V\n\n" + lines(ISO, VALUES),
-    "spaces in the header": lines(ISO, VALUES, header="utc, volts"),
-    "lines of another system": lines(ISO, VALUES).replace("\n", "\r\n"),
-    "no end of the last line": lines(ISO, VALUES).rstrip("\n"),
-    "the time last": lines(VALUES, ISO, header="volts,when"),
-    "words beside": lines(ISO, ["on"] * N, VALUES, header="utc,state,volts"),
-}
+CSV = TABLE[["utc", "volts"]].to_csv(index=False, date_format="%Y-%m-%dT%H:%M:%S.%fZ")
 
 
 def check(channel, name="volts", values=VALUES):
@@ -49,19 +28,10 @@ def check(channel, name="volts", values=VALUES):
     return cleaned
 
 
-@pytest.mark.parametrize("name", CSV)
-def test_csv_of_every_dialect(tmp_path, name):
-    path = tmp_path / "a.csv"
-    path.write_text(CSV[name], encoding="utf-8", newline="")
-    channels = read_source(path)
-    assert list(channels) == ["volts"]
-    check(channels["volts"])
-
-
 @pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
 def test_csv_of_other_encodings(tmp_path, encoding):
     path = tmp_path / "a.csv"
-    path.write_bytes(lines(ISO, VALUES, header="utc,°C").encode(encoding))
+    path.write_bytes(CSV.replace("volts", "°C").encode(encoding))
     cleaned = check(read_source(path)["°C"], "°C")
     assert (cleaned.report.find("encoding") is not None) == (encoding == "latin-1")
 
@@ -101,16 +71,8 @@ def test_channels_without_time(tmp_path):
 
 def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
     """Seven rows: one without a time, one with a word as its time, one duplicate, one cut off by a killed recorder."""
-    rows = [
-        "2020-03-01T00:00:00,1",
-        ",2",
-        "2020-03-01T00:00:01,3",
-        "boot,4",
-        "2020-03-01T00:00:01,3",
-        "2020-03-01T00:00:02,5",
-        "2020-03-01T00:00:03",
-    ]
-    (tmp_path / "a.csv").write_text("\n".join(["time,volts", *rows]))
+    rows = ["{}:00,1", ",2", "{}:01,3", "boot,4", "{}:01,3", "{}:02,5", "{}:03"]
+    (tmp_path / "a.csv").write_text("\n".join(["time,volts", *rows]).replace("{}", "2020-03-01T00:00"))
     channel = read_source(tmp_path / "a.csv", options=Cleaning(on_bad_times="drop"))["volts"]
     report = clean(channel).report
     assert (report.rows_in, report.rows_used, report.rows_left_out, report.samples) == (7, 3, 4, 3)
@@ -118,40 +80,24 @@ def test_every_row_of_a_dirty_table_is_accounted_for(tmp_path):
     assert found == {"clock": 1, "bad times": 1, "missing times": 2, "duplicate rows": 1, "missing values": 1}
 
 
-def save(folder, name, content):
-    path = folder / name
-    if isinstance(content, str | bytes):
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-    elif isinstance(content, pd.DataFrame):
-        content.to_parquet(path)
-    elif content is not None:
-        np.save(path, content)
-    return path
-
-
 BAD = {
     "not there": ("absent.csv", None, {}, "does not exist"),
     "a name no file can have": ("x" * 300 + ".csv", None, {}, "does not exist"),
-    "unknown kind": ("a.xlsx", "x", {}, "a.xlsx"),
-    "empty": ("a.csv", "", {}, "empty"),
-    "comments only": ("a.csv", "# a\n# b\n", {}, "a.csv"),
+    "unknown kind": ("a.xlsx", b"x", {}, "a.xlsx"),
+    "empty": ("a.csv", b"", {}, "empty"),
+    "comments only": ("a.csv", b"# a\n# b\n", {}, "a.csv"),
     "bytes": ("a.csv", bytes(range(256)) * 20, {}, "not text"),
-    "no header": ("a.csv", "1,2\n3,4\n5,6\n", {}, "1, 2"),
-    "lines longer than the header": ("a.csv", "a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
-    "one name for two columns, named": ("a.csv", "a,a,b\n1,2,3\n3,4,5\n", {"columns": ["a"]}, "'a' more than once"),
-    "no such column": ("a.csv", "a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
-    "two time columns": ("a.csv", "start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n", {}, "start, end"),
-    "words only": ("a.csv", "a,b\nx,y\nz,w\n", {}, "none in a.csv"),
-    "no columns named": ("a.csv", "a,b\n1,2\n", {"columns": []}, "columns=[]"),
-    "a channel of a file": ("a.csv#a", "a,b\n1,2\n", {}, "a.csv#a"),
+    "no header": ("a.csv", b"1,2\n3,4\n5,6\n", {}, "1, 2"),
+    "lines longer than the header": ("a.csv", b"a,b\n1,2,3\n4,5,6\n", {}, "a.csv"),
+    "one name for two columns, named": ("a.csv", b"a,a,b\n1,2,3\n3,4,5\n", {"columns": ["a"]}, "'a' more than once"),
+    "no such column": ("a.csv", b"a,b\n1,2\n", {"columns": ["c"]}, "'c'"),
+    "two time columns": ("a.csv", b"start,end,v\n2020-01-01,2020-01-02,1\n2020-01-02,2020-01-03,2\n", {}, "start, end"),
+    "words only": ("a.csv", b"a,b\nx,y\nz,w\n", {}, "none in a.csv"),
+    "no columns named": ("a.csv", b"a,b\n1,2\n", {"columns": []}, "columns=[]"),
+    "a channel of a file": ("a.csv#a", b"a,b\n1,2\n", {}, "a.csv#a"),
     "no Parquet": ("a.parquet", b"PAR1 but no more", {}, "a.parquet"),
     "windows": ("a.parquet", pd.DataFrame({"window": [[1.0, 2.0], [3.0, 4.0]]}), {}, "lists in 'window'"),
-    "two levels of names": (
-        "a.parquet",
-        pd.DataFrame([[1.0, 2.0]], columns=pd.MultiIndex.from_tuples([("a", "x"), ("a", "y")])),
-        {},
-        "2 levels",
-    ),
+    "two levels of names": ("a.parquet", pd.DataFrame([[1.0]], columns=pd.MultiIndex.from_tuples([("a", "x")])), {}, "2 levels"),
     "no array": ("a.npy", b"not an array", {}, "a.npy"),
     "a column number too large": ("a.npy", np.zeros((3, 2)), {"columns": ["2"]}, "'2'"),
     "a time of an array": ("a.npy", np.zeros(3), {"time": "t"}, "'t'"),
@@ -162,9 +108,15 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_bad_sources_are_refused(tmp_path, refused, case):
     name, content, arguments, words = BAD[case]
-    path = save(tmp_path, name.split("#")[0], content).with_name(name)
+    path = tmp_path / name.split("#")[0]
+    if isinstance(content, pd.DataFrame):
+        content.to_parquet(path)
+    elif isinstance(content, np.ndarray):
+        np.save(path, content)
+    elif content is not None:
+        path.write_bytes(content)
     with refused(words):
-        read_source(path, **arguments)
+        read_source(tmp_path / name, **arguments)
 
 
 def test_the_series_of_a_store(tmp_path, refused):
@@ -187,7 +139,7 @@ def test_the_series_of_a_store(tmp_path, refused):
     with refused("without any"):
         read_source(tmp_path / "empty")
     (tmp_path / "empty" / "labeled_anomalies.csv").touch()
-    with refused("labelled channels"):
+    with refused("train/T-1.npy"):
         read_source(tmp_path / "empty")
 
 
@@ -209,11 +161,11 @@ def test_telemetry_to_pandas_and_back(refused):
     assert pd.Timestamp(back.start) + pd.Timedelta(seconds=back.offset_s) == series.index[0]
     counted = to_series(Telemetry(VALUES.astype(np.float32), offset_s=7.0))
     assert (counted.index[0], from_series(counted, unit="A").offset_s, from_series(counted, unit="A").unit) == (7, 7.0, "A")
+    some = series.index[10:30]
     for dirty, words in (
-        (series.drop(series.index[[4, 5]]), "gap"),
+        (series.drop(some), "gap"),
         (pd.concat([series, series.iloc[:1]]), "sorted"),
-        (series.where(series.index != series.index[4]), "without a value"),
-        (series[~series.index.isin(series.index[10:30])], "gap"),
+        (series.mask(series > 0.9), "value"),
     ):
         with refused(words, "clean"):
             from_series(dirty)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.telemetry.windows import cut_windows, disjoint_rows, disjoint_starts, evenly_spaced_starts, random_window_starts, time_blocks
+from enhsim_tf.telemetry.windows import cut_windows, disjoint_rows, evenly_spaced_starts, random_window_starts, time_blocks
 
 
 def test_blocks_of_time_by_hand():
@@ -44,12 +44,6 @@ def test_random_starts_reach_every_window_and_no_more(refused):
     assert (starts != random_window_starts([range(30)], 20, 5_000, np.random.default_rng(1))).any()
     with refused("at least 20 samples", "Received: 19"):
         random_window_starts([range(19)], 20, 3, np.random.default_rng(0))
-
-
-def test_disjoint_starts_share_no_sample():
-    assert disjoint_starts(1_499, 500).tolist() == [0, 500]
-    assert disjoint_starts(1_500, 500).tolist() == [0, 500, 1_000]
-    assert disjoint_starts(499, 500).tolist() == []
 
 
 def test_evenly_spaced_starts_reach_from_end_to_end():

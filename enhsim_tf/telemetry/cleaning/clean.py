@@ -63,15 +63,15 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
         raise InputError(f"Expected samples. Received: none from {name}. Give a source that holds a series.")
     has_time = is_series and not isinstance(series.index, pd.RangeIndex)
     if has_time:
-        log, rows, clock = _rows_with_times(series.index, values, name, options, about)
+        log, rows = _rows_with_times(series.index, values, name, options, about)
     elif options.interval_s is not None:
         raise InputError(f"Expected interval_s with times only. Received: interval_s={options.interval_s} with {name}, which has none.")
     else:
-        log = CleaningLog(None, map(finding_from_dict, about.get("findings", ())), places)
+        no_clock = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
+        log = CleaningLog(None, [no_clock, *map(finding_from_dict, about.get("findings", ()))], places)
         numbers = np.arange(len(values))
         begin = series.index.start if is_series and series.index.step == 1 else 0  # a slice of a longer series keeps its sample numbers
         rows = Rows((numbers + begin) * UNITS_NS["s"], values, numbers)
-    log.findings[:0] = [_clock_finding(clock, rows.times) if has_time else _NO_CLOCK]
     log.findings += noted
 
     base = int(rows.times[0])
@@ -87,52 +87,33 @@ def clean(series: pd.Series | np.ndarray, options: Cleaning | None = None) -> Cl
     return Cleaned(telemetry, report)
 
 
-_NO_CLOCK = Finding("clock", 1, "no clock: samples are counted", details={"column": None})
-
-
-def _clock_finding(clock: dict[str, Any], times: np.ndarray) -> Finding:
-    """Describes the clock: its column, form and zone, whether it counts from zero, and its first and last time in `times`."""
-    first, last = int(times[0]), int(times[-1])
-    span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s" if clock["counts"] else f"from {iso_time(first)} to {iso_time(last)}"
-    text = f"the clock is {clock['column']}: {clock['form']}, zone {clock['zone']}, {span}"
-    return Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last})
-
-
-def _rows_with_times(
-    index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]
-) -> tuple[CleaningLog, Rows, dict[str, Any]]:
-    """Parses the times of a raw series and returns the cleaning log, the rows that have a time, in chronological order, and the clock."""
+def _rows_with_times(index: pd.Index, values: np.ndarray, name: str, options: Cleaning, about: dict[str, Any]) -> tuple[CleaningLog, Rows]:
+    """Parses the times of a raw series and returns the cleaning log and the rows that have a time, in chronological order."""
     places = about.get("places", ROWS)
-    what, drop = f"the times of {name}", options.on_bad_times == "drop"
-    parsed = parse_times(index, what, drop, options.time_format, places)
-    stamps, bad = parsed.stamps, parsed.bad
-    known = about.get("clock") or {
-        "column": "the index" if index.name is None else repr(str(index.name)),
-        "form": parsed.form,
-        "zone": parsed.zone,
-        "counts": parsed.counts,
-    }
+    parsed = parse_times(index, f"the times of {name}", options.on_bad_times == "drop", options.time_format, places)
+    stamps, bad, column = parsed.stamps, parsed.bad, "the index" if index.name is None else repr(str(index.name))
+    clock = about.get("clock") or {"column": column, "form": parsed.form, "zone": parsed.zone, "counts": parsed.counts}
     had_time = stamps.notna()
     local = stamps.tz is None
     if local and options.timezone:
         stamps = localize_times(stamps, options.timezone)
-    changed = had_time & stamps.isna()
     times = stamps.as_unit("ns").asi8 if stamps.tz is None else stamps.tz_convert("UTC").tz_localize(None).as_unit("ns").asi8
-    log = CleaningLog(times, map(finding_from_dict, about.get("findings", ())), places, known["counts"])
+    log = CleaningLog(times, map(finding_from_dict, about.get("findings", ())), places, clock["counts"])
+    for kind, mask, text in (
+        ("bad times", bad, "rows whose time cannot be read"),
+        ("missing times", ~had_time & ~bad, "rows without a time"),
+        ("clock change", had_time & stamps.isna(), f"rows at ambiguous or nonexistent local times of {options.timezone}"),
+    ):
+        log.add(kind, np.flatnonzero(mask), f"{text}: {{count}}", rows_left_out=int(mask.sum()))
     kept = np.flatnonzero(stamps.notna())
-    unreadable, missing = np.flatnonzero(bad), np.flatnonzero(~had_time & ~bad)
-    log.add("bad times", unreadable, "rows whose time cannot be read: {count}", rows_left_out=len(unreadable))
-    log.add("missing times", missing, "rows without a time: {count}", rows_left_out=len(missing))
-    lost = np.flatnonzero(changed)
-    log.add("clock change", lost, f"rows at ambiguous or nonexistent local times of {options.timezone}: {{count}}", rows_left_out=len(lost))
     if not len(kept):
         raise InputError(f"Expected rows with times. Received: none in {name}. Name another time column.")
     if local:
-        known = known | {"zone": f"{options.timezone or 'UTC'}, as none is stated"}
+        clock = clock | {"zone": f"{options.timezone or 'UTC'}, as none is stated"}
         if options.timezone is None:
             refuse_repeated_local_hour(times[kept], kept, log, name)
-    elif options.timezone and known["zone"] != "none":
-        known = known | {"zone": f"{known['zone']}, which goes before {options.timezone}"}
+    elif options.timezone and clock["zone"] != "none":
+        clock = clock | {"zone": f"{clock['zone']}, which goes before {options.timezone}"}
     steps = np.diff(times[kept])
     if len(steps) and (steps <= 0).all() and (steps < 0).any():
         log.add("descending", (), "rows in descending order of time, reversed: {count}", count=len(kept))
@@ -140,4 +121,8 @@ def _rows_with_times(
         early = kept[1:][times[kept][1:] < np.maximum.accumulate(times[kept])[:-1]]
         log.add("unsorted", early, "rows out of chronological order, sorted: {count}")
     kept = kept[np.argsort(times[kept], kind="stable")]
-    return log, Rows(times[kept], values[kept], kept), known
+    first, last = int(times[kept[0]]), int(times[kept[-1]])
+    span = f"from {first / 1e9:.10g} s to {last / 1e9:.10g} s" if clock["counts"] else f"from {iso_time(first)} to {iso_time(last)}"
+    text = f"the clock is {clock['column']}: {clock['form']}, zone {clock['zone']}, {span}"
+    log.findings.insert(0, Finding("clock", 1, text, details=clock | {"first_ns": first, "last_ns": last}))
+    return log, Rows(times[kept], values[kept], kept)

@@ -36,44 +36,30 @@ def parse_numbers(
     missing_values: Sequence[float | str] = (),
     places: Places = ROWS,
 ) -> tuple[np.ndarray, np.ndarray, list[Finding]]:
-    """Parses a column of values.
+    """Parses a one-dimensional column of numbers, text or objects.
 
     Args:
-        values: One-dimensional array, pandas Series or list of numbers, text or objects.
+        values: The column.
         what: Description of the source, for messages.
-        drop: If True, a value that is not a number is marked and treated as missing. If False, it raises an `InputError`.
+        drop: Whether a value that is no number in the range of float32 is marked and taken as missing, instead of refused.
         decimal: Decimal sign of text; the other sign separates thousands. None: inferred from the text.
         missing_values: Numbers and text that mean "no value".
         places: Where the rows are in their file, for messages.
 
     Returns:
-        `(values, bad, findings)`: float64 values with NaN where missing, the mask of values that could not be parsed, and
-        findings for the cleaning log.
-
-    Raises:
-        InputError: If the values are not a column of numbers, or one of them is not a number in the range of float32.
+        float64 values with NaN where missing, the mask of values that could not be parsed, and findings for the cleaning log.
     """
-    values = column(values, what)
-    if pd.api.types.is_bool_dtype(values.dtype) or pd.api.types.is_complex_dtype(values.dtype):
+    values = as_column(values, what)
+    is_plain = pd.api.types.is_numeric_dtype(values.dtype) and values.dtype.kind not in "bc"
+    if not (is_plain or is_text(values)):
         raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
-    if not (pd.api.types.is_numeric_dtype(values.dtype) or is_text(values)):
-        raise InputError(f"Expected numbers. Received: dtype {values.dtype} from {what}. Choose a numeric column.")
-    findings: list[Finding] = []
-    if is_text(values):
-        cells, findings = _without(values.astype(object), missing_values)
+    cells = pd.Series(values.to_numpy(np.float64, na_value=np.nan)) if is_plain else values.astype(object)
+    cells, findings = _without(cells, missing_values)
+    if is_plain:
+        parsed, bad = cells.to_numpy(), np.zeros(len(cells), bool)
+    else:
         parsed, bad, noted = _parse_text_numbers(cells, decimal)
         findings += noted
-    else:
-        with np.errstate(over="ignore"):
-            parsed = values.to_numpy(np.float64, na_value=np.nan)
-        bad = np.zeros(len(parsed), bool)
-        if values.dtype == np.longdouble:
-            bad = np.isinf(parsed) & np.isfinite(values.to_numpy())
-        parsed, findings = _without(pd.Series(parsed), missing_values)
-        parsed = parsed.to_numpy()
-    too_fine = np.abs(parsed) > 2**53
-    if pd.api.types.is_integer_dtype(values.dtype) and too_fine.any():
-        findings.append(Finding("resolution", int(too_fine.sum()), f"integers beyond 2^53, rounded to float64: {too_fine.sum():,}"))
     beyond = np.isfinite(parsed) & (np.abs(parsed) > _LARGEST)
     if (bad | beyond).any() and not drop:
         row = int(np.argmax(bad | beyond))
@@ -85,7 +71,7 @@ def parse_numbers(
     return np.where(bad | beyond, np.nan, parsed), bad | beyond, findings
 
 
-def column(values: Any, what: str) -> pd.Series:
+def as_column(values: Any, what: str) -> pd.Series:
     """Converts values to a Series with rows counted from 0; raises an `InputError` if they are not one-dimensional."""
     if isinstance(values, pd.DataFrame) or np.ndim(values) != 1:
         raise InputError(f"Expected one series of shape (samples,). Received: shape {np.shape(values)} from {what}. Name one column.")
@@ -94,7 +80,7 @@ def column(values: Any, what: str) -> pd.Series:
         return cells.astype(object) if isinstance(cells.dtype, pd.CategoricalDtype) else cells
     except (ValueError, TypeError, NotImplementedError) as error:  # types that pandas does not support
         reason = (str(error).splitlines() or [""])[0]
-        raise InputError(f"Expected numbers. Received: {type(values).__name__} from {what} ({reason}). Give an array of numbers.") from None
+        raise InputError(f"Expected one plain column. Received: {type(values).__name__} from {what} ({reason}). Name one column.") from None
 
 
 def is_text(values: pd.Series) -> bool:
@@ -144,31 +130,19 @@ def _advice(cell: Any) -> str:
 
 
 def shows_comma(text: pd.Series) -> bool:
-    """Whether text has numbers whose comma can only be a decimal sign, such as 20,5, but not 1,500.
-
-    Args:
-        text: Text without missing cells.
-    """
+    """Whether text without missing cells has numbers whose comma can only be a decimal sign, such as 20,5, but not 1,500."""
     cells = text.str.strip()
     commas = cells[cells.str.fullmatch(_COMMA).to_numpy(bool)]
     return bool(len(commas)) and not commas.str.fullmatch(_COMMA_THOUSANDS).all() and not cells.str.fullmatch(_BOTH).any()
 
 
 def has_commas(text: pd.Series) -> bool:
-    """Whether text has numbers with commas, whatever these mean.
-
-    Args:
-        text: Text without missing cells.
-    """
+    """Whether text without missing cells has numbers with commas, whatever these mean."""
     return bool(text.str.strip().str.fullmatch(f"{_COMMA}|{_COMMA_THOUSANDS}").any())
 
 
 def allows_point_thousands(text: pd.Series) -> bool:
-    """Whether every point in a column of numbers may separate thousands, such as in 1.200 and 999.
-
-    Args:
-        text: Text without missing cells.
-    """
+    """Whether every point in text without missing cells may separate thousands, such as in 1.200 and 999."""
     return bool(text.str.strip().str.fullmatch(f"{_POINT_THOUSANDS}|{_WHOLE}|{_COMMA}").all())
 
 

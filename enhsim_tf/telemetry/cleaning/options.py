@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import check_time_format
+from enhsim_tf.telemetry.cleaning.times import DAYS, UNITS_NS
 
 _CHOICES = {
     "on_bad_times": ("refuse", "drop"),
@@ -78,7 +78,12 @@ class Cleaning:
             raise InputError(f"Expected interval_s from 1e-9 to 1e9 seconds. Received: interval_s={self.interval_s}.")
         if not (0 <= self.max_jitter <= 0.5 and self.longest_gap >= 0 and self.min_part >= 1):
             raise InputError(f"Expected 0 <= max_jitter <= 0.5, max_fill >= 0, min_part >= 1. Received: {self}.")
-        check_time_format(self.time_format)
+        form, units = self.time_format, (*UNITS_NS, *DAYS)
+        if form is not None and form not in units and "%" not in form:
+            raise InputError(
+                "Expected time_format as datetime.strptime takes it, such as '%d.%m.%Y %H:%M:%S', or one of: "
+                f"{', '.join(units)}. Received: time_format={form!r}."
+            )
         for name in _NAMES:
             given = getattr(self, name)
             if given is not None:
@@ -92,10 +97,6 @@ class Cleaning:
         return _MAX_FILL[self.fill] if self.max_fill is None else self.max_fill
 
     def of_run(self, **changes: object) -> "Cleaning":
-        """Returns the options for a recorded run of a simulator, which has another layout than the telemetry.
-
-        Args:
-            **changes: Further fields to change.
-        """
+        """Returns the options for a recorded run of a simulator, which has another layout, with further changes of fields."""
         own = {"time_format": None, "label_column": None, "labelled": "keep", "series_column": None, "value_column": None}
         return dataclasses.replace(self, **own | {"no_header": False} | changes)

@@ -17,21 +17,21 @@ _STUCK = 20  # a shorter run of one value, in samples, does not count as stuck
 
 
 def describe_values(parts: Sequence[Part], read: np.ndarray, log: CleaningLog) -> None:
-    """Adds findings about the values of a channel to the cleaning log.
-
-    Args:
-        parts: The regular parts of one channel.
-        read: The finite values as they were read, before any was averaged or filled in.
-        log: The cleaning log.
-    """
+    """Adds findings about the values of a channel to the cleaning log: of its parts, and as they were read, before any was filled in."""
     _log_fill_values(read, log)
-    values = np.concatenate([part.values for part in parts])
-    numbers = np.concatenate([part.source_row for part in parts])
+    values, numbers = np.concatenate([part.values for part in parts]), np.concatenate([part.source_row for part in parts])
     if np.ptp(values) == 0:
         log.add("constant", (), f"the channel is {values[0]:g} throughout", count=len(values))
         return
-    _log_resolution(values, log)
-    _log_levels(read, log)
+    rounded = values.astype(np.float32).astype(np.float64)
+    error, spread = float(np.abs(rounded - values).max()), float(values.std())
+    if error > 1e-3 * spread:
+        text = f"float32 rounds the values by up to {error:.3g}, while their standard deviation is {spread:.3g}: subtract their mean first"
+        log.add("resolution", (), text, count=int((rounded != values).sum()), details={"error": error})
+    levels = Levels.find(read)
+    if levels is not None and levels.count <= _MAX_LEVELS:
+        text = f"quantised values, {{count}} levels in steps of {levels.step:.4g}: noise smaller than a step cannot be learnt"
+        log.add("quantised", (), text, count=levels.count, details={"step": levels.step})
     _log_stuck(values, numbers, log)
     _log_drift(values, log)
 
@@ -64,30 +64,12 @@ def _is_usual_fill(value: float) -> bool:
     return bool(re.fullmatch(r"-?9{2,}\.?9*|-?6999|-?3276[78]|65535|-?9\.9+e\+\d+|-?1e\+[23]\d", f"{value:.15g}"))
 
 
-def _log_resolution(values: np.ndarray, log: CleaningLog) -> None:
-    rounded = values.astype(np.float32).astype(np.float64)
-    error, spread = float(np.abs(rounded - values).max()), float(values.std())
-    if error > 1e-3 * spread:
-        text = f"float32 rounds the values by up to {error:.3g}, while their standard deviation is {spread:.3g}: subtract their mean first"
-        log.add("resolution", (), text, count=int((rounded != values).sum()), details={"error": error})
-
-
-def _log_levels(values: np.ndarray, log: CleaningLog) -> None:
-    levels = Levels.find(values)
-    if levels is not None and levels.count <= _MAX_LEVELS:
-        text = f"quantised values, {{count}} levels in steps of {levels.step:.4g}: noise smaller than a step cannot be learnt"
-        log.add("quantised", (), text, count=levels.count, details={"step": levels.step})
-
-
 def _log_stuck(values: np.ndarray, numbers: np.ndarray, log: CleaningLog) -> None:
     begins = np.flatnonzero(np.diff(values, prepend=values[0] - 1) != 0)
     lengths = np.diff(begins, append=len(values))
-    usual = float(np.quantile(lengths, 0.9))
-    stuck = lengths >= max(_STUCK, 3 * usual)
-    if stuck.any():
-        longest = int(lengths.max())
-        text = f"stretches of one value, the longest for {longest:,} samples: {{count}}"
-        log.add("stuck", numbers[begins[stuck]], text, details={"longest": longest})
+    stuck, longest = lengths >= max(_STUCK, 3 * np.quantile(lengths, 0.9)), int(lengths.max())
+    text = f"stretches of one value, the longest for {longest:,} samples: {{count}}"
+    log.add("stuck", numbers[begins[stuck]], text, details={"longest": longest})
 
 
 def _log_drift(values: np.ndarray, log: CleaningLog) -> None:

@@ -71,15 +71,12 @@ def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options
     Args:
         rows: The rows.
         bad: Mask of the source rows whose value cannot be read.
-        log: The cleaning log, to which findings are added. If it has no times, samples are counted.
+        log: The cleaning log. If it has no times, samples are counted.
         name: Channel name, for messages.
         options: How problems are treated.
 
     Returns:
-        `(parts, used, interval)`: the parts, the number of rows that their samples represent, and the interval in nanoseconds.
-
-    Raises:
-        InputError: If the rows have no common interval, or no part is long enough, or if times repeat that must not.
+        The parts, the number of rows that their samples represent, and the interval in nanoseconds.
     """
     rows = _drop_missing_values(_drop_duplicate_times(rows, bad, log, name, options), bad, log, name)
     holds, longest = options.fill == "hold", options.longest_gap + 1
@@ -103,10 +100,8 @@ def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options
         other = np.flatnonzero(_have_other_rate(rows.times, interval))
         if len(other) and not holds:  # a long step of telemetry that is held is no slower rate
             by_interval = True
-            text = (
-                f"rows in stretches of another rate than one every {interval / 1e9:.6g} s, to which they are averaged or filled: {{count}}"
-            )
-            log.add("other rates", rows.source_row[other], text)
+            usual = f"one every {interval / 1e9:.6g} s, to which they are averaged or filled"
+            log.add("other rates", rows.source_row[other], f"rows in stretches of another rate than {usual}: {{count}}")
     segments = _binned(rows.times, interval, longest) if by_interval else _regular(rows.times, interval, options.max_jitter, longest)
     same_place = "last" if holds else "mean" if by_interval else options.same_time or "mean"
     parts, used = _build_parts(rows, segments, interval, log, name, same_place, options)
@@ -114,14 +109,7 @@ def regularise(rows: Rows, bad: np.ndarray, log: CleaningLog, name: str, options
 
 
 def find_interval(times: np.ndarray) -> float:
-    """Finds the sampling interval that most rows have.
-
-    Args:
-        times: Times of at least two rows, all different.
-
-    Returns:
-        The interval in nanoseconds.
-    """
+    """Finds the sampling interval, in nanoseconds, that most of at least two rows with different times have."""
     steps = np.sort(np.diff(times).astype(np.float64))
     near = np.searchsorted(steps, _ALIKE[1] * steps, "right") - np.searchsorted(steps, _ALIKE[0] * steps, "left")
     most = steps[np.argmax(near)]
@@ -233,9 +221,8 @@ def _regular(times: np.ndarray, interval: float, max_jitter: float, max_step: in
     ratios = np.diff(times) / interval
     numbers = np.round(ratios)
     whole = (numbers <= max_step) & (np.abs(ratios - numbers) <= 2 * max_jitter + 1e-9)
-    breaks = [0, *(np.flatnonzero(~whole) + 1).tolist(), len(times)]
     segments = []
-    for start, stop in zip(breaks[:-1], breaks[1:], strict=True):
+    for start, stop in _between(~whole):
         all_places = np.concatenate([[0], np.cumsum(numbers[start : stop - 1])]).astype(np.int64)
         all_off = (times[start:stop] - times[start]) - all_places * interval
         first = 0
@@ -248,6 +235,12 @@ def _regular(times: np.ndarray, interval: float, max_jitter: float, max_step: in
             segments.append(_Segment(slice(start + first, start + end), places, float(times[start + first]) + middle, off - middle))
             first = end
     return segments
+
+
+def _between(breaks: np.ndarray) -> list[tuple[int, int]]:
+    """First row and end (exclusive) of each run of rows, where `breaks` marks the steps between rows at which a run ends."""
+    edges = [0, *(np.flatnonzero(breaks) + 1).tolist(), len(breaks) + 1]
+    return list(zip(edges[:-1], edges[1:], strict=True))
 
 
 def _end_of_spread(values: np.ndarray, spread: float) -> int:
@@ -268,9 +261,8 @@ def _end_of_spread(values: np.ndarray, spread: float) -> int:
 def _binned(times: np.ndarray, interval: float, max_step: int) -> list[_Segment]:
     """Splits a series at its long gaps and assigns every row to the nearest point of one grid that starts at the first row."""
     places = np.round((times - times[0]) / interval).astype(np.int64)
-    breaks = [0, *(np.flatnonzero(np.diff(places) > max_step) + 1).tolist(), len(times)]
     segments = []
-    for start, stop in zip(breaks[:-1], breaks[1:], strict=True):
+    for start, stop in _between(np.diff(places) > max_step):
         begin = float(times[0]) + places[start] * interval
         inside = places[start:stop] - places[start]
         segments.append(_Segment(slice(start, stop), inside, begin, times[start:stop] - begin - inside * interval))

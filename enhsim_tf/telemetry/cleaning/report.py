@@ -26,7 +26,7 @@ _NUM_PLACES = 3  # places named in each finding
 class Places(list):
     """Where the rows of a channel are: `[first row, its line, name of the file]` of each file, in the order of the rows.
 
-    A list, because it is kept in the attributes of a pandas Series, which pandas writes as JSON. Without files, rows are counted from 0.
+    It is a list because pandas writes the attributes of a Series as JSON. Without files, rows are counted from 0.
 
     Args:
         files: The files.
@@ -43,11 +43,7 @@ class Places(list):
         return self  # pandas copies attributes with every operation
 
     def of(self, row: int) -> str:
-        """Describes a row of the channel, for messages.
-
-        Args:
-            row: Number of the row, from 0.
-        """
+        """Describes a row of the channel, counted from 0, for messages."""
         row = int(row) if self.rows is None else int(self.rows[row])
         inside = [each for each in self if each[0] <= row]
         if not inside:
@@ -93,14 +89,12 @@ class Finding:
 
     def to_dict(self) -> dict[str, Any]:
         """The finding in plain JSON types; `finding_from_dict` restores it."""
-        found = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return found | {"places": list(self.places), "details": dict(self.details), "action": self.action}
+        return dataclasses.asdict(self) | {"places": list(self.places), "action": self.action}
 
 
 def finding_from_dict(content: Mapping[str, Any]) -> Finding:
     """Restores a finding from the output of `Finding.to_dict`."""
-    given = {name: value for name, value in content.items() if name != "action"}
-    return Finding(**given | {"places": tuple(given.get("places", ()))})
+    return Finding(**{name: tuple(value) if name == "places" else value for name, value in content.items() if name != "action"})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -153,17 +147,12 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """The report in plain JSON types."""
-        counted = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         sums = {"rows_left_out": self.rows_left_out, "samples_filled": self.samples_filled}
-        return counted | sums | {"findings": [finding.to_dict() for finding in self.findings]}
+        return dataclasses.asdict(self) | sums | {"findings": [finding.to_dict() for finding in self.findings]}
 
 
 def lines_of(reports: Sequence[Report]) -> list[str]:
-    """The reports of one or several channels as text; what several channels share is said once.
-
-    Args:
-        reports: The reports.
-    """
+    """The reports of one or several channels as text; what several channels share is said once."""
     owners: dict[str, list[str]] = {}
     for report in reports:
         for text in (report.summary, *(finding.line() for finding in report.findings)):
@@ -200,7 +189,7 @@ class CleaningLog:
         Args:
             kind: One of `KINDS`.
             rows: Rows of the source where it was found. The first few are named.
-            text: What was found and what was done, with `{count}` as the placeholder for the count.
+            text: What was found and what was done; `{count}` in it becomes the count.
             count: The count. None: the number of `rows`.
             **numbers: The other fields of the `Finding`.
         """

@@ -14,7 +14,7 @@ import pandas as pd
 from pandas.tseries.api import guess_datetime_format
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.numbers import column, format_cell, is_missing, is_text, parse_numbers
+from enhsim_tf.telemetry.cleaning.numbers import as_column, format_cell, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.report import ROWS, CleaningLog, Places
 
 UNITS_NS = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "min": 60 * 10**9, "s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
@@ -53,42 +53,17 @@ class Times:
     counts: bool = False
 
 
-def check_time_format(form: str | None) -> None:
-    """Checks a time format before it is used.
-
-    Args:
-        form: A format as for `datetime.strptime`, a unit of `UNITS_NS`, a kind of `DAYS`, or None.
-
-    Raises:
-        InputError: If it is none of these.
-    """
-    if form is not None and form not in UNITS_NS and form not in DAYS and "%" not in form:
-        raise InputError(
-            f"Expected time_format as datetime.strptime takes it, such as '%d.%m.%Y %H:%M:%S', or one of: "
-            f"{', '.join((*UNITS_NS, *DAYS))}. Received: time_format={form!r}."
-        )
-
-
 def parse_times(times: Any, what: str, drop: bool = False, form: str | None = None, places: Places = ROWS) -> Times:
     """Parses a column of times.
 
     Args:
         times: Date-times, text, objects, time spans, or numbers.
         what: Description of the source, for messages.
-        drop: If True, a time that cannot be parsed is marked and treated as missing. If False, it raises an `InputError`.
-        form: A format of text as for `datetime.strptime`, or the unit or kind of numbers, see `Cleaning.time_format`. None: detected.
+        drop: Whether a time that cannot be parsed is marked and taken as missing, instead of refused.
+        form: How they are written, see `Cleaning.time_format`. None: detected.
         places: Where the rows are in their file, for messages.
-
-    Returns:
-        The times.
-
-    Raises:
-        InputError: If the times cannot be parsed, or their unit or form cannot be told.
     """
-    check_time_format(form)
-    if isinstance(times, pd.MultiIndex):
-        raise InputError(f"Expected one time for a row. Received: an index of {times.nlevels} levels from {what}. Name one time column.")
-    times, reader = column(times, what), _Reader(what, drop, places)
+    times, reader = as_column(times, what), _Reader(what, drop, places)
     if isinstance(times.dtype, pd.PeriodDtype):
         times = times.astype(str).where(times.notna()) if len(times) else times.astype(object)
     kind, is_format = times.dtype, form is not None and "%" in form
@@ -226,20 +201,25 @@ def _refuse_lost_digits(values: np.ndarray, what: str) -> None:
         )
 
 
-def are_days(values: np.ndarray, even_whole: bool = False) -> bool:
-    """Whether numbers look like days of a spreadsheet or calendar: from the years 1954 to 2119, at steps of whole or tenth seconds.
+def refuse_days(values: np.ndarray, what: str, even_whole: bool = False) -> None:
+    """Refuses numbers that look like days of a spreadsheet or calendar: of the years 1954 to 2119, at steps of whole or tenth seconds.
 
-    Args:
-        values: Finite numbers.
-        even_whole: Whether whole days and tenths of days count too, as in a column whose name speaks of dates.
+    With `even_whole`, whole days and tenths of days count too, as in a column whose name speaks of dates.
     """
     ranges = ((20_000, 80_000), (6.9e5, 7.75e5), (2.43e6, 2.5e6))
     if len(values) < 2 or not any(low <= values.min() and values.max() < high for low, high in ranges):
-        return False
+        return
     step = float(np.median(np.abs(np.diff(values))))
     seconds = step * 86_400 * 10
     is_odd = abs(step * 1000 - round(step * 1000)) > 1e-6 and round(seconds) > 0 and abs(seconds - round(seconds)) < 0.01 * seconds
-    return bool(is_odd or even_whole)
+    if not (is_odd or even_whole):
+        return
+    dates = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
+    possible = [f"{kind} (from {pd.Timestamp(round(s), unit='s')})" for kind, s in dates.items() if _YEARS_S[0] < s < _YEARS_S[1]]
+    raise InputError(
+        f"Expected times whose unit is known. Received: {values[0]:.12g} to {values[-1]:.12g} in {what}, which may be days or seconds. "
+        f"Give time_format {', '.join(possible) or 'D'}, or s (--time-format)."
+    )
 
 
 def _infer_unit(values: np.ndarray, what: str) -> str:
@@ -253,45 +233,25 @@ def _infer_unit(values: np.ndarray, what: str) -> str:
                         f"Expected dates as text or times as numbers. Received: {text.iloc[0]} in {what}, which reads as both. "
                         f"Give time_format {form!r}, or 's' (--time-format)."
                     )
-    if are_days(values):
-        refuse_days(values, what)
-    for unit in ("s", "ms", "us", "ns"):
-        low, high = (bound * 1e9 / UNITS_NS[unit] for bound in _YEARS_S)
-        if (unit == "s" and size < low) or low <= size <= high:
-            return unit
+    refuse_days(values, what)
+    unit = "s" if size < _YEARS_S[0] else epoch_unit(size)
+    if unit is not None:
+        return unit
     raise InputError(
         f"Expected times in s, ms, us or ns since 1970. Received: numbers of about {size:.17g} in {what}, which are not from 1980 to 2100 in any of "
         "these units. Give time_format, such as 'ms' (--time-format)."
     )
 
 
-def refuse_days(values: np.ndarray, what: str) -> None:
-    """Raises an `InputError` that says which dates the days would be.
-
-    Args:
-        values: Numbers for which `are_days` is true.
-        what: Description of the source.
-
-    Raises:
-        InputError: Always.
-    """
-    dates = {kind: (values[0] - zero) * 86_400 for kind, zero in DAYS.items()}
-    possible = {kind: pd.Timestamp(round(second), unit="s") for kind, second in dates.items() if _YEARS_S[0] < second < _YEARS_S[1]}
-    said = ", ".join(f"{kind} (from {date})" for kind, date in possible.items())
-    raise InputError(
-        f"Expected times whose unit is known. Received: {values[0]:.12g} to {values[-1]:.12g} in {what}, which may be days or seconds. "
-        f"Give time_format {said or 'D'}, or s (--time-format)."
-    )
+def epoch_unit(size: float) -> str | None:
+    """Returns the unit in which a number is a time since 1970 from the years 1979 to 2103, or None."""
+    return next((unit for unit in ("s", "ms", "us", "ns") if _YEARS_S[0] <= size * UNITS_NS[unit] / 1e9 <= _YEARS_S[1]), None)
 
 
 def date_forms(text: pd.Series) -> list[str]:
-    """Finds the forms in which a column of dates may be written.
+    """Finds the forms in which text without missing cells may hold dates: formats as for `datetime.strptime`, or `_ISO`.
 
-    Args:
-        text: Text without missing cells.
-
-    Returns:
-        Formats as for `datetime.strptime`, or `_ISO`. None of them: the text is no dates. Two: day and month cannot be told apart.
+    None: the text is no dates. Two: day and month cannot be told apart.
     """
     head = _plain(text.iloc[:LOOK])
     if not len(head):
@@ -354,15 +314,10 @@ def _parse_dates(text: pd.Series, form: str) -> tuple[pd.Series, np.ndarray]:
         whole = form.replace(".%f", "")
         for other in dict.fromkeys((form, whole, whole.replace("%S", "%S.%f"))):
             found = pd.to_datetime(rest, format=other, utc=True, errors="coerce").dt.tz_localize(None)
-            dates = _fill_dates(dates, found)
+            unit = np.promote_types(dates.dtype, found.dtype)  # whole seconds and fractions have different units
+            dates = dates.astype(unit).fillna(found.astype(unit))
         zoned[left] = _has_zone(rest, form)
     return dates, zoned
-
-
-def _fill_dates(dates: pd.Series, found: pd.Series) -> pd.Series:
-    """Fills missing dates with others. Whole seconds and fractions have different units, of which the finer is taken."""
-    unit = np.promote_types(dates.dtype, found.dtype)
-    return dates.astype(unit).fillna(found.astype(unit))
 
 
 def _has_zone(text: pd.Series, form: str) -> np.ndarray:
@@ -374,20 +329,10 @@ def _has_zone(text: pd.Series, form: str) -> np.ndarray:
 
 
 def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
-    """Assigns a time zone to local times.
+    """Assigns a time zone to times without one; raises an `InputError` if it is unknown.
 
     Of an hour that a clock repeats in autumn, the order of the rows shows which is meant; where it does not, times become NaT. So do
     local times that do not exist.
-
-    Args:
-        stamps: Times without a zone.
-        zone: Name of the time zone.
-
-    Returns:
-        Times with the zone.
-
-    Raises:
-        InputError: If the time zone is unknown.
     """
     try:
         local = stamps.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
@@ -402,23 +347,13 @@ def localize_times(stamps: pd.DatetimeIndex, zone: str) -> pd.DatetimeIndex:
 
 
 def refuse_repeated_local_hour(times: np.ndarray, numbers: np.ndarray, log: CleaningLog, name: str) -> None:
-    """Checks for times that a local clock repeats when it is set back by one hour.
+    """Refuses times that step back by about one hour only, as a local clock does: without its zone, sorting would mix the two hours.
 
-    Without a time zone, sorting by time would mix the two hours.
-
-    Args:
-        times: Times in nanoseconds, int64, in the order of the source.
-        numbers: Source row of each time.
-        log: The cleaning log, which describes the place for the message.
-        name: Channel name, for the message.
-
-    Raises:
-        InputError: If times step back, and every step back is about one hour.
+    `times` are nanoseconds in the order of the source, and `numbers` their rows there.
     """
-    steps = np.diff(times)
+    steps, hour = np.diff(times), UNITS_NS["h"]
     usual = np.median(np.abs(steps)) if len(steps) else 0
     back = np.flatnonzero(steps < 0)
-    hour = UNITS_NS["h"]
     if len(back) and usual < hour / 2 and (np.abs(steps[back] + hour) <= 2 * usual).all():
         place = log.place(numbers[back[0] + 1])
         raise InputError(

@@ -1,7 +1,6 @@
 """Reads the channels of a table, each with its times and with findings that say what was decided."""
 
 import dataclasses
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,10 +12,10 @@ from enhsim_tf.common.size_limits import MAX_COLUMNS
 from enhsim_tf.telemetry.cleaning.numbers import format_cell, is_text
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
-from enhsim_tf.telemetry.reading.clock import NO_TIME
+from enhsim_tf.telemetry.reading.clock import NO_TIME, words_of
 from enhsim_tf.telemetry.reading.columns import Layout, anomalous, lay_out
 from enhsim_tf.telemetry.reading.files import read_table
-from enhsim_tf.telemetry.reading.table import Table
+from enhsim_tf.telemetry.reading.text_files import Table
 
 _SAID = {
     "row numbers": "columns that number the rows, not taken as channels",
@@ -38,32 +37,30 @@ def read_table_channels(
     source: Path | Sequence[Path] | pd.DataFrame | pd.Series, columns: list[str] | None, time: str | None, options: Cleaning
 ) -> dict[str, pd.Series]:
     """Reads columns of a table with their times; see `sources.read_source`, which calls it."""
-    what = _name_of(source)
+    what = "the table"
+    if not isinstance(source, pd.DataFrame | pd.Series):
+        what = source.name if isinstance(source, Path) else f"{source[0].name} ..."
     table = _without_repeats(read_table(source, options), columns, time, options, what)
-    lists = next(
-        (
-            name
-            for name, cells in table.frame.items()
-            if cells.dtype == object and len(cells) and isinstance(cells.iloc[0], list | np.ndarray)
-        ),
-        None,
-    )
-    if lists is not None:
-        raise InputError(
-            f"Expected one value in each cell. Received: lists in {lists!r} of {what}, as in files of windows. Give a series (generate --continuous)."
-        )
+    for name, cells in table.frame.items():
+        if cells.dtype == object and len(cells) and isinstance(cells.iloc[0], list | np.ndarray):
+            raise InputError(
+                f"Expected one value in each cell. Received: lists in {name!r} of {what}, as in files of windows. Give a series (generate --continuous)."
+            )
     named = list(columns) if columns is not None and set(columns) <= set(table.frame.columns) else None  # others are names of series
     layout = lay_out(table, named, time, options, what)
     keys = [key for key in _keys_of(table.frame, layout, options, what) if key not in (named or ())]
-    findings = [*table.findings, *_findings_of(layout, keys)]
+    findings = list(table.findings)
+    for kind, text in _SAID.items():
+        if names := [name for name in layout.left_out.get(kind, ()) if name not in keys]:
+            findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
     if not keys:
         _refuse_parallel_files(table.places, layout, what)
         chosen = {name: (name, None) for name in layout.channels}
     else:
         values = options.value_column or [name for name in layout.channels if name not in keys]
         chosen = _name_series(table.frame, keys, list(values), what)
-        said = ", ".join(list(chosen)[:6])
-        findings.append(Finding("series", len(chosen), f"series told apart by {', '.join(keys)}: {len(chosen):,} ({said})"))
+        text = f"series told apart by {', '.join(keys)}: {len(chosen):,} ({', '.join(list(chosen)[:6])})"
+        findings.append(Finding("series", len(chosen), text))
     if columns is not None and named is None:
         unknown = next((name for name in columns if name not in chosen), None)
         if unknown is not None:
@@ -71,19 +68,12 @@ def read_table_channels(
             raise InputError(f"Expected a channel of {what}: {known}. Received: {unknown!r}. Name one of these.")
         chosen = {name: chosen[name] for name in columns}
     if not chosen:
-        left = "; left out: " + ", ".join(_with_cell(table, name) for names in layout.left_out.values() for name in names)
-        left = left if layout.left_out else ""
+        left = ", ".join(_with_cell(table.frame[name]) for names in layout.left_out.values() for name in names)
+        left = f"; left out: {left}" if left else ""
         raise InputError(
             f"Expected a column of numbers. Received: none in {what} beside the times{left}. Give another table, or name the columns."
         )
     return {name: _channel(table, layout, name, *place, findings, options) for name, place in chosen.items()}
-
-
-def _name_of(source: Path | Sequence[Path] | pd.DataFrame | pd.Series) -> str:
-    """Returns the name of a source for messages."""
-    if isinstance(source, Path):
-        return source.name
-    return "the table" if isinstance(source, pd.DataFrame | pd.Series) else f"{source[0].name} ..."
 
 
 def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
@@ -102,22 +92,18 @@ def _refuse_parallel_files(places: Places, layout: Layout, what: str) -> None:
             )
 
 
-def _with_cell(table: Table, name: str) -> str:
+def _with_cell(cells: pd.Series) -> str:
     """Returns the name of a column with its first cell."""
-    cells = table.frame[name].dropna()
-    return f"{name} ({format_cell(cells.iloc[0])})" if len(cells) else name
+    given = cells.dropna()
+    return f"{cells.name} ({format_cell(given.iloc[0])})" if len(given) else str(cells.name)
 
 
 def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Table:
     """Refuses names that occur twice, unless other columns were asked for, and names of options that do not occur."""
     names = table.frame.columns
     repeated = set(names[names.duplicated()])
-    named = [
-        *(options.label_column or ()),
-        *(options.series_column or ()),
-        *(options.value_column or ()),
-        *([] if time is None else [time]),
-    ]
+    times = () if time is None else (time,)
+    named = [*(options.label_column or ()), *(options.series_column or ()), *(options.value_column or ()), *times]
     for name in [*(columns or ()), *named]:
         if name in repeated or name in named and name not in names and name != NO_TIME:
             received = f"{name!r} more than once in {what}" if name in repeated else repr(name)
@@ -129,52 +115,37 @@ def _without_repeats(table: Table, columns: Sequence[str] | None, time: str | No
     return dataclasses.replace(table, frame=table.frame.loc[:, ~names.isin(repeated)]) if repeated else table
 
 
-def _findings_of(layout: Layout, keys: Sequence[str]) -> list[Finding]:
-    findings = []
-    for kind, text in _SAID.items():
-        names = [name for name in layout.left_out.get(kind, ()) if name not in keys]
-        if names:
-            findings.append(Finding(kind, len(names), f"{text}: {', '.join(names[:8])}"))
-    return findings
-
-
 def _channel(
     table: Table, layout: Layout, name: str, column: str, rows: np.ndarray | None, findings: Sequence[Finding], options: Cleaning
 ) -> pd.Series:
     """Makes the raw series of one channel."""
-    frame, places = table.frame, table.places
-    take = slice(None) if rows is None else rows
-    cells = frame[column].iloc[take]
-    if layout.times is None:
-        index: pd.Index = pd.RangeIndex(len(cells))
-    else:
-        index = layout.times.stamps[take].rename(layout.clock.columns[0])
-    series = pd.Series(cells.array, index=index, name=name, copy=False)
-    findings = list(findings)
-    bad = np.empty(0, np.int64) if layout.times is None else np.flatnonzero(layout.times.bad)
-    if len(bad):
-        where = tuple(places.of(row) for row in bad[:3])
-        findings.append(Finding("bad times", len(bad), f"times that cannot be read, taken as missing: {len(bad):,}", where))
+    places, times, findings = table.places, layout.times, list(findings)
+    frame = table.frame if rows is None else table.frame[[column, *layout.labels]].iloc[rows]
+    index: pd.Index = pd.RangeIndex(len(frame))
+    attrs: dict = {"places": places if rows is None else Places(places, rows)}
+    if table.decimal is not None:
+        attrs["decimal"] = table.decimal
+    if times is not None:
+        index = (times.stamps if rows is None else times.stamps[rows]).rename(layout.clock.columns[0])
+        columns = " and ".join(map(repr, layout.clock.columns))
+        attrs["clock"] = {"column": columns, "form": times.form, "zone": times.zone, "counts": times.counts}
+        if len(bad := np.flatnonzero(times.bad)):
+            where = tuple(places.of(row) for row in bad[:3])
+            findings.append(Finding("bad times", len(bad), f"times that cannot be read, taken as missing: {len(bad):,}", where))
+    series = pd.Series(frame[column].array, index=index, name=name, copy=False)
     for label in (label for label in layout.labels if _concerns(label, column, layout)):
-        mask = anomalous(frame[label].iloc[take])
+        mask = anomalous(frame[label])
         if mask is None:
             said = ", ".join(map(str, frame[label].dropna().unique()[:4]))
-            findings.append(
-                Finding("labels", 1, f"labels of {label!r}, not used, because its values do not say which is anomalous: {said}")
-            )
+            text = f"labels of {label!r}, not used, because its values do not say which is anomalous: {said}"
+            findings.append(Finding("labels", 1, text))
             continue
         how = "kept" if options.labelled == "keep" else "taken as missing"
-        findings.append(
-            Finding("labels", max(1, int(mask.sum())), f"rows that {label!r} labels anomalous, {how}: {mask.sum():,} of {len(mask):,}")
-        )
+        text = f"rows that {label!r} labels anomalous, {how}: {mask.sum():,} of {len(mask):,}"
+        findings.append(Finding("labels", max(1, int(mask.sum())), text))
         if options.labelled == "missing":
             series = series.mask(mask) if not is_text(series) else series.astype(object).mask(mask)
-    series.attrs = {"findings": [finding.to_dict() for finding in findings], "places": places if rows is None else Places(places, rows)}
-    if table.decimal is not None:
-        series.attrs["decimal"] = table.decimal
-    if layout.times is not None:
-        times, columns = layout.times, " and ".join(map(repr, layout.clock.columns))
-        series.attrs["clock"] = {"column": columns, "form": times.form, "zone": times.zone, "counts": times.counts}
+    series.attrs = attrs | {"findings": [finding.to_dict() for finding in findings]}
     return series
 
 
@@ -188,11 +159,7 @@ def _keys_of(frame: pd.DataFrame, layout: Layout, options: Cleaning, what: str) 
     """Returns the columns whose values tell several series apart; none if the table holds one."""
     if options.series_column is not None:
         return [] if options.series_column == (NO_TIME,) else list(options.series_column)
-    own = [
-        name
-        for name in ("copy", "table")
-        if name in frame.columns and (name in layout.channels or name in layout.left_out.get("row numbers", ()))
-    ]
+    own = [name for name in ("copy", "table") if name in (*layout.channels, *layout.left_out.get("row numbers", ()))]
     candidates = [name for name in (*layout.words, *own) if 1 < frame[name].nunique(dropna=False) <= _MAX_SERIES]
     candidates.sort(key=lambda name: next((rank for rank, word in enumerate(_FIRST) if word == name.casefold()), len(_FIRST)))
     candidates.sort(key=lambda name: name in own)
@@ -238,7 +205,7 @@ def _is_key(frame: pd.DataFrame, name: str, chosen: Sequence[str], times: np.nda
 
 
 def _is_named(name: str) -> bool:
-    words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    words = [word.casefold() for word in words_of(name)]
     return bool(words) and (words[-1] in _KEYS or "".join(words) in _KEYS) and words[0] in _KEYS
 
 
@@ -269,12 +236,11 @@ def _refuse_numbered(frame: pd.DataFrame, layout: Layout, times: np.ndarray, wha
         return
     for name, cells in frame.items():
         is_number = pd.api.types.is_integer_dtype(cells.dtype) and name not in layout.clock.columns and layout.channels != (name,)
-        if is_number and 1 < cells.nunique() <= _MAX_SERIES:
-            if _repeating(times, _codes(frame, [name])) < 0.02:
-                raise InputError(
-                    f"Expected one row for each time. Received: times that repeat, with different values of {name!r}, in {what}. Give "
-                    f"series_column (--series-column {name}) if it tells several series apart."
-                )
+        if is_number and 1 < cells.nunique() <= _MAX_SERIES and _repeating(times, _codes(frame, [name])) < 0.02:
+            raise InputError(
+                f"Expected one row for each time. Received: times that repeat, with different values of {name!r}, in {what}. Give "
+                f"series_column (--series-column {name}) if it tells several series apart."
+            )
 
 
 def _name_series(frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[str], what: str) -> dict[str, tuple[str, np.ndarray]]:
@@ -286,12 +252,10 @@ def _name_series(frame: pd.DataFrame, keys: Sequence[str], channels: Sequence[st
         )
     filled = np.flatnonzero(frame.notna().any(axis=1))  # a blank line, as databases write at the end, is of no series
     order = filled[np.argsort(codes[filled], kind="stable")]
-    rows = np.split(order, np.flatnonzero(np.diff(codes[order])) + 1)
     found = {}
-    for inside in rows:
-        words = [
-            f"{key} {frame[key].iloc[inside[0]]}" if key in ("copy", "table") else str(frame[key].iloc[inside[0]]).strip() for key in keys
-        ]
+    for inside in np.split(order, np.flatnonzero(np.diff(codes[order])) + 1):
+        first = {key: str(frame[key].iloc[inside[0]]) for key in keys}
+        words = [f"{key} {word}" if key in ("copy", "table") else word.strip() for key, word in first.items()]
         for channel in channels:
             name = ".".join([*words, channel] if len(channels) > 1 else words)
             if name in found:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.cleaning.times import UNITS_NS, Times, are_days, refuse_days
+from enhsim_tf.telemetry.cleaning.times import UNITS_NS, Times, epoch_unit, refuse_days
 
 NO_TIME = "none"  # instead of the name of a time column: the table has no times, and samples are counted
 _TIMES = set(
@@ -54,19 +54,22 @@ class Clock:
     Args:
         columns: Columns that make it up; none if samples are counted.
         cells: Their content, one cell per row, to be parsed as times.
-        form: The unit or kind that the name tells, as for `Cleaning.time_format`, or None.
     """
 
     columns: tuple[str, ...] = ()
     cells: pd.Series | None = None
-    form: str | None = None
+
+
+def words_of(name: str) -> list[str]:
+    """Splits the name of a column into words of letters; capitals in the middle begin a word."""
+    return re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name))
 
 
 def _name_tells(name: str) -> tuple[int, str | None]:
     """Returns how clearly a name speaks of a clock (2 clearly, 1 as `t` does, 0 not), and the unit or kind of days that it states."""
     if name.casefold().strip() == "x_value":  # of LabVIEW
         return 2, None
-    words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name))
+    words = words_of(name)
     lower = [word.casefold() for word in words]
     unit = next((_UNIT_OF[word] for word in reversed(lower) if word in _UNIT_OF), None)
     unit = next((word for word in lower if word in _DAY_WORDS), unit)
@@ -95,31 +98,23 @@ def _is_regular(values: np.ndarray) -> bool:
 
 
 def _is_epoch(values: np.ndarray) -> bool:
-    """Whether numbers are times since 1970 in s, ms, us or ns, from the years 1979 to 2103."""
+    """Whether numbers are times since 1970 in s, ms, us or ns."""
     some = values[:: max(1, len(values) // 1_000)]
-    size = float(np.median(np.abs(some[np.isfinite(some)]))) if np.isfinite(some).any() else 0.0
-    return any(3.1e8 * 1e9 <= size * factor <= 4.2e9 * 1e9 for factor in (10**9, 10**6, 10**3, 1)) and size > 3e8
+    return np.isfinite(some).any() and epoch_unit(float(np.median(np.abs(some[np.isfinite(some)])))) is not None
 
 
 def find_clock(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapping[str, np.ndarray], what: str) -> Clock:
-    """Finds the clock of a table.
+    """Finds the clock of a table; refuses one in which several columns may be it, or one of which only the values speak for it.
 
     Args:
         frame: The table.
         kinds: Kind of each column, such as "numbers", "dates", "words".
         numbers: Values of the columns of numbers that are not asked for as channels.
         what: Description of the source, for messages.
-
-    Returns:
-        The clock.
-
-    Raises:
-        InputError: If several columns may be the clock, or one of which only the values speak for it.
     """
     tells = {name: _name_tells(name)[0] for name in kinds}
-    dates = _varying([name for name, kind in kinds.items() if kind == "dates"], frame)
-    hours = [name for name, kind in kinds.items() if kind == "times of day"]
-    spans = [name for name, kind in kinds.items() if kind == "spans"]
+    of_kind = {kind: [name for name in kinds if kinds[name] == kind] for kind in ("dates", "times of day", "spans")}
+    dates, hours, spans = _varying(of_kind["dates"], frame), of_kind["times of day"], of_kind["spans"]
     named = [name for name in numbers if tells[name] == 2]
     compact = [name for name in named if _are_compact_dates(numbers[name])]
     if (joined := _joined(frame, hours, dates or compact, numbers)) is not None:
@@ -178,59 +173,35 @@ def _refuse_unknown(frame: pd.DataFrame, kinds: Mapping[str, str], numbers: Mapp
             f"or a counter does. Give --time {_quoted(ramp)} (with --time-format ms or another unit if it does not count seconds), or --time none."
         )
     for name in (name for name, kind in kinds.items() if kind == "words"):
-        cells = frame[name].dropna().astype("str")
-        if (
-            len(cells) >= _FEWEST
-            and cells.iloc[:1_000].nunique() == len(cells.iloc[:1_000])
-            and cells.iloc[:_FEWEST].str.contains(r"\d").all()
-        ):
+        cells = frame[name].dropna().astype("str").iloc[:1_000]
+        if len(cells) >= _FEWEST and cells.is_unique and cells.iloc[:_FEWEST].str.contains(r"\d").all():
             raise InputError(
                 f"Expected to know the clock. Received: {cells.iloc[0][:40]!r} in {name!r} of {what}, which may be a time of an unknown form. Give "
                 f"--time {_quoted(name)} with --time-format, or --time none."
             )
 
 
-def named_clock(clock: Clock, what: str, stated: str | None, units: Mapping[str, str]) -> Clock:
-    """Returns a clock of one column of numbers with its unit: the stated one, that of its name, or that of a line of units.
+def unit_of(clock: Clock, units: Mapping[str, str], what: str) -> str | None:
+    """Returns the unit or kind of days that the name of a clock's one column or the line of units states, or None.
 
-    Args:
-        clock: The clock.
-        what: Description of the source, for messages.
-        stated: `Cleaning.time_format`.
-        units: Units of the columns.
-
-    Raises:
-        InputError: If the column holds days whose kind is not known.
+    Raises an `InputError` if the column holds days whose kind is not known.
     """
-    if len(clock.columns) != 1 or stated is not None:
-        return dataclasses.replace(clock, form=stated)
+    if len(clock.columns) != 1:
+        return None
     name = clock.columns[0]
     form = _name_tells(name)[1] or _UNIT_OF.get(units.get(name, "").strip(" []()").casefold())
     if form is None and pd.api.types.is_numeric_dtype(clock.cells.dtype) and re.search(r"dat(?:e|um)", name.casefold()):
         values = clock.cells.to_numpy(np.float64, na_value=np.nan)
-        values = values[np.isfinite(values)]
-        if are_days(values, even_whole=True):
-            refuse_days(values, f"{name!r} of {what}")
-    return dataclasses.replace(clock, form=form)
+        refuse_days(values[np.isfinite(values)], f"{name!r} of {what}", even_whole=True)
+    return form
 
 
 def further_clocks(clock: Clock, times: Times | None, numbers: Mapping[str, np.ndarray], kinds: Mapping[str, str]) -> set[str]:
-    """Returns the columns that show the time once more, or show it although samples are counted.
-
-    Args:
-        clock: The clock.
-        times: Its times.
-        numbers: Values of the columns of numbers.
-        kinds: Kind of each column.
-    """
+    """Returns the columns that show the time once more, or show it although samples are counted."""
     found = {name for name in numbers if _name_tells(name)[0] == 2} | {name for name, kind in kinds.items() if kind == "dates"}
     if times is None:
-        parts = _date_parts(pd.DataFrame(numbers), numbers)
-        return (
-            found
-            | {name for name, values in numbers.items() if _may_be_clock(_name_tells(name)[0], values)}
-            | {*(parts.columns if parts else ())}
-        )
+        parts = _date_parts(pd.DataFrame(numbers), numbers) or Clock()
+        return found.union(parts.columns, (name for name, values in numbers.items() if _may_be_clock(_name_tells(name)[0], values)))
     own = np.where(times.stamps.isna(), np.nan, times.stamps.tz_localize(None).as_unit("ns").asi8.astype(np.float64))
     for name, values in numbers.items():
         words = re.findall(r"[^\W\d_]+", name.casefold())

@@ -11,8 +11,8 @@ import pandas as pd
 from enhsim_tf.telemetry.cleaning.numbers import has_commas, is_missing, is_text, parse_numbers
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.times import DURATION, LOOK, Times, date_forms, parse_times
-from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, named_clock
-from enhsim_tf.telemetry.reading.table import Table
+from enhsim_tf.telemetry.reading.clock import NO_TIME, Clock, find_clock, further_clocks, unit_of, words_of
+from enhsim_tf.telemetry.reading.text_files import Table
 
 _LABELS = set("anomaly anomalies anomalous isanomaly label labels outlier outliers attack fault faulty changepoint groundtruth".split())
 _FLAGS = set("quality qc qa flag flags valid validity mask".split())
@@ -25,6 +25,7 @@ _OWN = {  # what the commands write beside the values: the columns that give it 
     "copies of a run": (("copy", "value", "out_of_range"), ("scenario", "severity", "onset", "end", "mask", "out_of_range"), None),
 }
 _MAX_STATES = 10  # a label or flag has at most this many different values
+_OBJECTS = {"dates": datetime.date | np.datetime64, "times of day": datetime.time, "spans": datetime.timedelta}
 _TIME_OF_DAY = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
 
 
@@ -50,20 +51,14 @@ class Layout:
 
 
 def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, options: Cleaning, what: str) -> Layout:
-    """Says what each column of a table is.
+    """Says what each column of a table is; raises an `InputError` if the clock cannot be told.
 
     Args:
         table: The table; no name repeats.
         columns: Columns that were asked for as channels, or None.
         time: Name of the time column, `NO_TIME`, or None.
-        options: `label_column`, `series_column` and `value_column` are used.
+        options: How columns and times are read.
         what: Description of the source, for messages.
-
-    Returns:
-        The layout.
-
-    Raises:
-        InputError: If the clock cannot be told.
     """
     frame, asked = table.frame, {*(columns or ()), *(options.value_column or ())}
     kinds = {name: _kind_of(frame[name]) for name in frame.columns}
@@ -86,8 +81,11 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
         clock = find_clock(frame, free, {name: values for name, values in numbers.items() if name not in roles}, what)
     else:
         clock = Clock() if time == NO_TIME else Clock((time,), frame[time])
-    clock = named_clock(clock, what, options.time_format, table.units)
-    times = _times_of(clock, table, options, what)
+    times = None
+    if clock.columns:
+        form = options.time_format or unit_of(clock, table.units, what)
+        of_what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
+        times = parse_times(clock.cells, of_what, options.on_bad_times == "drop", form, table.places)
     take("clock", clock.columns)
     take("further clocks", further_clocks(clock, times, numbers, kinds))
     counted = [name for name in numbers if name not in roles and clock.columns and _counts(numbers[name])]
@@ -97,7 +95,10 @@ def lay_out(table: Table, columns: Sequence[str] | None, time: str | None, optio
     words = tuple(name for name, kind in kinds.items() if kind == "words" and not roles.get(name))
     if columns is None:
         take("columns left out", [name for name in kinds if name not in channels])
-    left_out = {role: [name for name in kinds if roles.get(name) == role] for role in set(roles.values()) - {"", "clock", "series"}}
+    left_out: dict[str, list[str]] = {}
+    for name in kinds:
+        if roles.get(name, "") not in ("", "clock", "series"):
+            left_out.setdefault(roles[name], []).append(name)
     return Layout(clock, times, tuple(channels), tuple(left_out.get("labels", ())), words, left_out)
 
 
@@ -118,19 +119,15 @@ def _kind_of(cells: pd.Series) -> str:
     if not is_text(cells):
         is_number = pd.api.types.is_numeric_dtype(kind) and kind.kind != "c"
         return "objects" if not is_number else "numbers" if cells.notna().any() else "empty"
-    given = cells.iloc[: 10 * LOOK]
-    given = given[~is_missing(given)].iloc[:LOOK]
-    if not len(given):
-        given = cells[~is_missing(cells)].iloc[:LOOK]
-    if not len(given):
+    for some in (cells.iloc[: 10 * LOOK], cells):
+        given = some[~is_missing(some)].iloc[:LOOK]
+        if len(given):
+            break
+    else:
         return "empty"
-    first = given.iloc[0]
-    if isinstance(first, datetime.date | np.datetime64):
-        return "dates"
-    if isinstance(first, datetime.time):
-        return "times of day"
-    if isinstance(first, datetime.timedelta):
-        return "spans"
+    for kind, classes in _OBJECTS.items():
+        if isinstance(given.iloc[0], classes):
+            return kind
     if not parse_numbers(given, "", drop=True)[1].all():
         return "numbers"
     text = given[given.map(lambda cell: isinstance(cell, str)).to_numpy(bool)].astype("str").str.strip()
@@ -138,10 +135,9 @@ def _kind_of(cells: pd.Series) -> str:
         return "objects"
     if has_commas(text):  # which are refused where they can be read in two ways
         return "numbers"
-    if text.str.fullmatch(DURATION).mean() > 0.5:
-        return "spans"
-    if text.str.fullmatch(_TIME_OF_DAY).mean() > 0.5:
-        return "times of day"
+    for kind, pattern in (("spans", DURATION), ("times of day", _TIME_OF_DAY)):
+        if text.str.fullmatch(pattern).mean() > 0.5:
+            return kind
     return "dates" if date_forms(text) else "words"
 
 
@@ -152,7 +148,7 @@ def _values(cells: pd.Series, decimal: str | None) -> np.ndarray:
 
 
 def _words_of(name: str) -> set[str]:
-    split = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    split = [word.casefold() for word in words_of(name)]
     return {*split, *("".join(pair) for pair in zip(split, split[1:], strict=False))}
 
 
@@ -186,25 +182,15 @@ def _numbers_rows(name: str, values: np.ndarray) -> bool:
     is_unnamed = bool(re.fullmatch(r"column 0|Unnamed: \d+|level_0", name))
     if not (is_unnamed or _words_of(name) <= _ROWS and _words_of(name)) or not np.isfinite(values).all() or (values % 1).any():
         return False
-    steps = np.diff(values)
-    return (
-        bool(np.mean(steps == 1) >= 0.9)
-        if len(steps) and not is_unnamed
-        else len(np.unique(values)) == len(values) or bool(np.mean(steps == 1) > 0.9)
-    )
+    share = np.mean(np.diff(values) == 1) if len(values) > 1 else 0.0
+    if is_unnamed or len(values) < 2:
+        return len(np.unique(values)) == len(values) or bool(share > 0.9)
+    return bool(share >= 0.9)
 
 
 def _counts(values: np.ndarray) -> bool:
     """Whether values beside a clock count the rows from 0 or 1."""
     return len(values) > 2 and values[0] in (0, 1) and bool((np.diff(values) == 1).all())
-
-
-def _times_of(clock: Clock, table: Table, options: Cleaning, what: str) -> Times | None:
-    """Parses the times of a clock."""
-    if not clock.columns:
-        return None
-    what = f"the times {' and '.join(map(repr, clock.columns))} of {what}"
-    return parse_times(clock.cells, what, options.on_bad_times == "drop", clock.form, table.places)
 
 
 def _fits(cells: pd.Series, form: str) -> bool:
@@ -219,29 +205,20 @@ def _fits(cells: pd.Series, form: str) -> bool:
 
 
 def anomalous(cells: pd.Series) -> np.ndarray | None:
-    """Says which rows a column labels as anomalous.
+    """Says which rows a column labels as anomalous: a mask, or None if its values do not show it.
 
-    Args:
-        cells: The column: true and false, 0 and others, -1 and 1 (where -1 is anomalous), or words such as "normal" and "attack".
-
-    Returns:
-        Mask of the rows, or None if its values do not show it.
+    It holds true and false, 0 and others, -1 and 1 (where -1 is anomalous), or words such as "normal" and "attack".
     """
-    missing = is_missing(cells.astype(object))
     if pd.api.types.is_bool_dtype(cells.dtype):
         return cells.to_numpy(bool)
-    values, bad, _ = parse_numbers(
-        cells.astype(object).map(lambda cell: int(cell) if isinstance(cell, bool | np.bool_) else cell), "", drop=True
-    )
+    objects = cells.astype(object)
+    values, bad, _ = parse_numbers(objects.map(lambda cell: int(cell) if isinstance(cell, bool | np.bool_) else cell), "", drop=True)
     if not bad.any():
-        states = set(np.unique(values[np.isfinite(values)]).tolist())
+        states = set(values[np.isfinite(values)].tolist())
         if states == {-1.0, 1.0}:
             return values == -1
-        return (
-            np.isfinite(values) & (values != 0) if 0 in states or states == {1.0} else np.zeros(len(values), bool) if not states else None
-        )
-    words = cells.astype("str").str.strip().str.casefold()
-    normal = (words.isin(_NORMAL) | missing).to_numpy(bool)
+        return np.isfinite(values) & (values != 0) if 0 in states or states <= {1.0} else None
+    missing, words = is_missing(objects), cells.astype("str").str.strip().str.casefold()
     if not words[~missing].isin(_NORMAL).any() and not words[~missing].isin(_ANOMALOUS).all():
         return None
-    return ~normal
+    return ~(words.isin(_NORMAL) | missing).to_numpy(bool)

@@ -24,7 +24,7 @@ class Dialect:
 
     Args:
         separator: What separates columns.
-        names: Names of the columns; "" for a column without one.
+        names: Names of the columns; one without a name is called by its number.
         first_line: Line at which the data begin, counted from 0.
         skipped: Lines before the data that are neither names nor blank.
         units: Cells of the line between the names and the data, where units stand, or none.
@@ -40,16 +40,10 @@ class Dialect:
 
 
 def decode(content: bytes) -> tuple[str, str, list[Finding]]:
-    """Decodes the content of a text file.
-
-    Args:
-        content: The bytes.
+    """Decodes the content of a text file; raises a `ValueError` if it is not text.
 
     Returns:
         The text (its first part if all of it is ASCII with lines), the encoding, and findings for the cleaning log.
-
-    Raises:
-        ValueError: If it is not text.
     """
     findings = []
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -61,10 +55,7 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
             findings.append(Finding("padding", len(content) - len(whole), text))
         try:
             is_simple = b"\x00" not in content and content.isascii() and b"\n" in content
-            text, encoding = (
-                whole[:_HEAD].decode() if is_simple else whole.decode("utf-8-sig"),
-                "utf-8",
-            )  # with or without a byte order mark
+            text, encoding = whole[: _HEAD if is_simple else None].decode("utf-8-sig"), "utf-8"  # with or without a byte order mark
         except UnicodeDecodeError:
             if b"\x00" in whole:
                 raise ValueError("it is not text") from None
@@ -80,16 +71,7 @@ def decode(content: bytes) -> tuple[str, str, list[Finding]]:
 
 
 def find_dialect(text: str, name: str, no_header: bool, separator: str | None = None) -> Dialect:
-    """Finds the separator, the names and the beginning of the data.
-
-    Args:
-        text: The text, or its first part.
-        name: Name of the file, for messages.
-        no_header: Whether there is no line of names.
-        separator: The separator, if it is known.
-
-    Returns:
-        The dialect.
+    """Finds the separator, if it is not known, the names and the beginning of the data, from the first part of a text.
 
     Raises:
         InputError: If there is no line of names above the data, and `no_header` is False.
@@ -100,15 +82,13 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
         lines[0], separator = "", stated[1]
     if not any(map(_is_content, lines)):
         raise ValueError("it is empty")
-    found = []
-    for mark in separator or _SEPARATORS:
-        layout = _lay_out(mark, _split(lines, mark), no_header)
-        if layout is not None and len(layout.names) > 1:
-            found.append(layout)
-    if not found:
-        blanks = _lay_out(BLANKS, [line.split() if _is_content(line) else [] for line in lines], no_header)
+    layouts = [_lay_out(mark, _split(lines, mark), no_header) for mark in separator or _SEPARATORS]
+    if not any(each and len(each.names) > 1 for each in layouts):
+        layouts = [_lay_out(BLANKS, [line.split() if _is_content(line) else [] for line in lines], no_header)]
+    found = [each for each in layouts if each and len(each.names) > 1]
+    if not found or found[0].separator == BLANKS:
         single = _lay_out(",", [[line.strip()] if _is_content(line) else [] for line in lines], no_header)
-        found = [each for each in (blanks, single) if each is not None and (each is single or len(each.names) > 1)]
+        found += [single] if single else []
     with_header = [each for each in found if any(each.names)]
     best = max(with_header or found, key=lambda each: len(each.names) if with_header else 0, default=None)
     if best is None or len(best.names) > MAX_COLUMNS:
@@ -120,7 +100,7 @@ def find_dialect(text: str, name: str, no_header: bool, separator: str | None = 
                 f"Expected a header line with the columns' names. Received: {', '.join(found[0].head[0][:4]) if found[0].head else 'none'} "
                 f"in {name}. Add a line of names on top, or give no_header=True (--no-header)."
             )
-    return best
+    return dataclasses.replace(best, names=[each or f"column {number}" for number, each in enumerate(best.names)])
 
 
 def _is_content(line: str) -> bool:
@@ -191,11 +171,9 @@ def _named_by_comment(found: Dialect, lines: Sequence[str]) -> Dialect | None:
     comments = [line.lstrip("#%").strip() for line in lines[: found.first_line] if line.startswith(("#", "%"))]
     if not comments:
         return None
-    mark = (
-        (r"\s{2,}|\t" if len(comments[-1].split()) != len(found.names) else BLANKS)
-        if found.separator == BLANKS
-        else re.escape(found.separator)
-    )
+    mark = re.escape(found.separator)
+    if found.separator == BLANKS:
+        mark = BLANKS if len(comments[-1].split()) == len(found.names) else r"\s{2,}|\t"
     names = [name.strip() for name in re.split(mark, comments[-1])]
     if len(names) != len(found.names) or not all(names[1:]) or all(_SOLID.match(name) for name in names):
         return None

@@ -16,8 +16,7 @@ from enhsim_tf.common.size_limits import MAX_COLUMNS, READ_ERRORS, check_parquet
 from enhsim_tf.telemetry.cleaning.options import Cleaning
 from enhsim_tf.telemetry.cleaning.report import Finding, Places
 from enhsim_tf.telemetry.reading.dialect import find_dialect
-from enhsim_tf.telemetry.reading.table import Table
-from enhsim_tf.telemetry.reading.text_files import read_text
+from enhsim_tf.telemetry.reading.text_files import Table, read_text, table_of
 from enhsim_tf.telemetry.registry import PACKED
 
 TEXTS = (".csv", ".tsv", ".txt")
@@ -26,18 +25,7 @@ _SMALL_BYTES, _MAX_RATIO = 2**28, 200  # an unpacked file may have this size, or
 
 
 def read_table(source: Path | Sequence[Path] | pd.DataFrame | pd.Series, options: Cleaning) -> Table:
-    """Reads a table.
-
-    Args:
-        source: A file, a folder of files, several files with the same columns, or a pandas object.
-        options: `decimal` and `no_header` are used.
-
-    Returns:
-        The table; the rows of several files follow each other.
-
-    Raises:
-        InputError: If a file cannot be read, or the files have different columns.
-    """
+    """Reads a file, a folder of files, several files with the same columns, or a pandas object; the rows of files follow each other."""
     if isinstance(source, pd.DataFrame | pd.Series):
         table = Table(source.to_frame() if isinstance(source, pd.Series) else source)
         return _with_plain_columns(table, "the DataFrame")
@@ -47,11 +35,7 @@ def read_table(source: Path | Sequence[Path] | pd.DataFrame | pd.Series, options
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Returns the tables in a folder, in the order of their names: CSV files, or those of the next kind if there are none.
-
-    Args:
-        folder: The folder.
-    """
+    """Returns the tables in a folder, in the order of their names: CSV files, or those of the next kind if there are none."""
     for endings in ((".csv",), (".parquet",), (".tsv", ".txt"), _EXCEL):
         found = [path for path in folder.iterdir() if path.is_file() and _suffix_of(path) in endings and not path.name.startswith(".")]
         if found:
@@ -70,20 +54,17 @@ def _read_file(path: Path, options: Cleaning) -> Table:
         content, name = _unpack(path)
         suffix = Path(name).suffix.lower()
         if suffix == ".parquet":
-            if content is None:
-                check_parquet(path)
-            else:
+            if content is not None:
                 raise ValueError("a packed Parquet file; unpack it")
+            check_parquet(path)
             return Table(pd.read_parquet(path))
-        if suffix in _EXCEL:
-            return _read_excel(io.BytesIO(path.read_bytes() if content is None else content), path.name, options)
-        return read_text(path.read_bytes() if content is None else content, path.name, options)
+        content = path.read_bytes() if content is None else content
+        return _read_excel(io.BytesIO(content), path.name, options) if suffix in _EXCEL else read_text(content, path.name, options)
     except InputError:
         raise
     except (*READ_ERRORS, pa.ArrowException) as error:
-        reason = short_reason(error)
         raise InputError(
-            f"Expected a table. Received: {path.name}, which cannot be read ({reason}). Correct it or save it again."
+            f"Expected a table. Received: {path.name}, which cannot be read ({short_reason(error)}). Correct it or save it again."
         ) from None
 
 
@@ -130,16 +111,14 @@ def _read_excel(stream: io.BytesIO, name: str, options: Cleaning) -> Table:
             findings.append(Finding("files", 1, f"only the first sheet was read: {book.worksheets[0].title}"))
     except openpyxl.utils.exceptions.InvalidFileException as error:
         raise ValueError(short_reason(error)) from None
-    width = max((len(row) for row in rows), default=0)
-    width = max((place + 1 for place in range(width) if any(place < len(row) and row[place] is not None for row in rows)), default=0)
+    width = max((place + 1 for row in rows for place, cell in enumerate(row) if cell is not None), default=0)
     cells = [["" if cell is None else str(cell).replace("\n", " ") for cell in row[:width]] for row in rows[:100]]
     if not any(any(row) for row in cells):
         raise ValueError("it is empty")
     text = "\n".join("\t".join(cell.replace("\t", " ").replace('"', "'") for cell in row) if any(row) else "" for row in cells)
     dialect = find_dialect(text, name, options.no_header, "\t")
-    names = [f"column {number}" if cell == "" else cell for number, cell in enumerate(dialect.names)]
-    frame = pd.DataFrame([row[:width] for row in rows[dialect.first_line :]], columns=names).infer_objects()
-    return Table(frame, Places([(0, dialect.first_line + 1, name)]), None, tuple(findings), dict(zip(names, dialect.units, strict=False)))
+    frame = pd.DataFrame([row[:width] for row in rows[dialect.first_line :]]).infer_objects()
+    return table_of(frame, dialect, name, None, findings)
 
 
 def _with_plain_columns(table: Table, name: str) -> Table:

@@ -1,9 +1,10 @@
 """Reads text files as tables: one decision on the decimal sign from all columns, and messages with the lines of the file."""
 
+import dataclasses
 import io
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -11,24 +12,41 @@ import pandas as pd
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.numbers import allows_point_thousands, has_commas, is_text, shows_comma
 from enhsim_tf.telemetry.cleaning.options import Cleaning
-from enhsim_tf.telemetry.cleaning.report import Finding, Places
+from enhsim_tf.telemetry.cleaning.report import ROWS, Finding, Places
 from enhsim_tf.telemetry.reading.dialect import BLANKS, Dialect, decode, find_dialect
-from enhsim_tf.telemetry.reading.table import Table
 
 _LOOK = 2_000  # cells of a column that are searched for a decimal comma
 _ANNOTATION = re.compile(r"^#(?:group|datatype|default)\b", re.MULTILINE)
 
 
-def read_text(content: bytes, name: str, options: Cleaning) -> Table:
-    """Reads a text file.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Table:
+    """A table.
 
     Args:
-        content: Content of the file.
-        name: Name of the file, for messages.
-        options: `decimal` and `no_header` are used.
+        frame: The cells; columns have names of text, which may repeat.
+        places: Where the rows are in their files.
+        decimal: Decimal sign of numbers in text; None: each column shows its own.
+        findings: Findings for the cleaning log.
+        units: Cells of a line of units by the names of the columns.
+    """
 
-    Returns:
-        The table. Every line behind the header is a row; blank lines are rows of missing values.
+    frame: pd.DataFrame
+    places: Places = ROWS
+    decimal: str | None = None
+    findings: tuple[Finding, ...] = ()
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+def table_of(frame: pd.DataFrame, dialect: Dialect, name: str, decimal: str | None, findings: Sequence[Finding]) -> Table:
+    """Makes a table of the cells below the header of a file."""
+    frame.columns = dialect.names
+    units = dict(zip(dialect.names, dialect.units, strict=False))
+    return Table(frame, Places([(0, dialect.first_line + 1, name)]), decimal, tuple(findings), units)
+
+
+def read_text(content: bytes, name: str, options: Cleaning) -> Table:
+    """Reads the content of a text file. Every line behind the header is a row; blank lines are rows of missing values.
 
     Raises:
         InputError: If it has no header, or its decimal sign cannot be told.
@@ -41,17 +59,16 @@ def read_text(content: bytes, name: str, options: Cleaning) -> Table:
     if dialect.skipped:
         findings.append(Finding("header lines", dialect.skipped, f"lines before the data that were skipped: {dialect.skipped:,}"))
     stream = _stream_of(content, text, encoding, dialect.first_line)
-    names = _unnamed(dialect.names)
-    frame, decimal = _read_rows(stream, dialect, names, name, options.decimal)
+    frame, decimal = _read_rows(stream, dialect, name, options.decimal)
     if decimal == ",":
         findings.append(Finding("decimal comma", 1, "the decimal sign of the file is a comma; points separate thousands"))
-    frame, repeated = _without_repeated_headers(frame, names)
+    repeated = _repeated_headers(frame, dialect.names)
     if repeated:
+        frame = frame.astype(object)
+        frame.iloc[repeated] = None
         lines = ", ".join(str(row + dialect.first_line + 1) for row in repeated[:3])
         findings.append(Finding("header lines", len(repeated), f"lines that repeat the header, left out: {len(repeated):,} (line {lines})"))
-    return Table(
-        frame, Places([(0, dialect.first_line + 1, name)]), decimal, tuple(findings), dict(zip(names, dialect.units, strict=False))
-    )
+    return table_of(frame, dialect, name, decimal, findings)
 
 
 def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.BytesIO | io.StringIO:
@@ -66,14 +83,9 @@ def _stream_of(content: bytes, text: str, encoding: str, first_line: int) -> io.
     return stream
 
 
-def _unnamed(names: Sequence[str]) -> list[str]:
-    return [f"column {number}" if name == "" else name for number, name in enumerate(names)]
-
-
-def _read_rows(
-    stream: io.BytesIO | io.StringIO, dialect: Dialect, names: list[str], name: str, decimal: str | None
-) -> tuple[pd.DataFrame, str | None]:
+def _read_rows(stream: io.BytesIO | io.StringIO, dialect: Dialect, name: str, decimal: str | None) -> tuple[pd.DataFrame, str | None]:
     """Reads the data with the decimal sign that all columns allow; None if they do not show it."""
+    names = dialect.names
     head = pd.DataFrame([(row + [""] * len(names))[: len(names)] for row in dialect.head])
     sign = decimal or ("," if any(_shows_comma(head[column]) for column in head) else None)
     if sign is None and dialect.separator == ";":
@@ -83,7 +95,6 @@ def _read_rows(
         sign, frame = ",", _parse(stream, dialect, name, ",")
     if sign == "," and decimal is None:
         _check_points(frame, names, name)
-    frame.columns = names
     return frame, sign
 
 
@@ -121,46 +132,33 @@ def _check_points(frame: pd.DataFrame, names: Sequence[str], name: str) -> None:
 
 def _parse(stream: io.BytesIO | io.StringIO, dialect: Dialect, name: str, decimal: str | None) -> pd.DataFrame:
     width, begin = len(dialect.names), stream.tell()
-    options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False}
+    options = {"sep": dialect.separator, "header": None, "names": range(width), "index_col": False, "low_memory": False}
     options |= {"skip_blank_lines": dialect.separator == BLANKS, "decimal": decimal or ".", "skipinitialspace": dialect.separator != "\t"}
     with warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)  # otherwise lines longer than the header are cut
-        warnings.simplefilter("error", pd.errors.DtypeWarning)
         try:
-            try:
-                return pd.read_csv(stream, **options)
-            except pd.errors.DtypeWarning:  # numbers and text in one column: read as a whole, which is slower, all become text
-                stream.seek(begin)
-                return pd.read_csv(stream, low_memory=False, **options)
+            return pd.read_csv(stream, **options)
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=range(width), dtype=object)
         except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
             found = re.search(r"in line (\d+), saw (\d+)", str(error))
-            if found is None and isinstance(error, pd.errors.ParserWarning):
-                found = (None, 1, "more")
-            if found is None:
-                reason = (
-                    "a quote that does not end" if "EOF" in str(error) or "quot" in str(error) else "lines that do not match the header"
-                )
-                raise ValueError(reason) from None
-            line = int(found[1]) + dialect.first_line
-            raise ValueError(f"line {line} has {found[2]} cells, the header {width}") from None
+            if found or isinstance(error, pd.errors.ParserWarning):
+                line, cells = found.groups() if found else (1, "more")
+                raise ValueError(f"line {int(line) + dialect.first_line} has {cells} cells, the header {width}") from None
+            is_quote = "EOF" in str(error) or "quot" in str(error)
+            raise ValueError("a quote that does not end" if is_quote else "lines that do not match the header") from None
         finally:
             if not stream.closed:
                 stream.seek(begin)  # it may be read again with another decimal sign
 
 
-def _without_repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> tuple[pd.DataFrame, list[int]]:
-    """Empties rows that repeat the names, as in files that were joined, and returns their numbers."""
+def _repeated_headers(frame: pd.DataFrame, names: Sequence[str]) -> list[int]:
+    """Returns the numbers of the rows that repeat the names, as in files that were joined."""
     first = next((place for place, name in enumerate(names) if not name.startswith("column ")), None)
     if first is None or not is_text(frame.iloc[:, first]):
-        return frame, []
+        return []
     rows = np.flatnonzero((frame.iloc[:, first] == names[first]).fillna(False))
-    rows = [row for row in rows if all(str(cell).strip() in (name, "nan") for cell, name in zip(frame.iloc[row], names, strict=True))]
-    if rows:
-        frame = frame.astype(object)
-        frame.iloc[rows] = None
-    return frame, rows
+    return [row for row in rows if all(str(cell).strip() in (name, "nan") for cell, name in zip(frame.iloc[row], names, strict=True))]
 
 
 def _read_annotated(text: str, name: str, findings: list[Finding]) -> Table:
