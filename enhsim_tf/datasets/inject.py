@@ -10,8 +10,8 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import label_samples
 from enhsim_tf.datasets.labelled_windows import parse_length
 from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_place
-from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.detection.injection import Anomaly, check_kind, estimate_noise_sd, inject_anomalies
+from enhsim_tf.detection.anomalies import INJECTIONS, check_kind
+from enhsim_tf.detection.injection import Anomaly, estimate_noise_sd, inject_anomalies
 from enhsim_tf.telemetry.series import Telemetry
 
 if TYPE_CHECKING:

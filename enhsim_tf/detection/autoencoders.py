@@ -3,12 +3,38 @@
 Keras is imported only when a detector is trained.
 """
 
+from typing import Any
+
 import numpy as np
 
 from enhsim_tf.detection.detectors import flat
 
 
-class DenseAutoencoder:
+class _Autoencoder:
+    """Scores windows by the mean squared reconstruction error of a network that `_build` makes."""
+
+    training: dict[str, Any]
+
+    def fit(self, windows: np.ndarray) -> "_Autoencoder":
+        """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
+        from enhsim_tf.common.training import fit_windows
+
+        windows = flat(windows)
+        self._mean, self._scale = np.mean(windows), np.std(windows)
+        self._network, scaled = self._build(windows.shape[1]), self._scaled(windows)
+        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0, **self.training)
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
+        scaled = self._scaled(flat(windows))
+        return np.mean((self._reconstruct(scaled) - scaled) ** 2, axis=1)
+
+    def _scaled(self, windows: np.ndarray) -> np.ndarray:
+        return ((windows - self._mean) / self._scale).astype(np.float32)
+
+
+class DenseAutoencoder(_Autoencoder):
     """Anomaly detector that uses the mean squared reconstruction error of a dense autoencoder.
 
     Args:
@@ -18,31 +44,21 @@ class DenseAutoencoder:
         seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
+    training = {"jit_compile": False}
+
     def __init__(self, num_hidden: int = 128, num_code: int = 16, epochs: int = 30, seed: int = 0):
         self.num_hidden, self.num_code, self.epochs, self.seed = num_hidden, num_code, epochs, seed
 
-    def fit(self, windows: np.ndarray) -> "DenseAutoencoder":
-        """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
-        from enhsim_tf.common.training import dense_stack, fit_windows
+    def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
+        from enhsim_tf.common.training import dense_stack
 
-        windows = flat(windows)
-        self._mean, self._scale = np.mean(windows), np.std(windows)
-        units, samples = (self.num_hidden, self.num_code, self.num_hidden), windows.shape[1]
-        self._network = dense_stack(samples, (*units, samples), seed=self.seed, name="autoencoder")
-        scaled = self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, verbose=0, jit_compile=False)
-        return self
+        return dense_stack(samples, (self.num_hidden, self.num_code, self.num_hidden, samples), seed=self.seed, name="autoencoder")
 
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
-        scaled = self._scaled(flat(windows))
-        return np.mean((np.asarray(self._network(scaled)) - scaled) ** 2, axis=1)
-
-    def _scaled(self, windows: np.ndarray) -> np.ndarray:
-        return ((windows - self._mean) / self._scale).astype(np.float32)
+    def _reconstruct(self, scaled: np.ndarray) -> np.ndarray:
+        return np.asarray(self._network(scaled))
 
 
-class ConvolutionalAutoencoder:
+class ConvolutionalAutoencoder(_Autoencoder):
     """Anomaly detector that uses the mean squared reconstruction error of a convolutional autoencoder.
 
     The encoder has two convolutions of stride 4, which compress every sixteen samples to `num_code` numbers. The decoder has
@@ -56,28 +72,10 @@ class ConvolutionalAutoencoder:
         seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
-    stride = 4
+    stride, training = 4, {"learning_rate": 0.003}
 
     def __init__(self, filters: int = 16, width: int = 9, num_code: int = 4, epochs: int = 15, seed: int = 0):
         self.filters, self.width, self.num_code, self.epochs, self.seed = filters, width, num_code, epochs, seed
-
-    def fit(self, windows: np.ndarray) -> "ConvolutionalAutoencoder":
-        """Trains the autoencoder to reconstruct nominal windows of shape `(windows, samples)`."""
-        from enhsim_tf.common.training import fit_windows
-
-        windows = flat(windows)
-        self._mean, self._scale = np.mean(windows), np.std(windows)
-        self._network = self._build(windows.shape[1])
-        scaled = self._scaled(windows)
-        fit_windows(self._network, scaled, scaled, self.epochs, batch_size=32, seed=self.seed, learning_rate=0.003, verbose=0)
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the mean squared reconstruction error of each window, in units of the variance of the training windows."""
-        from enhsim_tf.common.training import predict_windows
-
-        scaled = self._scaled(flat(windows))
-        return np.mean((predict_windows(self._network, scaled, 1_024) - scaled) ** 2, axis=1)
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.backend import keras
@@ -101,5 +99,7 @@ class ConvolutionalAutoencoder:
             name="convolutional_autoencoder",
         )
 
-    def _scaled(self, windows: np.ndarray) -> np.ndarray:
-        return ((windows - self._mean) / self._scale).astype(np.float32)
+    def _reconstruct(self, scaled: np.ndarray) -> np.ndarray:
+        from enhsim_tf.common.training import predict_windows
+
+        return predict_windows(self._network, scaled, 1_024)

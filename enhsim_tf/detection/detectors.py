@@ -1,14 +1,15 @@
 """Anomaly detectors without neural networks, and trivial detectors as controls (title and abstract of the paper).
 
-All detectors have the interface `Detector`: `fit(windows)` takes nominal windows, and `score(windows)` returns one score for each
-window, where higher is more anomalous. Windows have the shape `(windows, samples)` or `(windows, samples, channels)`; several channels are
-given in units of their standard deviations. `registry` lists all detectors by name.
+All have the interface `Detector`. Windows have the shape `(windows, samples)` or `(windows, samples, channels)`; several channels are given in
+units of their standard deviations. `registry` lists all detectors by name.
 """
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.window_features import window_features
+
+_MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` is fitted
 
 
 def flat(windows: np.ndarray) -> np.ndarray:
@@ -45,10 +46,7 @@ class LimitCheck:
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the largest distance outside the limits, in the unit of the telemetry.
-
-        The score of a window within the limits is negative: its magnitude is the remaining margin.
-        """
+        """Returns the largest distance outside the limits, in the unit of the telemetry; within them, minus the remaining margin."""
         beyond = np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
         return beyond if windows.ndim == 2 else beyond.max(axis=1)
 
@@ -157,8 +155,7 @@ class OneClassSVMOnFeatures:
 class JointMeans:
     """Mahalanobis distance of the means of all channels in equal parts of a window.
 
-    A small change of one channel against the others is large where the channels hardly move apart otherwise. The covariance is not
-    shrunk: shrinkage hides just these small differences.
+    A small change of one channel against the others is large where they hardly move apart otherwise; shrinkage of the covariance would hide it.
 
     Args:
         num_parts: Number of parts of a window.
@@ -198,30 +195,11 @@ class JointSize:
         return np.maximum(*(scale.score(windows) / unit for scale, unit in zip(self._scales, self._units, strict=True)))
 
 
-class RandomScore:
-    """Control: random scores, independent of the windows. Each call continues the random sequence.
-
-    Args:
-        seed: Seed for the scores.
-    """
-
-    def __init__(self, seed: int = 0):
-        self._rng = np.random.default_rng(seed)
-
-    def fit(self, windows: np.ndarray) -> "RandomScore":
-        """Does nothing, because this control has no parameters to fit."""
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns random numbers that are uniformly distributed between 0 and 1."""
-        return self._rng.random(len(windows))
-
-
 class LargestStep:
     """Control: the largest absolute first difference. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
 
     def fit(self, windows: np.ndarray) -> "LargestStep":
-        """Does nothing, because this control has no parameters to fit."""
+        """Does nothing: there is nothing to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -240,7 +218,7 @@ class MovingDeviation:
         self.width = width
 
     def fit(self, windows: np.ndarray) -> "MovingDeviation":
-        """Does nothing, because this control has no parameters to fit."""
+        """Does nothing: there is nothing to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -260,17 +238,16 @@ class Innovation:
 
     Args:
         order: Number of past samples of each channel; less in short windows.
-        most_rows: Number of samples from which it is fitted at most.
     """
 
-    def __init__(self, order: int = 48, most_rows: int = 40_000):
-        self.order, self.most_rows = order, most_rows
+    def __init__(self, order: int = 48):
+        self.order = order
 
     def fit(self, windows: np.ndarray) -> "Innovation":
         """Fits the prediction and the covariance of its errors to nominal windows."""
         values = _with_channels(windows)
         self._mean, order = values.mean(axis=(0, 1)), max(1, min(self.order, values.shape[1] // 4))
-        number = max(1, self.most_rows // (values.shape[1] - order))
+        number = max(1, _MOST_ROWS // (values.shape[1] - order))
         centred = (values - self._mean)[np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)]
         view = np.lib.stride_tricks.sliding_window_view(centred, order + 1, axis=1)  # (windows, places, channels, order + 1)
         past = view[..., :-1].reshape(-1, centred.shape[2] * order)

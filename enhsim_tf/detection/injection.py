@@ -1,8 +1,7 @@
 """Injects anomalies into a nominal series at given or random places, with labels that mark exactly the changed samples.
 
-The kinds of anomaly are those of `anomalies.INJECTIONS`, and their severity is in units of the standard deviation of the noise.
-Unlike `anomalies.inject_into_trace`, the functions of this module accept several kinds, severities and lengths in one series,
-and a series that consists of parts with gaps between them.
+The kinds of anomaly are those of `anomalies.INJECTIONS`, and their severity is in units of the standard deviation of the noise. A series may
+consist of parts with gaps between them.
 """
 
 import dataclasses
@@ -11,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.anomalies import INJECTIONS, SPIKE_INTERVAL
+from enhsim_tf.detection.anomalies import INJECTIONS, check_kind, step_of
 
 TRIES = 100  # drawn places of an anomaly, before the series is said to have no place where it changes a sample
 _NORMAL_MAD = 1.482602218505602  # standard deviation of a normal distribution, in units of its median absolute deviation
@@ -47,30 +46,13 @@ class Anomaly:
         return self.begin + self.length
 
 
-def check_kind(kind: str, severity: float) -> None:
-    """Checks a kind of anomaly and its severity.
-
-    Args:
-        kind: Kind of the anomaly.
-        severity: Severity in units of the standard deviation of the noise.
-
-    Raises:
-        InputError: If the kind is unknown, or the severity is not a number of at least 0. Only `stuck` may be infinite.
-    """
-    if kind not in INJECTIONS:
-        raise InputError(f"Expected a kind of anomaly, one of: {', '.join(INJECTIONS)}. Received: {kind!r}. Name one of these.")
-    if not severity >= 0 or (severity == np.inf and kind != "stuck"):
-        raise InputError(f"Expected a severity of 0 or more, which may be infinite only for stuck. Received: {kind} at {severity}.")
-
-
 def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
     """Estimates the standard deviation of the noise of a smooth signal from its second differences.
 
-    The second difference of white noise with the standard deviation s has the standard deviation s * sqrt(6), and a smooth signal
-    contributes little to it. The standard deviation of the differences is estimated by their median absolute deviation, so that
-    jumps of the signal do not count (Gasser, Sroka and Jennen-Steinmetz, Biometrika 1986, with a robust scale). If more than half
-    of the differences are zero, as in telemetry with few levels, their root mean square is used instead. Noise that is correlated
-    between neighbouring samples is underestimated.
+    The second difference of white noise with the standard deviation s has the standard deviation s * sqrt(6), which is estimated by the
+    median absolute deviation, so that jumps of the signal do not count (Gasser, Sroka and Jennen-Steinmetz 1986, with a robust scale). If
+    more than half of the differences are zero, as in telemetry with few levels, their root mean square is used instead. Noise that is
+    correlated between neighbouring samples is underestimated.
 
     Args:
         parts: The series, or the parts between its gaps, each of shape `(samples,)`.
@@ -95,9 +77,8 @@ def inject_anomalies(
 ) -> tuple[np.ndarray, np.ndarray, list[Anomaly]]:
     """Injects anomalies into a series. They do not overlap, and none extends over a gap of the series.
 
-    Drawn anomalies are placed one after the other, the longest first, each at a sample drawn uniformly from all places that are
-    free. A place where the anomaly would change no sample is drawn again: for example, `stuck` changes nothing where the
-    telemetry is constant.
+    Drawn anomalies are placed one after the other, the longest first, each uniformly among all places that are free. A place where the
+    anomaly would change no sample is drawn again: for example, `stuck` changes nothing where the telemetry is constant.
 
     Args:
         parts: The nominal series, or the parts between its gaps, each of shape `(samples,)`. They are not modified.
@@ -108,9 +89,8 @@ def inject_anomalies(
         rng: Random number generator.
 
     Returns:
-        `(values, mask, anomalies)`: the float32 series of all parts, a boolean array that marks exactly the samples whose value
-        has changed, both of shape `(samples,)`, and the anomalies in the order of time. `begin` and `length` of each are those of
-        the changed samples, which may be fewer than was asked.
+        `(values, mask, anomalies)`: the float32 series of all parts, a boolean array that marks exactly the changed samples, both of
+        shape `(samples,)`, and the anomalies in the order of time, with `begin` and `length` of the samples that have changed.
 
     Raises:
         InputError: If anomalies overlap, lie outside a part, do not fit, or change no sample.
@@ -121,47 +101,40 @@ def inject_anomalies(
     values = nominal.copy()
     taken: list[tuple[int, int]] = []
     found: list[Anomaly] = []
+
+    def put(anomaly: Anomaly) -> bool:
+        """Whether an anomaly changes the series; then it is kept."""
+        changed = _put(values, nominal, anomaly, bounds, noise_sd, rng)
+        if changed is not None:
+            taken.append((anomaly.begin, anomaly.end))
+            found.append(changed)
+        return changed is not None
+
     for anomaly in sorted(given, key=lambda each: each.begin):
         _check_place(anomaly, bounds, taken)
-        changed = _put(values, nominal, anomaly, bounds, noise_sd, rng)
-        if changed is None:
+        if not put(anomaly):
             raise InputError(
                 f"Expected an anomaly that changes the telemetry. Received: {_text(anomaly)}, which changes no sample. "
                 "Choose another place, a longer one or a higher severity."
             )
-        taken.append((anomaly.begin, anomaly.end))
-        found.append(changed)
     for kind, severity, length in sorted(drawn, key=lambda each: -each[2]):
-        check_kind(kind, severity)
-        for _ in range(TRIES):
-            anomaly = Anomaly(kind, severity, draw_begin(bounds, taken, length, gap, rng), length)
-            changed = _put(values, nominal, anomaly, bounds, noise_sd, rng)
-            if changed is not None:
-                break
-        else:
+        if not any(put(Anomaly(kind, severity, draw_begin(bounds, taken, length, gap, rng), length)) for _ in range(TRIES)):
             raise InputError(
                 f"Expected a place where the anomaly changes a sample. Received: {kind} at {severity:g} sd over {length} samples, which changes "
                 f"none at {TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
             )
-        taken.append((anomaly.begin, anomaly.end))
-        found.append(changed)
     return values, values != nominal, sorted(found, key=lambda each: each.begin)
 
 
 def _put(
-    values: np.ndarray,
-    nominal: np.ndarray,
-    anomaly: Anomaly,
-    bounds: Sequence[tuple[int, int]],
-    noise_sd: float,
-    rng: np.random.Generator,
+    values: np.ndarray, nominal: np.ndarray, anomaly: Anomaly, bounds: Sequence[tuple[int, int]], noise_sd: float, rng: np.random.Generator
 ) -> Anomaly | None:
     """Changes the samples of an anomaly and returns the anomaly as it is, or None if no sample has changed."""
     start, stop = next(each for each in bounds if each[0] <= anomaly.begin < each[1])
     centre = np.array([[np.mean(nominal[start:stop], dtype=np.float64)]])
     piece = np.asarray(nominal[anomaly.begin : anomaly.end], np.float64)[None]
     changed = INJECTIONS[anomaly.kind](piece, anomaly.severity * noise_sd, centre, rng)[0]
-    step = SPIKE_INTERVAL if anomaly.kind == "spike" else 1  # the samples between spikes are nominal
+    step = step_of(anomaly.kind)
     with np.errstate(over="ignore"):
         values[anomaly.begin : anomaly.end : step] = changed[::step]
     here = values[anomaly.begin : anomaly.end]

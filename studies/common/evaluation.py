@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject, inject_into_trace
+from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, SEVERITIES, inject, put_anomalies
 from enhsim_tf.detection.interface import Detector
 from enhsim_tf.detection.metrics import recall, threshold
 from enhsim_tf.telemetry.windows import cut_windows, mean_over_windows
@@ -95,6 +95,40 @@ def make_trial(
             marks.append(mark)
         trace, labels = np.concatenate(stretches), np.concatenate(marks)
     return Trial(nominal, reference, anomalous, trace, labels, **settings)
+
+
+def inject_into_trace(
+    trace: np.ndarray, kind: str, severity: float, duration: int, noise_sd: float, num_ranges: int, gap: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Injects anomalies of one kind into a continuous trace, at positions drawn uniformly from all possible arrangements.
+
+    Args:
+        trace: Nominal telemetry, shape `(samples,)`. It is not modified.
+        kind: Kind of the anomalies, a key of `anomalies.INJECTIONS`.
+        severity: Severity of the anomalies, in units of `noise_sd`.
+        duration: Duration of each anomaly, in samples.
+        noise_sd: Standard deviation of the noise, in the unit of the telemetry.
+        num_ranges: Number of anomalies.
+        gap: Minimum number of nominal samples between two anomalies, before the first and after the last.
+        rng: Random number generator. Positions are drawn first.
+
+    Returns:
+        The float32 trace, and a boolean array that marks the anomalous samples, both of the shape of `trace`.
+
+    Raises:
+        InputError: If the anomalies do not fit into the trace.
+    """
+    free = len(trace) - num_ranges * (duration + gap) - gap
+    if free < 0 or num_ranges < 1:
+        raise InputError(
+            f"Expected at least one anomaly, and a trace of at least {len(trace) - free} samples. "
+            f"Received: num_ranges={num_ranges} and {len(trace)} samples."
+        )
+    steps = np.sort(rng.choice(free + num_ranges, num_ranges, replace=False))  # an arrangement, with each anomaly shrunk to one sample
+    begins = gap + steps + np.arange(num_ranges) * (duration + gap - 1)
+    rows, columns = np.zeros((num_ranges, 1), int), begins[:, None] + np.arange(duration)
+    anomalous, labels = put_anomalies(np.asarray(trace)[None], rows, columns, kind, severity * noise_sd, rng)
+    return anomalous[0], labels[0]
 
 
 def evaluate_arm(

@@ -13,10 +13,11 @@ from enhsim_tf.common.stages import Stages
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.anomalies import DURATIONS, INJECTIONS, inject
 from enhsim_tf.detection.interface import Detector
-from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.paper.telemetry import true_signal
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, time_blocks
+from studies.common.controls import CONTROLS
 from studies.common.example import coarse_simulator, draw_noise
 from studies.common.metrics import recall_at_real_rate
 from studies.common.settings import Settings

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enhsim_tf.common.stages import Stages
-from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import DETECTORS
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
 from studies.common import evaluation
 from studies.common.block_bootstrap import BlockBootstrap
+from studies.common.controls import CONTROLS
 from studies.common.example import Example
 from studies.common.settings import Settings
 from studies.robustness import real_floor

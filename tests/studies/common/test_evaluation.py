@@ -8,7 +8,7 @@ from enhsim_tf.detection.anomalies import INJECTIONS, SEVERITIES
 from enhsim_tf.detection.detectors import LargestStep, PCAResidual
 from enhsim_tf.telemetry.windows import mean_over_windows
 from studies.common import evaluation
-from studies.common.evaluation import evaluate_arm, false_alarm_rates, make_trial, score_trace
+from studies.common.evaluation import evaluate_arm, false_alarm_rates, inject_into_trace, make_trial, score_trace
 
 WINDOW = 300
 
@@ -118,3 +118,30 @@ def test_samples_behind_the_last_window_take_its_score():
 def test_a_trace_shorter_than_a_window_is_refused(refused):
     with refused("9 samples"):
         score_trace(Largest(), np.zeros(9, np.float32), window=10, stride=4)
+
+
+def test_ranges_of_a_trace():
+    trace = np.full(10_000, 2.0)
+    values, labels = inject_into_trace(trace, "level_shift", 3, 50, 0.1, num_ranges=20, gap=100, rng=np.random.default_rng(0))
+    assert values.dtype == np.float32 and labels.dtype == bool and values.shape == labels.shape == (10_000,)
+    begins, ends = np.flatnonzero(np.diff(labels, prepend=False, append=False)).reshape(-1, 2).T
+    assert (ends - begins == 50).all() and len(begins) == 20
+    assert (begins[1:] - ends[:-1]).min() >= 100 and begins[0] >= 100 and ends[-1] <= 9_900
+    assert (values[~labels] == 2).all() and np.abs(values[labels] - 2) == pytest.approx(np.full(1_000, 0.3), abs=1e-6)
+    assert len(set(np.round(values[begins] - 2, 3))) == 2  # each range draws its side
+
+
+def test_every_arrangement_of_a_trace_is_as_likely():
+    # two ranges of 1 sample, 1 apart at least, among 6 samples: (1, 3), (1, 4), (2, 4)
+    rng, counts = np.random.default_rng(0), {}
+    for _ in range(3_000):
+        places = tuple(np.flatnonzero(inject_into_trace(np.zeros(6), "dropout", 1, 1, 1, 2, 1, rng)[1]).tolist())
+        counts[places] = counts.get(places, 0) + 1
+    assert set(counts) == {(1, 3), (1, 4), (2, 4)}
+    assert list(counts.values()) == pytest.approx([1_000] * 3, abs=5 * np.sqrt(3_000 * 2 / 9))
+
+
+def test_anomalies_that_do_not_fit_into_a_trace_are_refused(refused):
+    for number in (4, 0):
+        with refused(f"num_ranges={number}", "100 samples"):
+            inject_into_trace(np.zeros(100), "ramp", 1, 20, 0.1, num_ranges=number, gap=6, rng=np.random.default_rng(0))
