@@ -1,7 +1,6 @@
 """A coarse simulator for channels without a shape that repeats: one constant level (step 1 of the paper's pipeline).
 
-It simulates nothing but the level. Everything else that the telemetry does is noise to it, so an enhanced simulator with this coarse
-simulator generates noise around levels that occurred in the telemetry.
+Everything else that the telemetry does is noise to it, so its enhanced simulator generates noise around levels that occurred.
 """
 
 from collections.abc import Mapping
@@ -16,8 +15,8 @@ from enhsim_tf.common.errors import InputError
 class ConstantLevel(SquareWaveSimulator):
     """A constant level, in the form of a square wave whose two levels are equal.
 
-    The degraded modes `drift` and `dropout` change it, because they act on the sensor. The modes of a mechanism do not, because
-    nothing moves; but in a series, telemetry that is stuck no longer follows the levels of the record.
+    The degraded modes of the sensor, `drift` and `dropout`, change it. Those of a mechanism do not, because nothing moves; but in a
+    series, telemetry that is stuck no longer follows the levels of the record.
 
     Args:
         level: The level, in the unit of the telemetry.
@@ -47,19 +46,11 @@ class ConstantLevel(SquareWaveSimulator):
         """Lowest and highest level for degraded modes and units."""
         return self.level - self.spread, self.level + self.spread
 
-    def synchronise(self, time_s: np.ndarray, windows: np.ndarray) -> np.ndarray:
-        """Returns the times unchanged, because a constant has no phase."""
-        return np.asarray(time_s, np.float64)
-
     def get_config(self) -> dict:
         """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
         return {"level": self.level, "spread": self.spread, "period_s": self.waves[0].period_s}
 
 
 def waves_or_level(config: Mapping[str, Any]) -> SquareWaveSimulator:
-    """Restores a simulator from the output of `get_config`: a constant level, or square waves.
-
-    Args:
-        config: The settings.
-    """
+    """Restores a simulator from the output of `get_config`: a constant level, or square waves."""
     return ConstantLevel(**config) if "level" in config else SquareWaveSimulator.from_config(config)

@@ -15,12 +15,7 @@ MODES = {
     "dropout": "random runs of 10 samples, half of all runs at severity 1, read the lowest level",
     "period_change": "every period is multiplied by 1 + `severity`",
 }
-
-
 _DROPOUT_RUN = 10  # samples
-
-
-_NUM_SHIFTS = 100  # time shifts tried in each direction by `synchronise`, in steps of 0.5 % of a period
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,14 +44,8 @@ class Degraded:
             raise InputError(f"Expected 0 <= severity <= 1 and 0 <= onset < 1. Received: {self}.")
 
     def first_sample(self, num_samples: int) -> int:
-        """Sample of a window or series at which the degradation starts.
-
-        The product is rounded before it is truncated, since 0.29 * 100 is 28.999999999999996.
-
-        Args:
-            num_samples: Length of the window or series.
-        """
-        return int(round(self.onset * num_samples, 6))
+        """Sample at which the degradation of a window or series of this length starts."""
+        return int(round(self.onset * num_samples, 6))  # rounded first, since 0.29 * 100 is 28.999999999999996
 
 
 def degrade(
@@ -67,10 +56,9 @@ def degrade(
     shortest_period_s: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Applies a degraded mode to a signal.
+    """Applies a degraded mode to a signal, which is a function of time.
 
-    The signal is given as a function of time. The coarse simulator and, if it is known in closed form, the true vehicle are
-    therefore degraded in the same way by the same scenario and the same state of `rng`.
+    The coarse simulator and a true vehicle that is known in closed form are degraded alike by the same scenario and state of `rng`.
 
     Args:
         signal: The nominal signal, a function from times in seconds to values of the same shape.

@@ -1,8 +1,7 @@
 """The interface of coarse simulators: objects that simulate named columns at given times (steps 1 and 2 of the pipeline).
 
-The square waves of `square_waves` have this interface, and so have recorded runs of a user's simulator (`recording`).
-`FunctionSimulator` turns a function into a simulator. An object of any class is a simulator if it has the attribute and the method of
-`CoarseSimulator`.
+Square waves have this interface, and so have recorded runs of a user's simulator (`recording`). `FunctionSimulator` turns a function into a
+simulator. An object of any class is one if it has the attribute and the method of `CoarseSimulator`.
 """
 
 import inspect
@@ -83,13 +82,7 @@ class FunctionSimulator:
 
 
 def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
-    """Checks the names of a simulator's outputs.
-
-    Args:
-        columns: The names.
-
-    Returns:
-        The names as a tuple.
+    """Returns the names of a simulator's outputs as a tuple.
 
     Raises:
         InputError: If there is none, one is not text, or one occurs twice.
@@ -100,13 +93,7 @@ def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def simulate(
-    simulator: CoarseSimulator,
-    time_s: np.ndarray,
-    scenario: Any = None,
-    rng: np.random.Generator | None = None,
-    compare: bool = True,
-) -> np.ndarray:
+def simulate(simulator: CoarseSimulator, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
     """Runs a simulator and checks what it returns.
 
     Args:
@@ -114,7 +101,6 @@ def simulate(
         time_s: Times in seconds, shape `(samples,)`.
         scenario: What differs from nominal operation, or None.
         rng: Random number generator. None: one with seed 0.
-        compare: Whether a run with a scenario is compared with the nominal run, which takes a second run.
 
     Returns:
         float32 array of shape `(samples, columns)`.
@@ -132,7 +118,7 @@ def simulate(
     rng = np.random.default_rng(0) if rng is None else rng
     before = rng.bit_generator.state
     values = _checked(simulator.run(time_s, scenario, rng), name, columns, time_s)
-    if scenario is None or not compare or getattr(scenario, "severity", 1) == 0:
+    if scenario is None or getattr(scenario, "severity", 1) == 0:
         return values
     after, rng.bit_generator.state = rng.bit_generator.state, before
     nominal = _checked(simulator.run(time_s, None, rng), name, columns, time_s)

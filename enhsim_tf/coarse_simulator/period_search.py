@@ -3,7 +3,7 @@
 The series is folded at each trial frequency, and the box that explains the most variance is found from cumulative sums.
 """
 
-import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,36 +14,18 @@ _NUM_PEAKS = 12  # highest peaks of the periodogram that are used as trial frequ
 _OVERSAMPLING = 4  # frequency oversampling of the periodogram
 
 
-@dataclasses.dataclass(frozen=True)
-class Box:
-    """A fitted square wave: one box per cycle, in units of samples.
+class Box(NamedTuple):
+    """A fitted square wave: one box per cycle, in units of samples."""
 
-    Args:
-        frequency: Frequency in cycles per sample.
-        begin: Phase at which the box begins, from 0 to 1, where sample 0 has phase 0.
-        duty: Fraction of the cycle inside the box.
-        low: Mean of the series outside the box.
-        high: Mean of the series inside the box.
-        explained: Variance explained by the wave, in squared units of the series.
-    """
-
-    frequency: float
-    begin: float
-    duty: float
-    low: float
-    high: float
-    explained: float
+    frequency: float  # cycles per sample
+    begin: float  # phase at which the box begins, from 0 to 1, where sample 0 has phase 0
+    duty: float  # fraction of the cycle inside the box
+    low: float  # mean of the series outside the box
+    high: float  # mean of the series inside the box
 
 
 def fit_box(values: np.ndarray, name: str = "the series") -> Box:
-    """Fits a square wave to a series by least squares.
-
-    Args:
-        values: Series of shape `(samples,)`.
-        name: Name of the series, for the message.
-
-    Returns:
-        The fitted wave.
+    """Fits a square wave to a series of shape `(samples,)` by least squares; `name` is for the message.
 
     Raises:
         InputError: If the series has no period that can be found.
@@ -70,9 +52,9 @@ def fit_box(values: np.ndarray, name: str = "the series") -> Box:
     while step * num_samples > 1e-3:
         best = max(best + step * np.arange(-4, 5), key=lambda trial: _best_box(index * trial, centred)[0])
         step /= 3
-    explained, begin, duty = _best_box(index * best, centred)
+    _, begin, duty = _best_box(index * best, centred)
     inside = np.mod(index * best - begin, 1.0) < duty
-    return Box(float(best), begin, duty, float(values[~inside].mean()), float(values[inside].mean()), explained)
+    return Box(float(best), begin, duty, float(values[~inside].mean()), float(values[inside].mean()))
 
 
 def _best_box(cycles: np.ndarray, centred: np.ndarray) -> tuple[float, float, float]:

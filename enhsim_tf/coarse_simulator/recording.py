@@ -12,7 +12,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, check_columns, name_of, simulate
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+from enhsim_tf.telemetry.series import Telemetry
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +70,7 @@ class Recording:
         return sum(map(len, self.parts))
 
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Returns what was recorded at given times, interpolated linearly between samples.
+        """Returns what was recorded at given times, as `at`, and refuses all else.
 
         Args:
             time_s: Times in seconds after the start of the recording, shape `(samples,)`.
@@ -98,7 +98,7 @@ class Recording:
         return values
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """Returns what was recorded at given times, and NaN where nothing was.
+        """Returns what was recorded at given times, interpolated linearly between samples, and NaN where nothing was.
 
         Args:
             time_s: Times in seconds after the start of the recording, shape `(samples,)`.
@@ -119,7 +119,7 @@ class Recording:
         return values
 
     def clock(self, part: Run | None = None) -> Telemetry:
-        """Returns a series with the times of a part, or of the start of the recording, whose values mean nothing."""
+        """Returns a series with the times of a part, or of the recording's start, whose values mean nothing."""
         length, offset_s = (1, 0.0) if part is None else (len(part), part.offset_s)
         return Telemetry(np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name)
 
@@ -176,26 +176,3 @@ def record(
     carried = {name: np.broadcast_to(np.asarray(value), len(time_s)) for name, value in (labels or {}).items()}
     run = Run(values, float(time_s[0]), carried)
     return Recording((run,), tuple(simulator.columns), float(steps.mean()), start, name_of(simulator))
-
-
-def seconds_between(first: Telemetry, second: Telemetry) -> float:
-    """Returns how many seconds the zero of one clock is after the zero of another.
-
-    Args:
-        first: A series on the first clock.
-        second: A series on the second clock.
-
-    Returns:
-        `second.start - first.start` in seconds; 0 if neither series has times.
-
-    Raises:
-        InputError: If only one of the two has times.
-    """
-    if first.has_time != second.has_time:
-        with_times, without = (first, second) if first.has_time else (second, first)
-        raise InputError(
-            f"Expected times in both the telemetry and the coarse run, or in neither. Received: {with_times.name} with times, "
-            f"{without.name} without. Name the time columns, or `none` for both."
-        )
-    starts = [nanoseconds(dataclasses.replace(each, offset_s=0.0), 0, 1)[0] for each in (first, second)]
-    return float(starts[1] - starts[0]) / 1e9

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 class ScheduledMode:
     """A degraded mode during some samples of a series.
 
-    The mode acts on these samples as it does on a window with the onset 0, and the signal is nominal after the last of them. A
-    stuck mechanism, for example, stands still for the fraction `severity` of the samples and then continues at the time that it
-    would have reached without the fault.
+    The mode acts on these samples as on a window with the onset 0, and the signal is nominal after the last of them: a mechanism that was
+    stuck continues at the time that it would have reached without the fault.
 
     Args:
         mode: One of `degraded.MODES`.
@@ -49,15 +48,7 @@ class ScheduledMode:
 
 
 def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int] | None:
-    """Returns the samples of a window or series at which a stuck mechanism stands still, as its first sample and its end.
-
-    Args:
-        scenario: A degraded mode, or None.
-        num_samples: Length of the window or series.
-
-    Returns:
-        None if the mechanism is not stuck.
-    """
+    """Returns the first sample and the end at which a stuck mechanism stands still in a window or series; None if it is not stuck."""
     if scenario is None or scenario.mode != "stuck" or scenario.severity == 0:
         return None
     begin = min(scenario.first_sample(num_samples), num_samples - 1)
@@ -65,14 +56,7 @@ def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int]
 
 
 def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[ScheduledMode]:
-    """Checks that the events of a schedule do not overlap and lie within a series.
-
-    Args:
-        schedule: The events.
-        num_samples: Length of the series.
-
-    Returns:
-        The events in the order of time.
+    """Returns the events of a schedule in the order of time.
 
     Raises:
         InputError: If two events overlap or touch, or one extends beyond the series.
@@ -94,16 +78,16 @@ def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[
 def simulate_schedule(
     coarse: "SquareWaveSimulator", time_s: np.ndarray, schedule: Sequence[ScheduledMode], rng: np.random.Generator
 ) -> np.ndarray:
-    """Simulates a series with several degraded modes.
+    """Simulates a series that equals the nominal run outside of events, which do not overlap.
 
     Args:
         coarse: The coarse simulator.
         time_s: Times in seconds, shape `(samples,)`.
-        schedule: The events, in the order of time and without overlaps.
+        schedule: The events, in the order of time.
         rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
 
     Returns:
-        float32 array of shape `(samples,)`. It equals the nominal run outside the events.
+        float32 array of shape `(samples,)`.
     """
     values = coarse.simulate(time_s[None])[0]
     for event in schedule:

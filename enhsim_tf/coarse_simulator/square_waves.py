@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import _NUM_SHIFTS, Degraded, degrade
-from enhsim_tf.coarse_simulator.period_search import Box, fit_box
+from enhsim_tf.coarse_simulator.degraded import Degraded, degrade
+from enhsim_tf.coarse_simulator.period_search import fit_box
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry
 
@@ -119,57 +119,20 @@ class SquareWaveSimulator:
         return self.simulate(np.asarray(time_s, np.float64)[None], scenario, rng)[0][:, None]
 
     @classmethod
-    def fit(cls, telemetry: Telemetry, max_waves: int = 1, min_explained: float = 0.05, num_levels: int = 2) -> "SquareWaveSimulator":
-        """Fits square waves to telemetry by least squares, one after another, each to the residual of the previous ones.
+    def fit(cls, telemetry: Telemetry) -> "SquareWaveSimulator":
+        """Fits one square wave to telemetry by least squares.
 
         Args:
             telemetry: The series, at least two periods long.
-            max_waves: Largest number of square waves. One suits most channels; further waves usually fit harmonics rather than
-                further mechanisms.
-            min_explained: Smallest fraction of the series' variance that each wave after the first must explain.
-            num_levels: Number of levels of each wave. The fit itself uses two levels.
-
-        Returns:
-            The fitted simulator.
 
         Raises:
             InputError: If `telemetry` is not a `Telemetry`, or no period is found.
         """
         check_telemetry(telemetry)
-        residual = telemetry.values.astype(np.float64)
-        variance, waves = residual.var(), []
-        while len(waves) < max_waves:
-            box = fit_box(residual, telemetry.name)
-            wave, explained = cls._wave_of(box, telemetry), box.explained
-            if explained < min_explained * variance and waves:
-                break
-            residual = residual - wave(telemetry.time_s)
-            waves.append(dataclasses.replace(wave, num_levels=num_levels))
-        return cls(waves)
-
-    @staticmethod
-    def _wave_of(box: Box, telemetry: Telemetry) -> SquareWave:
+        box = fit_box(telemetry.values.astype(np.float64), telemetry.name)
         period_s = telemetry.interval_s / box.frequency
         phase = np.mod(-box.begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
-        return SquareWave(period_s, float(phase), box.duty, box.low, box.high)
-
-    def synchronise(self, time_s: np.ndarray, windows: np.ndarray) -> np.ndarray:
-        """Shifts the simulator's time for each window so that its phase matches the telemetry. Only the time is changed.
-
-        A simulator that runs in parallel with a vehicle is synchronised to the vehicle's clock; a free-running one drifts away.
-
-        Args:
-            time_s: Times of the windows in seconds, shape `(windows, samples)`.
-            windows: Telemetry at these times, same shape.
-
-        Returns:
-            Shifted times, same shape, at which the nominal signal correlates best with each window.
-        """
-        time_s, centred = np.asarray(time_s, np.float64), windows - windows.mean(axis=1, keepdims=True)
-        longest_s = max(wave.period_s for wave in self.waves)
-        shifts = np.linspace(-0.5, 0.5, 2 * _NUM_SHIFTS + 1) * longest_s
-        agreement = [np.sum(self(time_s + shift) * centred, axis=1) for shift in shifts]
-        return time_s + shifts[np.argmax(agreement, axis=0)][:, None]
+        return cls([SquareWave(period_s, float(phase), box.duty, box.low, box.high)])
 
     def get_config(self) -> dict:
         """The settings as plain JSON types, from which `from_config` restores the simulator."""
@@ -182,13 +145,6 @@ class SquareWaveSimulator:
 
 
 def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
-    """Computes the normalisation of a coarse simulator.
-
-    Args:
-        coarse: The simulator.
-
-    Returns:
-        `(offset, scale)`, so that `(values - offset) / scale` maps the lowest level to -1 and the highest to 1.
-    """
+    """Returns `(offset, scale)`, so that `(values - offset) / scale` maps the lowest level of a simulator to -1 and the highest to 1."""
     low, high = coarse.levels
     return (low + high) / 2, (high - low) / 2 or 1.0
