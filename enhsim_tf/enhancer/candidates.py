@@ -1,12 +1,12 @@
 """The candidates for the enhancer, from the coarse simulator itself to the paper's network, and the choice among them (section 2.2).
 
-The paper's network is one of several maps from coarse to realistic windows. Each is judged on blocks of time that it was not fitted to,
-from cheap to dear. The simplest one whose error is within one standard error, or within 1 %, of the best is used. What no linear map can
-learn is left to random rectified features (Rahimi and Recht 2007): a network whose hidden layer is drawn and whose output layer is a ridge
-regression, which takes a second. The paper's network is trained only if it is asked for.
+Each is judged on blocks of time that it was not fitted to. The simplest one whose error is within one standard error, or within 1 %, of the
+best is used. What no linear map can learn is left to random rectified features (Rahimi and Recht 2007): a network whose hidden layer is
+drawn and whose output layer is a ridge regression. The paper's network is trained only if it is asked for.
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -22,7 +22,6 @@ _PAPER_RATE = 1e-3  # its initial learning rate, which falls to zero along a cos
 _BATCH_SIZE = 15  # as in the paper
 _NUM_FEATURES = 1_000  # random rectified features
 _NEGLIGIBLE = 0.02  # share of the best candidate's squared error: 1 % of its error
-
 
 Layers = Sequence[tuple[np.ndarray, np.ndarray]]
 """Kernel and bias of each Dense layer."""
@@ -188,7 +187,7 @@ def fit_enhancer(
     if name != NETWORK:
         ridge = fit_ridge(rows, outputs, starts, num_channels=channels, chosen=penalties or None)
         penalties = ridge.chosen
-        maps = [ridge.weights] if ridge.factors is None else list(ridge.factors)
+        maps = list(ridge.factors)
         moved = ridge.input_mean.ravel()
         for each in maps:
             moved = moved @ each
@@ -245,7 +244,7 @@ def _random_features(rows: np.ndarray, left: np.ndarray, starts: np.ndarray, cha
     kernel = rng.standard_normal((rows.shape[1], _NUM_FEATURES)) / np.sqrt(rows.shape[1])
     shift = rng.uniform(-1, 1, _NUM_FEATURES)
     ridge = fit_ridge(np.maximum(rows @ kernel + shift, 0)[:, None, :], left, starts, num_channels=channels)
-    weights = ridge.weights if ridge.factors is None else ridge.factors[0] @ ridge.factors[1]
+    weights = functools.reduce(np.matmul, ridge.factors)
     return [(kernel, shift), (weights, ridge.target_mean - ridge.input_mean.ravel() @ weights)]
 
 

@@ -17,8 +17,7 @@ from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.enhancer.overlapping import average_windows, run_starts
+from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of
 from enhsim_tf.simulator.alignment import Alignment, Drawn, Runs, Waves
 from enhsim_tf.simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of

@@ -79,13 +79,6 @@ def test_level_and_gain_are_those_of_least_squares():
         np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
 
 
-def test_one_column_and_channel_may_be_given_without_their_axes():
-    coarse = series()
-    inputs, targets, starts = windows_of(coarse, coarse[:, 0])
-    with_axis, without = (fit_enhancer(RIDGE, each, targets, starts) for each in (inputs[:, :, :1], inputs[:, :, 0]))
-    np.testing.assert_array_equal(with_axis.predict(inputs[:, :, :1]), without.predict(inputs[:, :, :1]))
-
-
 def test_the_papers_network_has_the_layers_of_figure_3(monkeypatch):
     def dense_stack(inputs, units, seed, name):
         raise KeyError(inputs, units)  # before it is trained
@@ -209,14 +202,6 @@ def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monke
     for each in judging:
         np.testing.assert_array_equal(each, starts[split_fold(starts, WINDOW, edges, 0)[0]])
     np.testing.assert_array_equal(refitting, starts)
-
-
-def test_same_seed_same_choice():
-    coarse = series(1_200)
-    data = windows_of(coarse, coarse[:, 0] ** 2, 100)
-    one, other = (choose_enhancer(*data, RIDGE_AND_FEATURES, seed=4) for _ in range(2))
-    assert one.judged == other.judged
-    np.testing.assert_array_equal(one.enhancer.predict(data[0]), other.enhancer.predict(data[0]))
 
 
 @pytest.mark.parametrize(

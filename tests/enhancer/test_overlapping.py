@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.enhancer.overlapping import average_windows, run_starts
+from enhsim_tf.enhancer.model import average_windows, run_starts
 
 
-@pytest.mark.parametrize("num_samples", [32, 33, 63, 200, 201])
+@pytest.mark.parametrize("num_samples", [32, 63, 201])
 def test_windows_that_agree_give_the_run_itself(num_samples):
     run = np.random.default_rng(0).standard_normal((num_samples, 2)).astype(np.float32)
     starts = run_starts(num_samples, 32)
@@ -24,4 +24,4 @@ def test_windows_that_disagree_are_joined_without_a_step():
 def test_every_sample_is_covered_and_the_last_window_ends_with_the_run():
     starts = run_starts(101, 20)
     assert starts[0] == 0 and starts[-1] == 81 and np.diff(starts).max() <= 5
-    assert run_starts(20, 20).tolist() == [0] and run_starts(21, 20, 10).tolist() == [0, 1]
+    assert run_starts(20, 20).tolist() == [0] and run_starts(21, 20).tolist() == [0, 1]
