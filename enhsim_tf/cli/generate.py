@@ -8,8 +8,7 @@ from enhsim_tf.common.console import tell
 from enhsim_tf.common.errors import InputError, printable
 
 if TYPE_CHECKING:
-    from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+    from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
     from enhsim_tf.datasets.places import Place
     from enhsim_tf.simulator.simulator import EnhancedSimulator
 
@@ -128,7 +127,7 @@ def _schedule_of(
     import numpy as np
     import pandas as pd
 
-    from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+    from enhsim_tf.coarse_simulator.degraded import ScheduledMode
     from enhsim_tf.datasets.labelled_windows import parse_start
     from enhsim_tf.datasets.places import length_limits, split_limits
     from enhsim_tf.datasets.schedule import draw_schedule

@@ -92,14 +92,11 @@ class FmuSimulator:
         return np.stack([found[name][places] for name in self.columns], axis=1).astype(np.float64)
 
     def _inputs(self, time_s: np.ndarray) -> np.ndarray | None:
+        """The commands at the times of a run, in the form of FMPy."""
         if self.commands is None:
             return None
-        values = self.commands.run(time_s)
-        inputs = np.zeros(len(time_s), [("time", np.float64), *((name, np.float64) for name in self.commands.columns)])
-        inputs["time"] = time_s
-        for number, name in enumerate(self.commands.columns):
-            inputs[name] = values[:, number]
-        return inputs
+        columns = self.commands.run(time_s).astype(np.float64).T
+        return np.rec.fromarrays([time_s, *columns], names=["time", *self.commands.columns])
 
     def _check_names(self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None) -> None:
         for name in names:

@@ -17,8 +17,7 @@ from enhsim_tf.common.errors import InputError
 class CoarseSimulator(Protocol):
     """The interface of a coarse simulator.
 
-    A simulator must apply the scenario or refuse it with an error. One that ignores a scenario would give nominal data under
-    the label of a fault; `simulate` checks this.
+    It must apply a scenario or refuse it: one that is ignored would give nominal data under the label of a fault. `simulate` checks this.
 
     Args:
         columns: Names of the outputs, for example `("voltage", "current")`.
@@ -43,8 +42,8 @@ class FunctionSimulator:
     """A coarse simulator made from a function.
 
     Args:
-        function: Called with the times in seconds, shape `(samples,)`. If it has a parameter `scenario` or `rng`, it receives
-            that too. It returns an array of shape `(samples,)` or `(samples, columns)`.
+        function: Called with the times in seconds, shape `(samples,)`, and with `scenario` and `rng` if it has these parameters. It returns an
+            array of shape `(samples,)` or `(samples, columns)`.
         columns: Names of the outputs.
         name: Name of the simulator in messages. None uses the name of the function.
 
@@ -106,8 +105,8 @@ def simulate(simulator: CoarseSimulator, time_s: np.ndarray, scenario: Any = Non
         float32 array of shape `(samples, columns)`.
 
     Raises:
-        InputError: If the object is no simulator, if it returns another shape, numbers that are not finite, or if the run with
-            a scenario equals the nominal run. A scenario whose attribute `severity` is 0 may equal it.
+        InputError: If the object is no simulator, returns another shape or numbers that are not finite, or if the run with a scenario equals
+            the nominal run, unless the scenario's attribute `severity` is 0.
     """
     name = name_of(simulator)
     if not isinstance(simulator, CoarseSimulator):

@@ -1,7 +1,6 @@
 """Brings telemetry and a recorded run of the coarse simulator to one clock (steps 3 and 4 of the pipeline).
 
-The telemetry and the run are cut to the time that they share. A constant delay between them is estimated by cross-correlation,
-unless it is given.
+They are cut to the time that they share. A constant delay between them is estimated by cross-correlation, unless it is given.
 """
 
 import dataclasses
@@ -22,12 +21,7 @@ _LEAST_SHARE = 0.5  # a delay is considered only if at least this share of the s
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Pair:
-    """A contiguous stretch of telemetry with the coarse run of the same time.
-
-    Args:
-        telemetry: The telemetry.
-        coarse: The coarse run, delayed, float32 of shape `(samples, columns)`.
-    """
+    """A contiguous stretch of telemetry with the coarse run of the same time, delayed, float32 of shape `(samples, columns)`."""
 
     telemetry: Telemetry
     coarse: np.ndarray
@@ -38,19 +32,12 @@ class Pair:
 
 @dataclasses.dataclass(frozen=True)
 class Delay:
-    """A constant delay between the coarse run and the telemetry.
+    """A constant delay between the coarse run and the telemetry."""
 
-    Args:
-        seconds: How much later the telemetry is, in seconds, or in samples if there are no times.
-        column: The coarse column that it was estimated from; None if it was not estimated.
-        correlation: Correlation of that column with the telemetry at this delay.
-        undelayed: The same without a delay.
-    """
-
-    seconds: float
-    column: str | None = None
-    correlation: float = float("nan")
-    undelayed: float = float("nan")
+    seconds: float  # how much later the telemetry is; in samples if there are no times
+    column: str | None = None  # the coarse column that it was estimated from; None if it was not estimated
+    correlation: float = float("nan")  # of that column with the telemetry at this delay
+    undelayed: float = float("nan")  # the same without a delay
 
 
 def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_s: float = 0.0, least_samples: int = 2) -> list[Pair]:

@@ -1,7 +1,6 @@
 """Recorded runs of a user's simulator: several columns on one clock (step 3 of the pipeline, "which is also recorded").
 
-A recording has the interface of a coarse simulator: it returns the recorded values at given times, and refuses times that it does not
-cover.
+A recording has the interface of a coarse simulator; it refuses scenarios, and times that it does not cover.
 """
 
 import dataclasses
@@ -23,16 +22,10 @@ _TOLERANCE = 1e-3  # in intervals: a time this far outside a part still belongs 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """A regularly sampled run without gaps.
+    """A regularly sampled run without gaps; `carried` are columns that are no inputs, such as `scenario`, with a value per sample each."""
 
-    Args:
-        values: float32 array of shape `(samples, columns)`.
-        offset_s: Time of the first sample in seconds after the start of the recording.
-        carried: Further columns, which are no inputs of the enhancer, such as `scenario`: one value per sample each.
-    """
-
-    values: np.ndarray
-    offset_s: float = 0.0
+    values: np.ndarray  # float32 of shape `(samples, columns)`
+    offset_s: float = 0.0  # time of the first sample in seconds after the start of the recording
     carried: Mapping[str, "pd.Series | np.ndarray"] = dataclasses.field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -44,7 +37,7 @@ class Recording:
     """The recorded output of a simulator.
 
     Args:
-        parts: Runs in chronological order, which share columns, interval and clock. There is more than one if there are gaps.
+        parts: Runs in chronological order, which share columns, interval and clock; more than one if there are gaps.
         columns: Names of the columns.
         interval_s: Sampling interval in seconds; 1 (one sample) if the recording has no times.
         start: Zero of the time axis as ISO 8601 text in UTC, or None if the recording has no times.
@@ -70,15 +63,7 @@ class Recording:
         return sum(map(len, self.parts))
 
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Returns what was recorded at given times, as `at`, and refuses all else.
-
-        Args:
-            time_s: Times in seconds after the start of the recording, shape `(samples,)`.
-            scenario: None, because a recording cannot simulate anything else.
-            rng: Not used.
-
-        Returns:
-            float32 array of shape `(samples, columns)`.
+        """Returns what was recorded, as `at`, and refuses all else, see `interface.CoarseSimulator.run`.
 
         Raises:
             InputError: If a scenario is given, or if a time is not covered.
@@ -124,10 +109,7 @@ class Recording:
         return Telemetry(np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name)
 
     def select(self, columns: Sequence[str]) -> "Recording":
-        """Returns the recording with some of its columns, in the given order.
-
-        Args:
-            columns: Names of the columns.
+        """Returns the recording with the named columns, in the given order.
 
         Raises:
             InputError: If a column is missing.

@@ -11,7 +11,7 @@ from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import label_samples
 from enhsim_tf.datasets.places import draw_between, length_limits
-from enhsim_tf.detection.injection import draw_begin, estimate_noise_sd
+from enhsim_tf.detection.anomalies import draw_begin, estimate_noise_sd
 
 if TYPE_CHECKING:
     import pandas as pd

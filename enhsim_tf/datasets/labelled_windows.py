@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, ScheduledMode
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import label_samples, label_windows, write_table, write_timeeval

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.injection import TRIES, draw_begin
+from enhsim_tf.detection.anomalies import TRIES, draw_begin
 from enhsim_tf.simulator.changes import fade_length
 
 if TYPE_CHECKING:

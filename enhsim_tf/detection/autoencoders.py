@@ -35,64 +35,58 @@ class _Autoencoder:
 
 
 class DenseAutoencoder(_Autoencoder):
-    """Anomaly detector that uses the mean squared reconstruction error of a dense autoencoder.
+    """Dense autoencoder with hidden layers of 128 units and a bottleneck of 16.
 
     Args:
-        num_hidden: Number of units in each hidden layer.
-        num_code: Number of units in the bottleneck layer.
         epochs: Number of training epochs.
         seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
     training = {"jit_compile": False}
 
-    def __init__(self, num_hidden: int = 128, num_code: int = 16, epochs: int = 30, seed: int = 0):
-        self.num_hidden, self.num_code, self.epochs, self.seed = num_hidden, num_code, epochs, seed
+    def __init__(self, epochs: int = 30, seed: int = 0):
+        self.epochs, self.seed = epochs, seed
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.training import dense_stack
 
-        return dense_stack(samples, (self.num_hidden, self.num_code, self.num_hidden, samples), seed=self.seed, name="autoencoder")
+        return dense_stack(samples, (128, 16, 128, samples), seed=self.seed, name="autoencoder")
 
     def _reconstruct(self, scaled: np.ndarray) -> np.ndarray:
         return np.asarray(self._network(scaled))
 
 
 class ConvolutionalAutoencoder(_Autoencoder):
-    """Anomaly detector that uses the mean squared reconstruction error of a convolutional autoencoder.
+    """Convolutional autoencoder, which is local and translation-invariant.
 
-    The encoder has two convolutions of stride 4, which compress every sixteen samples to `num_code` numbers. The decoder has
-    the corresponding transposed convolutions. The network is local and translation-invariant.
+    Two convolutions of stride 4 compress every sixteen samples to four numbers, and two transposed convolutions decode them.
 
     Args:
-        filters: Number of filters of the outer convolutions.
-        width: Width of each filter in samples.
-        num_code: Number of channels of the bottleneck layer.
         epochs: Number of training epochs.
         seed: Seed for the initial weights and for the shuffling of the windows.
     """
 
-    stride, training = 4, {"learning_rate": 0.003}
+    training = {"learning_rate": 0.003}
 
-    def __init__(self, filters: int = 16, width: int = 9, num_code: int = 4, epochs: int = 15, seed: int = 0):
-        self.filters, self.width, self.num_code, self.epochs, self.seed = filters, width, num_code, epochs, seed
+    def __init__(self, epochs: int = 15, seed: int = 0):
+        self.epochs, self.seed = epochs, seed
 
     def _build(self, samples: int) -> "keras.Sequential":  # noqa: F821 - Keras is not imported for a type hint
         from enhsim_tf.common.backend import keras
         from enhsim_tf.common.training import seeded_initialiser
 
-        missing = -samples % self.stride**2  # number of zeros that are appended to a window and removed from the output
+        missing = -samples % 16  # number of zeros that are appended to a window and removed from the output
         layers, kernels = keras.layers, [seeded_initialiser("he_uniform", self.seed * 1000 + number) for number in range(4)]
-        options = {"strides": self.stride, "padding": "same"}
+        options = {"kernel_size": 9, "strides": 4, "padding": "same"}
         return keras.Sequential(
             [
                 keras.Input((samples,)),
                 layers.Reshape((samples, 1)),
                 layers.ZeroPadding1D((0, missing)),
-                layers.Conv1D(self.filters, self.width, activation="relu", kernel_initializer=kernels[0], **options),
-                layers.Conv1D(self.num_code, self.width, kernel_initializer=kernels[1], **options),
-                layers.Conv1DTranspose(self.filters, self.width, activation="relu", kernel_initializer=kernels[2], **options),
-                layers.Conv1DTranspose(1, self.width, kernel_initializer=kernels[3], **options),
+                layers.Conv1D(16, activation="relu", kernel_initializer=kernels[0], **options),
+                layers.Conv1D(4, kernel_initializer=kernels[1], **options),
+                layers.Conv1DTranspose(16, activation="relu", kernel_initializer=kernels[2], **options),
+                layers.Conv1DTranspose(1, kernel_initializer=kernels[3], **options),
                 layers.Cropping1D((0, missing)),
                 layers.Reshape((samples,)),
             ],

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.window_features import window_features
 
+_WIDTH = 25  # samples of a moving deviation
 _MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` is fitted
 
 
@@ -30,19 +31,11 @@ def _with_channels(windows: np.ndarray) -> np.ndarray:
 
 
 class LimitCheck:
-    """Limit check, as it is common in ground stations: the distance by which a window leaves the range of the training samples.
-
-    Args:
-        low: Quantile of the training samples that defines the lower limit.
-        high: Quantile of the training samples that defines the upper limit.
-    """
-
-    def __init__(self, low: float = 0.001, high: float = 0.999):
-        self.low, self.high = low, high
+    """Limit check, as it is common in ground stations: the distance by which a window leaves the range of the training samples."""
 
     def fit(self, windows: np.ndarray) -> "LimitCheck":
-        """Computes the limits from nominal windows."""
-        self._limits = np.quantile(windows, [self.low, self.high], axis=(0, 1))
+        """Computes the limits, the quantiles of 0.1 % and 99.9 % of nominal samples."""
+        self._limits = np.quantile(windows, [0.001, 0.999], axis=(0, 1))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -107,18 +100,17 @@ class IsolationForestOnFeatures:
     """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`.
 
     Args:
-        num_trees: Number of trees.
         seed: Seed for the trees.
     """
 
-    def __init__(self, num_trees: int = 200, seed: int = 0):
-        self.num_trees, self.seed = num_trees, seed
+    def __init__(self, seed: int = 0):
+        self.seed = seed
 
     def fit(self, windows: np.ndarray) -> "IsolationForestOnFeatures":
         """Fits the forest to nominal windows."""
         from sklearn.ensemble import IsolationForest
 
-        self._forest = IsolationForest(n_estimators=self.num_trees, random_state=self.seed).fit(features(windows))
+        self._forest = IsolationForest(n_estimators=200, random_state=self.seed).fit(features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -127,23 +119,16 @@ class IsolationForestOnFeatures:
 
 
 class OneClassSVMOnFeatures:
-    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`.
-
-    Args:
-        nu: Upper bound on the share of training windows outside the decision boundary.
-    """
-
-    def __init__(self, nu: float = 0.01):
-        self.nu = nu
+    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`."""
 
     def fit(self, windows: np.ndarray) -> "OneClassSVMOnFeatures":
-        """Fits the decision boundary to nominal windows."""
+        """Fits the decision boundary, which leaves at most 1 % of the nominal windows outside."""
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
         from sklearn.svm import OneClassSVM
 
         with threadpool_limits(1):
-            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=self.nu)).fit(features(windows))
+            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=0.01)).fit(features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -208,14 +193,7 @@ class LargestStep:
 
 
 class MovingDeviation:
-    """Control: the largest moving standard deviation.
-
-    Args:
-        width: Width of the moving window in samples.
-    """
-
-    def __init__(self, width: int = 25):
-        self.width = width
+    """Control: the largest standard deviation of 25 neighbouring samples."""
 
     def fit(self, windows: np.ndarray) -> "MovingDeviation":
         """Does nothing: there is nothing to fit."""
@@ -224,7 +202,7 @@ class MovingDeviation:
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
         centred = np.asarray(windows, np.float64) - np.mean(windows, axis=1, keepdims=True, dtype=np.float64)
-        centred, width = centred.reshape(*windows.shape[:2], -1), min(self.width, windows.shape[1])
+        centred, width = centred.reshape(*windows.shape[:2], -1), min(_WIDTH, windows.shape[1])
         sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0), (0, 0))), axis=2)
         mean, square = (sums[:, :, width:] - sums[:, :, :-width]) / width
         return np.sqrt(np.maximum(square - mean**2, 0).max(axis=(1, 2)))

@@ -9,11 +9,7 @@ from enhsim_tf.common.errors import InputError
 
 @runtime_checkable
 class Detector(Protocol):
-    """An anomaly detector for windows of telemetry.
-
-    A detector does not choose its own threshold. The caller chooses it with `metrics.threshold`, from the scores of
-    held-out windows of the same kind as the training windows.
-    """
+    """An anomaly detector for windows of telemetry. Its threshold is chosen by the caller, with `metrics.threshold`."""
 
     def fit(self, windows: np.ndarray) -> "Detector":
         """Learns what is nominal from windows of shape `(windows, samples)`, and returns the detector."""

@@ -1,8 +1,7 @@
 """Thresholds and performance measures of anomaly detectors, as functions of their scores (title and abstract of the paper).
 
-Higher scores are more anomalous. A score raises an alarm if it is strictly above the threshold. Every threshold of this project
-comes from `threshold`, or from `finite_threshold` where a finite one is needed. Scores are never adjusted by the labels ("point
-adjustment"), because that makes even random scores look good.
+A score raises an alarm if it is strictly above the threshold. Scores are never adjusted by the labels ("point adjustment"), because that
+makes even random scores look good.
 """
 
 import numpy as np

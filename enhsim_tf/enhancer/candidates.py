@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
@@ -22,6 +21,9 @@ _PAPER_RATE = 1e-3  # its initial learning rate, which falls to zero along a cos
 _BATCH_SIZE = 15  # as in the paper
 _NUM_FEATURES = 1_000  # random rectified features
 _NEGLIGIBLE = 0.02  # share of the best candidate's squared error: 1 % of its error
+NUM_FOLDS = 3  # folds of interleaved blocks, so that each fold covers the beginning, the middle and the end of the time
+_MOST_BLOCKS = 9
+_WINDOWS_IN_BLOCK = 3  # preferred minimum length of a block, in windows
 
 Layers = Sequence[tuple[np.ndarray, np.ndarray]]
 """Kernel and bias of each Dense layer."""
@@ -29,20 +31,12 @@ Layers = Sequence[tuple[np.ndarray, np.ndarray]]
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """The error of one candidate on held-out time.
+    """The error of one candidate on held-out time, with standard errors from disjoint stretches of one window each."""
 
-    Args:
-        name: One of `CANDIDATES`.
-        error: Root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all channels.
-        standard_error: Standard error of `error`, from its variation between disjoint stretches of one window each.
-        behind: Mean squared error minus that of the best candidate, divided by the targets' variance.
-        behind_standard_error: Standard error of `behind`, from the same stretches.
-    """
-
-    name: str
-    error: float
+    name: str  # one of `CANDIDATES`
+    error: float  # root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all channels
     standard_error: float
-    behind: float
+    behind: float  # mean squared error minus that of the best candidate, divided by the targets' variance
     behind_standard_error: float
 
     @property
@@ -53,19 +47,12 @@ class Judged:
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """The chosen enhancer.
+    """The chosen enhancer."""
 
-    Args:
-        enhancer: The candidate, fitted to all windows.
-        judged: The held-out error of each candidate that was tried.
-        edges: Edges of the blocks of time; the blocks of fold 0 were held out.
-        without_fold: The chosen candidate as it was judged, fitted without the held-out blocks.
-    """
-
-    enhancer: Enhancer
-    judged: tuple[Judged, ...]
-    edges: np.ndarray
-    without_fold: Enhancer
+    enhancer: Enhancer  # fitted to all windows
+    judged: tuple[Judged, ...]  # the held-out error of each candidate that was tried
+    edges: np.ndarray  # of the blocks of time; the blocks of fold 0 were held out
+    without_fold: Enhancer  # the chosen candidate as it was judged, fitted without the held-out blocks
 
 
 def choose_enhancer(
@@ -131,9 +118,6 @@ def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
 
     Args:
         squared: For each candidate, the mean squared error on each stretch, divided by the targets' variance, shape `(stretches,)`.
-
-    Returns:
-        The comparison of each candidate, in the given order.
     """
     best = min(squared, key=lambda name: np.mean(squared[name]))
     judged = []
@@ -271,3 +255,45 @@ def check_windows(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -
     if not (np.isfinite(inputs).all() and np.isfinite(targets).all()):
         raise InputError("Expected finite windows. Received: NaN or infinite values. Fill or cut them.")
     return inputs, targets, starts
+
+
+def block_edges(begin: int, end: int, window: int) -> np.ndarray:
+    """Cuts the samples from `begin` to before `end` into contiguous blocks of about equal length, on which enhancers are judged.
+
+    Returns:
+        The edges in samples, in ascending order; block `b` covers the samples from `edges[b]` to before `edges[b + 1]`.
+
+    Raises:
+        InputError: If a block would be shorter than a window.
+    """
+    num_blocks = int(np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS))
+    edges = np.linspace(begin, end, num_blocks + 1).round().astype(np.int64)
+    if np.diff(edges).min() < window:
+        raise InputError(
+            f"Expected at least {NUM_FOLDS} windows of {window} samples, one after another. Received: {end - begin} samples. "
+            "Give longer telemetry or a smaller window."
+        )
+    return edges
+
+
+def split_fold(starts: np.ndarray, window: int, edges: np.ndarray, fold: int) -> tuple[np.ndarray, np.ndarray]:
+    """Splits windows, which may overlap, into training windows and held-out windows that share no sample.
+
+    Block `b` is held out if `b % NUM_FOLDS == fold`. A window that lies across the edge of a held-out block is in neither set.
+
+    Args:
+        starts: First sample of each window, shape `(windows,)`, in any order.
+        window: Length of a window in samples.
+        edges: Edges of the blocks, as returned by `block_edges`.
+        fold: Number of the fold, from 0.
+
+    Returns:
+        The indices of the training windows, and the indices of the held-out windows.
+    """
+    starts = np.asarray(starts)
+    inside, touched = np.zeros((2, len(starts)), bool)
+    for block in range(fold, len(edges) - 1, NUM_FOLDS):
+        low, high = edges[block], edges[block + 1]
+        inside |= (starts >= low) & (starts + window <= high)
+        touched |= (starts < high) & (starts + window > low)
+    return np.flatnonzero(~touched), np.flatnonzero(inside)

@@ -85,32 +85,15 @@ class MatchedWindowBootstrap:
         return cls(windows, _segment_means(signal, np.shape(windows)), starts)
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows.
-
-        Args:
-            number: Number of windows.
-            rng: Random number generator.
-            signal: The signal that the noise is added to, shape `(number, samples, channels)`, in the unit of the fit.
-
-        Returns:
-            float32 array of shape `(number, samples, channels)`.
+        """Draws windows, float32 of the shape of `signal`, the signal that the noise is added to, in the unit of the fit.
 
         Raises:
-            InputError: If there is no finite signal of this shape.
+            InputError: If the signal is not finite, or has another shape than `(number, samples, channels)`.
         """
         return self.windows[self._draw(self._nearest(signal, number), rng)]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws a series of any length without seams.
-
-        Args:
-            num_samples: Length of the series.
-            rng: Random number generator.
-            signal: The signal that the noise is added to, shape `(num_samples, channels)`, in the unit of the fit.
-
-        Returns:
-            float32 array of shape `(num_samples, channels)`.
-        """
+        """Draws a series of any length without seams, float32 of the shape of `signal`: `(num_samples, channels)`; see `generate`."""
         window, signal = self.windows.shape[1], _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(np.float32)
 
         def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

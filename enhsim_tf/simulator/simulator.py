@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of

@@ -8,8 +8,7 @@ import numpy as np
 
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhancer.candidates import fit_enhancer
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
+from enhsim_tf.enhancer.candidates import block_edges, fit_enhancer, split_fold
 from studies.battery.errors import about
 from studies.battery.faults import ALL, Fault
 from studies.battery.orbits import ORBIT_SAMPLES

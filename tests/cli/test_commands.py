@@ -17,9 +17,8 @@ from enhsim_tf.__main__ import main
 from enhsim_tf.cli import arguments as commands
 from enhsim_tf.cli.arguments import DETECTORS, parse
 from enhsim_tf.cli.options import channels_by_model, cleaning_options
-from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.degraded import MODES
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
 from enhsim_tf.detection import registry
 from enhsim_tf.detection.anomalies import INJECTIONS
 from enhsim_tf.simulator import fit_many

@@ -66,13 +66,6 @@ def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused)
     assert len(pair) == 1_800 and np.corrcoef(pair.telemetry.values, pair.coarse[:, 0])[0, 1] > 0.9
 
 
-def test_no_delay_is_estimated_without_correlation():
-    telemetry, recording = pair_of(drive(6_000), 0)
-    unrelated = dataclasses.replace(telemetry, values=np.random.default_rng(3).standard_normal(6_000).astype(np.float32))
-    found = estimate_delay([unrelated], recording, 20)
-    assert found.seconds == 0 and found.column is None
-
-
 def test_both_are_cut_to_the_time_they_share():
     telemetry, recording = pair_of(drive(), 0, noise=0)
     recording = dataclasses.replace(recording, start="2024-01-01T00:10:00+00:00", parts=(Run(recording.parts[0].values[60:1_000]),))
@@ -81,14 +74,6 @@ def test_both_are_cut_to_the_time_they_share():
     assert [(pair.telemetry.offset_s, len(pair)) for pair in pairs] == [(600.0, 440), (5_200.0, 480)]
     for pair in pairs:
         np.testing.assert_allclose(pair.telemetry.values, pair.coarse[:, 0], atol=1e-5)
-
-
-def test_samples_between_those_of_the_run_are_interpolated():
-    ramp = np.arange(100.0)
-    recording = Recording((Run(ramp[:, None].astype(np.float32)),), ("ramp",), 10.0, START)
-    telemetry = Telemetry(np.zeros(50, np.float32), 10.0, 4.0, START, "volts")
-    (pair,) = pair_with_recording([telemetry], recording, 1.0)
-    np.testing.assert_allclose(pair.coarse[:, 0], np.arange(50) + 0.3, rtol=1e-5)
 
 
 def test_runs_of_another_time_are_refused(refused):

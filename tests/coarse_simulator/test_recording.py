@@ -7,7 +7,6 @@ import pytest
 from enhsim_tf.coarse_simulator.pairing import pair_with_recording
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.recording_files import read_recording
-from enhsim_tf.telemetry.cleaning.clean import Cleaning
 from enhsim_tf.telemetry.series import Telemetry
 
 
@@ -102,11 +101,6 @@ def test_a_run_without_times_counts_its_samples(written):
     found = read_recording(written(table().drop(columns="time")), ["volts"])
     assert found.start is None and found.interval_s == 1.0 and found.parts[0].offset_s == 0
     assert list(found.parts[0].carried["scenario"])[18:22] == ["nominal", "nominal", "leak", "leak"]
-
-
-def test_local_times_are_converted_as_those_of_telemetry(written):
-    found = read_recording(written(table()), ["volts"], cleaning=Cleaning(timezone="Europe/Berlin"))
-    assert found.start == "2023-12-31T23:00:00+00:00" and list(found.parts[0].carried["scenario"])[19:21] == ["nominal", "leak"]
 
 
 def test_unusable_runs_are_refused(refused, written):

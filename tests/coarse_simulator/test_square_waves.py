@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
-from enhsim_tf.coarse_simulator.period_search import fit_box
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, fit_box, level_offset_and_scale
 from enhsim_tf.telemetry.series import Telemetry
 
 TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
@@ -21,16 +20,13 @@ ONSET = 100  # a quarter of the 400 samples
 def test_square_wave_by_hand():
     wave = SquareWave(period_s=4, low=-1, high=3)
     assert wave(np.array([-4.0, -1, 0, 1, 2, 3, 4, 5.9, 6])).tolist() == [3, -1, 3, 3, -1, -1, 3, 3, -1]
-
-
-def test_phase_is_ahead_and_duty_is_the_high_share():
     wave = SquareWave(period_s=8, phase=0.25, duty=0.75, low=0, high=1)
     # a quarter of a period ahead: the six high samples of eight began two samples ago
     assert wave(np.arange(8.0)).tolist() == [1, 1, 1, 1, 0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("duty", [0.5, 0.3])
-def test_staircase_is_a_quantised_sine(duty):
+def test_staircase_is_a_quantised_sine():
+    duty = 0.3
     cycle = (np.arange(2_000.0) + 0.5) / 2_000
     sine = np.sin(np.interp(cycle, [0, duty, 1], [0, np.pi, 2 * np.pi]))  # half waves whose lengths follow the duty
     staircase = SquareWave(2_000, duty=duty, num_levels=8)(2_000 * cycle)  # levels -1, -5/7 ... 1 for eighths of -1 to 1
@@ -57,15 +53,11 @@ def test_simulator_is_the_sum_of_its_waves(refused):
     first, second = TWO.waves
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
     assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(TIMES).dtype == np.float32
+    assert SquareWaveSimulator.from_config(json.loads(json.dumps(TWO.get_config()))).waves == TWO.waves
     assert TWO.levels == (0.5, 2.0) and TWO.shortest_period_s == 120
     assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):
         SquareWaveSimulator([])
-
-
-def test_configuration_round_trip():
-    config = json.loads(json.dumps(TWO.get_config()))
-    assert SquareWaveSimulator.from_config(config).waves == TWO.waves
 
 
 # the fit
@@ -144,17 +136,16 @@ def test_severity_zero_is_nominal_to_the_bit(mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("severity", [0.3, 1.0])
-def test_nominal_to_the_bit_before_the_onset_and_not_after(mode, severity):
+def test_nominal_to_the_bit_before_the_onset_and_not_after(mode):
     before = TIMES.copy()
-    nominal, degraded = TWO.simulate(TIMES), TWO.simulate(TIMES, Degraded(mode, severity), np.random.default_rng(1))
+    nominal, degraded = TWO.simulate(TIMES), TWO.simulate(TIMES, Degraded(mode, 0.3), np.random.default_rng(1))
     assert degraded.shape == nominal.shape and degraded.dtype == np.float32
     assert degraded[:, :ONSET].tobytes() == nominal[:, :ONSET].tobytes()
     assert (degraded[:, ONSET:] != nominal[:, ONSET:]).any(axis=1).all()
     assert (before == TIMES).all()  # the caller's array is unchanged
 
 
-@pytest.mark.parametrize("onset", [0.0, 0.07, 0.29, 0.57, 0.9])
+@pytest.mark.parametrize("onset", [0.0, 0.29, 0.57])
 def test_onset_is_the_sample_asked_for(onset):
     times = np.arange(100.0)[None]
     values = degrade(lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0), 40.0, np.random.default_rng(0))
@@ -208,12 +199,6 @@ def test_dropout_reads_the_lowest_level_in_runs_of_ten():
         assert np.mean(runs) == pytest.approx(share, abs=5 * np.sqrt(share * (1 - share) / 4_000))
     kept = by_time("dropout", 0.5)
     assert (kept[kept != -1] == TIMES[kept != -1]).all()
-
-
-@pytest.mark.parametrize("mode", ["friction", "dropout"])
-def test_random_modes_use_the_given_generator(mode):
-    first, again, other = (TWO.simulate(TIMES, Degraded(mode), np.random.default_rng(seed)) for seed in (5, 5, 6))
-    assert (first == again).all() and (first != other).any()
 
 
 @pytest.mark.parametrize(

@@ -21,12 +21,12 @@ DETECTORS = {
     "limit check": lambda seed=0: LimitCheck(),
     "PCA residual": lambda seed=0: PCAResidual(seed=seed),
     "nearest neighbours": lambda seed=0: NearestNeighbours(),
-    "isolation forest": lambda seed=0: IsolationForestOnFeatures(num_trees=50, seed=seed),
+    "isolation forest": lambda seed=0: IsolationForestOnFeatures(seed),
     "one-class SVM": lambda seed=0: OneClassSVMOnFeatures(),
-    "dense autoencoder": lambda seed=0, epochs=20: DenseAutoencoder(num_hidden=64, epochs=epochs, seed=seed),
-    "convolutional autoencoder": lambda seed=0, epochs=20: ConvolutionalAutoencoder(epochs=epochs, seed=seed),
+    "dense autoencoder": lambda seed=0, epochs=20: DenseAutoencoder(epochs, seed),
+    "convolutional autoencoder": lambda seed=0, epochs=20: ConvolutionalAutoencoder(epochs, seed),
     "largest step": lambda seed=0: LargestStep(),
-    "moving deviation": lambda seed=0: MovingDeviation(width=20),
+    "moving deviation": lambda seed=0: MovingDeviation(),
     "innovation": lambda seed=0: Innovation(order=20),
 }
 SEEDED = ("isolation forest", "dense autoencoder", "convolutional autoencoder")
@@ -180,8 +180,9 @@ def test_innovation_of_a_channel_that_is_a_copy_of_another_is_finite():
 
 
 def test_limit_check_by_hand():
-    detector = LimitCheck(low=0.25, high=0.75).fit(np.arange(5.0)[None])  # limits 1 and 3
-    assert detector.score(np.array([[2.0, 2.5], [2, 3.5], [-1, 3.5], [1, 3], [9, -9]])).tolist() == [-0.5, 0.5, 2, 0, 10]
+    detector = LimitCheck().fit(np.arange(1_001.0)[None])  # limits 1 and 999
+    windows = np.array([[2.0, 2.5], [2, 999.5], [-1, 999.5], [1, 999], [9, -9]])
+    assert detector.score(windows) == pytest.approx([-1, 0.5, 2, 0, 10])
 
 
 def test_distance_to_the_neighbours_by_hand():
@@ -196,8 +197,7 @@ def test_distance_to_the_neighbours_by_hand():
 def test_controls_by_hand():
     windows = np.array([[0.0, 1, -2, -2], [5, 5, 5, 5]])
     assert LargestStep().fit(windows).score(windows).tolist() == [3, 0]
-    assert MovingDeviation(2).fit(windows).score(windows) == pytest.approx([1.5, 0])
-    assert MovingDeviation(4).fit(windows).score(windows) == pytest.approx(np.std(windows, axis=1))
+    assert MovingDeviation().fit(windows).score(windows) == pytest.approx(np.std(windows, axis=1))
     random = waves(5, 0) + 1e4
     stretches = np.lib.stride_tricks.sliding_window_view(random.astype(np.float64), 25, axis=1)
     assert MovingDeviation().score(random) == pytest.approx(stretches.std(axis=2).max(axis=1))
@@ -225,7 +225,7 @@ def test_pca_residual_is_the_energy_outside_the_span():
 
 def test_autoencoder_scores_in_units_of_the_training_variance():
     training, windows = waves(150, 0), waves(30, 1)
-    plain, stretched = DenseAutoencoder(64, 16, 4).fit(training), DenseAutoencoder(64, 16, 4).fit(-900 + 64 * training)
+    plain, stretched = DenseAutoencoder(4).fit(training), DenseAutoencoder(4).fit(-900 + 64 * training)
     np.testing.assert_allclose(plain.score(windows), stretched.score(-900 + 64 * windows), rtol=0.02)
 
 

@@ -138,8 +138,6 @@ def test_a_signal_of_another_shape_is_refused(refused):
         lambda: noise.generate(3, default_rng(0)),
         lambda: noise.generate(3, default_rng(0), sines(4, 40)),
         lambda: noise.generate_series(90, default_rng(0), np.zeros(80)),
-        lambda: noise.generate(3, default_rng(0), sines(3, 40)[:, :, None]),
-        lambda: MatchedWindowBootstrap.fit(ar1(30, 40), None),
         lambda: MatchedWindowBootstrap(ar1(30, 40), np.zeros((29, 40))),
         lambda: noise.generate(30, default_rng(0), np.full((30, 40), np.nan)),
     ):
