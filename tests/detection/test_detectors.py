@@ -6,29 +6,17 @@ import pytest
 from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAutoencoder
 from enhsim_tf.detection.detectors import (
     Innovation,
-    IsolationForestOnFeatures,
     JointMeans,
     JointSize,
     LargestStep,
     LimitCheck,
     MovingDeviation,
     NearestNeighbours,
-    OneClassSVMOnFeatures,
     PCAResidual,
 )
+from enhsim_tf.detection.registry import all_detectors
 
-DETECTORS = {
-    "limit check": lambda seed=0: LimitCheck(),
-    "PCA residual": lambda seed=0: PCAResidual(seed=seed),
-    "nearest neighbours": lambda seed=0: NearestNeighbours(),
-    "isolation forest": lambda seed=0: IsolationForestOnFeatures(seed),
-    "one-class SVM": lambda seed=0: OneClassSVMOnFeatures(),
-    "dense autoencoder": lambda seed=0, epochs=20: DenseAutoencoder(epochs, seed),
-    "convolutional autoencoder": lambda seed=0, epochs=20: ConvolutionalAutoencoder(epochs, seed),
-    "largest step": lambda seed=0: LargestStep(),
-    "moving deviation": lambda seed=0: MovingDeviation(),
-    "innovation": lambda seed=0: Innovation(order=20),
-}
+DETECTORS = all_detectors()
 SEEDED = ("isolation forest", "dense autoencoder", "convolutional autoencoder")
 MUST_SEE = {  # anomalies that each detector should find; a constant window is not anomalous for a network with a short receptive field
     "limit check": ["spike", "noisy", "shifted"],
@@ -57,42 +45,28 @@ def waves(number, seed, noise_sd=0.1):
     return (5 + np.sin(2 * np.pi * np.arange(100) / 40 + phases) + noise_sd * rng.standard_normal((number, 100))).astype(np.float32)
 
 
-def changed(windows, change):
-    windows = windows.copy()
-    change(windows)
+def anomalous(kind):
+    """Windows of one kind of anomaly."""
+    windows = waves(60, 1, noise_sd=0.4 if kind == "noisy" else 0.1)
+    if kind == "stuck":
+        windows[:, 30:] = windows[:, 30:31]
+    elif kind == "spike":
+        windows[:, 50] += 3
+    elif kind == "shifted":
+        windows[:, 40:70] += 3
     return windows
-
-
-def stick(windows):
-    windows[:, 30:] = windows[:, 30:31]
-
-
-def strike(windows):
-    windows[:, 50] += 3
-
-
-def shift(windows):
-    windows[:, 40:70] += 3
-
-
-ANOMALIES = {
-    "stuck": changed(waves(60, 1), stick),
-    "noisy": waves(60, 2, noise_sd=0.4),
-    "spike": changed(waves(60, 6), strike),
-    "shifted": changed(waves(60, 7), shift),
-}
 
 
 @pytest.fixture(scope="module", params=DETECTORS)
 def fitted(request):
     """The name of a detector, and the detector fitted to 400 nominal windows."""
-    return request.param, DETECTORS[request.param]().fit(waves(400, 0))
+    return request.param, DETECTORS[request.param](0).fit(waves(400, 0))
 
 
-@pytest.mark.parametrize("anomaly", ANOMALIES)
+@pytest.mark.parametrize("anomaly", ["stuck", "noisy", "spike", "shifted"])
 def test_planted_anomalies_are_found(fitted, anomaly):
     name, detector = fitted
-    nominal, scores = detector.score(waves(60, 3)), detector.score(ANOMALIES[anomaly])
+    nominal, scores = detector.score(waves(60, 3)), detector.score(anomalous(anomaly))
     assert scores.shape == nominal.shape == (60,) and np.isfinite(scores).all()
     if anomaly in MUST_SEE[name]:
         assert area(scores, nominal) > 0.95
@@ -106,8 +80,7 @@ def test_nominal_windows_are_not_told_from_nominal_windows(fitted):
 @pytest.mark.parametrize("name", DETECTORS)
 def test_same_seed_same_scores(name):
     training, windows = waves(120, 0), waves(20, 1)
-    options = {"epochs": 1} if "autoencoder" in name else {}
-    first, again, other = (DETECTORS[name](seed, **options).fit(training).score(windows) for seed in (3, 3, 4))
+    first, again, other = (DETECTORS[name](seed).fit(training).score(windows) for seed in (3, 3, 4))
     assert (first == again).all()
     if name in SEEDED:
         assert (first != other).any()
@@ -128,12 +101,12 @@ def both_ways(number, seed, noise_sd=0.1):
 
 @pytest.mark.parametrize("name", [name for name in DETECTORS if "autoencoder" not in name])
 def test_an_anomaly_of_one_channel_of_several_is_found(name):
-    detector = DETECTORS[name]().fit(both_ways(400, 0))
-    nominal, anomalous = both_ways(60, 3), both_ways(60, 4)
+    detector = DETECTORS[name](0).fit(both_ways(400, 0))
+    nominal, changed = both_ways(60, 3), both_ways(60, 4)
     for begin, end in ((50, 51), (60, 90)):
-        anomalous[:, begin:end, 1] += 3
-    anomalous[:, 20:60, 1] += np.random.default_rng(9).standard_normal((60, 40))
-    scores, plain = detector.score(anomalous), detector.score(nominal)
+        changed[:, begin:end, 1] += 3
+    changed[:, 20:60, 1] += np.random.default_rng(9).standard_normal((60, 40))
+    scores, plain = detector.score(changed), detector.score(nominal)
     assert scores.shape == plain.shape == (60,) and area(scores, plain) > 0.95
 
 

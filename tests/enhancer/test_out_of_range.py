@@ -77,17 +77,6 @@ def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitt
     assert outside.min() > inside.max()
 
 
-def test_many_windows_are_scored_in_parts_and_remembered_up_to_a_number(fitted, training, monkeypatch):
-    windows = degraded("stuck", 0.3)[0]
-    whole = fitted.score(windows)
-    monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._CHUNK", 7)
-    np.testing.assert_allclose(fitted.score(windows), whole)
-    assert fitted.score(windows[:0]).shape == (0,)
-    monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._MAX_KEPT", 100)
-    thinned = OutOfRange().fit(training).score(windows)  # with fewer stored windows, the nearest can only be further away
-    assert np.all(thinned >= whole - 1e-9) and np.mean(thinned) < 1.1 * np.mean(whole)
-
-
 def test_what_is_refused(fitted, training, refused):
     with refused("before fit"):
         OutOfRange().score(training)
