@@ -93,21 +93,14 @@ def choose_enhancer(
     variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
     variance = np.where(variance > 0, variance, 1.0)
     fitted: dict[str, Enhancer] = {}
-    penalties: list[float] = []  # chosen once, by blocks of the time that is not held out
     squared: dict[str, np.ndarray] = {}
-
-    def by_stretch(predicted: np.ndarray) -> np.ndarray:
-        errors = np.mean((predicted - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
-        return np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
-
-    def try_candidate(name: str) -> None:
+    penalties: list[float] = []  # chosen once, by blocks of the time that is not held out
+    for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
         on_candidate(name)
         fitted[name] = fit_enhancer(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs, penalties)
         penalties.extend(fitted[name].penalties[len(penalties) :])
-        squared[name] = by_stretch(fitted[name].predict(inputs[held_out]))
-
-    for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
-        try_candidate(name)
+        errors = np.mean((fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
+        squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
     judged = judge(squared)
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
     return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs, penalties), judged, edges, fitted[chosen])
@@ -170,12 +163,8 @@ def fit_enhancer(
     linear, factors, layers = np.zeros(outputs.shape[1]), (), ()
     if name != NETWORK:
         ridge = fit_ridge(rows, outputs, starts, num_channels=channels, chosen=penalties or None)
-        penalties = ridge.chosen
-        maps = list(ridge.factors)
-        moved = ridge.input_mean.ravel()
-        for each in maps:
-            moved = moved @ each
-        linear = ridge.target_mean - moved
+        penalties, maps = ridge.chosen, list(ridge.factors)
+        linear = ridge.target_mean - functools.reduce(np.matmul, maps, ridge.input_mean.ravel())
         maps[0] = maps[0] / column_scale[:, None]
         maps[-1] = maps[-1] * output_unit
         factors = tuple(each.astype(np.float32) for each in maps)

@@ -99,16 +99,6 @@ def test_fit_refuses_a_series_without_a_period(refused):
             SquareWaveSimulator.fit(Telemetry(values.astype(np.float32), name="wheel"))
 
 
-def test_box_of_a_wave_in_units_of_samples():
-    # 7 of 20 samples are high, the first of them sample 15
-    values = np.where(np.mod(np.arange(400) - 15, 20) < 7, 4.0, -1.0)
-    box = fit_box(values)
-    assert (box.low, box.high) == (-1, 4)
-    assert box.frequency == pytest.approx(1 / 20, rel=0.005)
-    assert box.duty == pytest.approx(7 / 20, abs=0.06)  # anything from just over 6 to 7 samples holds the same 7
-    assert box.begin == pytest.approx(15 / 20, abs=0.06)
-
-
 def test_box_finds_the_fundamental_under_a_stronger_harmonic():
     # two short pulses a period, of heights 1 and 0.4: every even harmonic is stronger than the fundamental
     phase = np.arange(4_000) % 100
