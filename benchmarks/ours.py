@@ -62,7 +62,7 @@ def simulator(window: int = 500, hidden_units: int = 3_200) -> EnhancedSimulator
     enhancer = Enhancer(NETWORK, window, 1, 1, np.zeros(1, np.float32), np.zeros(window, np.float32), layers=layers)
     residuals = np.random.default_rng(0).normal(0, 0.1, (1_500, window, 1)).astype(np.float32)
     alignment = Waves([SquareWaveSimulator(waves)], ("telemetry",), 1.0, window)
-    return EnhancedSimulator(alignment, enhancer, WindowBootstrap.fit(residuals), levels=np.array([[0.0, 1.0]]))
+    return EnhancedSimulator(alignment, enhancer, WindowBootstrap(residuals), levels=np.array([[0.0, 1.0]]))
 
 
 def enhance_and_noise(num_windows: int, window: int = 500, hidden_units: int = 3_200) -> Work:

@@ -83,8 +83,7 @@ def _windows_writer(options: argparse.Namespace, scenarios: "Sequence[Degraded]"
 def _series_writer(options: argparse.Namespace, scenarios: "Sequence[Degraded]", seed: int) -> Writer:
     import numpy as np
 
-    from enhsim_tf.coarse_simulator.degraded import Degraded
-    from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+    from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
     from enhsim_tf.datasets.label_columns import write_table
     from enhsim_tf.datasets.labelled_windows import draw_schedule, series_index, series_labelled
     from enhsim_tf.datasets.places import length_limits, parse_length, parse_num_samples, parse_place, parse_start, split_limits

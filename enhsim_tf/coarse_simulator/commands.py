@@ -1,9 +1,8 @@
 """Commands as a coarse run: traces of the commands that explain a channel (step 3 of the pipeline).
 
-A command is one sample long, but its effect lasts. Commands after which the telemetry jumps, such as "on" and "off", are turned into states:
-each is 1 from the command until another command of this kind is sent. Other commands are turned into traces that rise by 1 when the command is
-sent and decay exponentially. Which commands are used, and how fast their traces decay, is chosen by their effect on the telemetry and their
-correlation with it.
+A command is one sample long, but its effect lasts. Commands after which the telemetry jumps, such as "on" and "off", become states: each is 1
+from the command until another of this kind is sent. Other commands become traces that rise by 1 when the command is sent and decay
+exponentially, as fast as suits the telemetry best.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,13 +73,7 @@ class CommandTraces:
         return cls(sorted(chosen)) if chosen else None
 
     def traces(self, commands: np.ndarray) -> np.ndarray:
-        """Computes the coarse columns.
-
-        Args:
-            commands: The commands, shape `(samples, commands)`.
-
-        Returns:
-            float32 array of shape `(samples, traces)`.
+        """Computes the coarse columns, float32 of shape `(samples, traces)`, of commands of shape `(samples, commands)`.
 
         Raises:
             InputError: If there are fewer commands than in the fit.
@@ -93,11 +86,7 @@ class CommandTraces:
         return np.stack(traces, axis=1).astype(np.float32)
 
     def recording(self, commands: np.ndarray) -> Recording:
-        """Returns the coarse run of telemetry without times, whose samples are counted from 0.
-
-        Args:
-            commands: The commands, shape `(samples, commands)`.
-        """
+        """Returns the coarse run of telemetry without times, whose samples are counted from 0; see `traces`."""
         return Recording((Run(self.traces(commands)),), self.columns, name="the commands")
 
     def get_config(self) -> dict[str, Any]:

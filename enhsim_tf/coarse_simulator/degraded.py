@@ -1,7 +1,8 @@
-"""Degraded modes of the coarse simulator (sections 1 and 3 of the paper): simulates components that fail or age."""
+"""Degraded modes of the coarse simulator, for a whole window or for some samples of a series (sections 1 and 3 of the paper)."""
 
 import dataclasses
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,12 +16,7 @@ MODES = {
     "dropout": "random runs of 10 samples, half of all runs at severity 1, read the lowest level",
     "period_change": "every period is multiplied by 1 + `severity`",
 }
-
-
 _DROPOUT_RUN = 10  # samples
-
-
-_NUM_SHIFTS = 100  # time shifts tried in each direction by `synchronise`, in steps of 0.5 % of a period
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,14 +45,8 @@ class Degraded:
             raise InputError(f"Expected 0 <= severity <= 1 and 0 <= onset < 1. Received: {self}.")
 
     def first_sample(self, num_samples: int) -> int:
-        """Sample of a window or series at which the degradation starts.
-
-        The product is rounded before it is truncated, since 0.29 * 100 is 28.999999999999996.
-
-        Args:
-            num_samples: Length of the window or series.
-        """
-        return int(round(self.onset * num_samples, 6))
+        """Sample at which the degradation of a window or series of this length starts."""
+        return int(round(self.onset * num_samples, 6))  # rounded first, since 0.29 * 100 is 28.999999999999996
 
 
 def degrade(
@@ -67,10 +57,9 @@ def degrade(
     shortest_period_s: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Applies a degraded mode to a signal.
+    """Applies a degraded mode to a signal, which is a function of time.
 
-    The signal is given as a function of time. The coarse simulator and, if it is known in closed form, the true vehicle are
-    therefore degraded in the same way by the same scenario and the same state of `rng`.
+    The coarse simulator and a true vehicle that is known in closed form are degraded alike by the same scenario and state of `rng`.
 
     Args:
         signal: The nominal signal, a function from times in seconds to values of the same shape.
@@ -116,3 +105,58 @@ def degrade(
         runs = rng.random((num_windows, -(-after.shape[1] // _DROPOUT_RUN))) < severity / 2
         after[np.repeat(runs, _DROPOUT_RUN, axis=1)[:, : after.shape[1]]] = low
     return values
+
+
+@dataclasses.dataclass(frozen=True)
+class ScheduledMode:
+    """A degraded mode during some samples of a series.
+
+    The mode acts on these samples as on a window with the onset 0, and the signal is nominal after the last of them: a mechanism that was
+    stuck continues at the time that it would have reached without the fault.
+
+    Raises:
+        InputError: If the mode is unknown or a number is out of range.
+    """
+
+    mode: str  # one of `MODES`
+    severity: float  # from 0 to 1
+    begin: int  # first sample
+    length: int  # number of samples
+
+    def __post_init__(self):
+        Degraded(self.mode, self.severity, 0.0)
+        if self.begin < 0 or self.length < 1:
+            raise InputError(f"Expected an event of at least one sample, from sample 0 on. Received: {self}.")
+
+    @property
+    def end(self) -> int:
+        """First sample after the event."""
+        return self.begin + self.length
+
+
+def held_samples(scenario: Degraded | None, num_samples: int) -> tuple[int, int] | None:
+    """Returns the first sample and the end at which a stuck mechanism stands still in a window or series; None if it is not stuck."""
+    if scenario is None or scenario.mode != "stuck" or scenario.severity == 0:
+        return None
+    begin = min(scenario.first_sample(num_samples), num_samples - 1)
+    return begin, begin + int(round(scenario.severity * (num_samples - 1 - begin), 6)) + 1
+
+
+def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[ScheduledMode]:
+    """Returns the events of a schedule in the order of time.
+
+    Raises:
+        InputError: If two events overlap or touch, or one extends beyond the series.
+    """
+    ordered = sorted(schedule, key=lambda event: event.begin)
+    for before, after in itertools.pairwise(ordered):
+        if after.begin <= before.end:
+            raise InputError(
+                f"Expected events with nominal samples between them. Received: {before.mode} until sample {before.end} and {after.mode} from "
+                f"sample {after.begin}. Move one."
+            )
+    if ordered and ordered[-1].end > num_samples:
+        raise InputError(
+            f"Expected events within {num_samples:,} samples. Received: {ordered[-1].mode} until sample {ordered[-1].end}. Move or shorten it."
+        )
+    return ordered

@@ -49,23 +49,14 @@ class FmuSimulator:
         try:
             description = fmpy.read_model_description(str(path))
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions, and those of zip and XML
-            reason = (str(error).splitlines() or [type(error).__name__])[0][:120]
-            raise InputError(f"Expected an FMU. Received: {self.name}, which cannot be read ({reason}). Export it again.") from None
+            raise InputError(f"Expected an FMU. Received: {self.name}, which cannot be read ({_reason(error)}). Export it again.") from None
         self._variables = {variable.name: variable.causality for variable in description.modelVariables}
         self._check_names(self.columns, "output", None)
         self._check_names(self.parameters, "parameter", "parameter")
-        self._check_names(() if commands is None else commands.columns, "input", "input")
+        self._check_names(commands.columns if commands else (), "input", "input")
 
     def run(self, time_s: np.ndarray, scenario: Mapping[str, float] | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates one run from the first to the last time, see `interface.CoarseSimulator.run`.
-
-        Args:
-            time_s: Times in seconds at a regular interval, shape `(samples,)`.
-            scenario: Values of parameters that differ from nominal operation, by name.
-            rng: Not used.
-
-        Returns:
-            float64 array of shape `(samples, columns)`.
+        """Simulates one run, see `interface.CoarseSimulator.run`; a scenario gives other values of parameters by name.
 
         Raises:
             InputError: If a parameter does not exist, the commands do not cover the times, or the simulation fails.
@@ -78,7 +69,7 @@ class FmuSimulator:
             )
         self._check_names(scenario or {}, "parameter", "parameter")
         time_s = np.asarray(time_s, np.float64)
-        step_s = float(np.mean(np.diff(time_s)))
+        step_s, inputs = float(np.mean(np.diff(time_s))), self._inputs(time_s)
         try:
             found = fmpy.simulate_fmu(
                 str(self.path),
@@ -86,15 +77,12 @@ class FmuSimulator:
                 stop_time=time_s[-1],
                 output_interval=step_s,
                 start_values=self.parameters | dict(scenario or {}),
-                input=self._inputs(time_s),
+                input=inputs,
                 output=list(self.columns),
             )
-        except InputError:
-            raise
         except Exception as error:  # noqa: BLE001  FMPy raises plain exceptions for whatever goes wrong in the tool's code
-            reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
             raise InputError(
-                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {reason}. Correct the model."
+                f"Expected {self.name} to simulate {time_s[0]:g} s to {time_s[-1]:g} s. Received: {_reason(error)}. Correct the model."
             ) from None
         places = np.searchsorted(found["time"], time_s + 1e-6 * step_s, "right") - 1  # an FMU may report events in between
         if len(found) < 2 or np.abs(found["time"][places] - time_s).max() > 1e-3 * step_s:
@@ -104,17 +92,19 @@ class FmuSimulator:
         return np.stack([found[name][places] for name in self.columns], axis=1).astype(np.float64)
 
     def _inputs(self, time_s: np.ndarray) -> np.ndarray | None:
+        """The commands at the times of a run, in the form of FMPy."""
         if self.commands is None:
             return None
-        values = self.commands.run(time_s)
-        inputs = np.zeros(len(time_s), [("time", np.float64), *((name, np.float64) for name in self.commands.columns)])
-        inputs["time"] = time_s
-        for number, name in enumerate(self.commands.columns):
-            inputs[name] = values[:, number]
-        return inputs
+        columns = self.commands.run(time_s).astype(np.float64).T
+        return np.rec.fromarrays([time_s, *columns], names=["time", *self.commands.columns])
 
     def _check_names(self, names: Sequence[str] | Mapping[str, Any], kind: str, causality: str | None) -> None:
         for name in names:
             if name not in self._variables or causality not in (None, self._variables[name]):
                 known = [each for each, what in self._variables.items() if causality in (None, what)]
                 raise InputError(f"Expected the name of a variable ({kind}) of {self.name}: {', '.join(known)[:160]}. Received: {name!r}.")
+
+
+def _reason(error: Exception) -> str:
+    """The first line of an exception of FMPy, shortened."""
+    return (str(error).splitlines() or [type(error).__name__])[0][:160]

@@ -1,8 +1,7 @@
 """The interface of coarse simulators: objects that simulate named columns at given times (steps 1 and 2 of the pipeline).
 
-The square waves of `square_waves` have this interface, and so have recorded runs of a user's simulator (`recording`).
-`FunctionSimulator` turns a function into a simulator. An object of any class is a simulator if it has the attribute and the method of
-`CoarseSimulator`.
+Square waves have this interface, and so have recorded runs of a user's simulator (`recording`). `FunctionSimulator` turns a function into a
+simulator. An object of any class is one if it has the attribute and the method of `CoarseSimulator`.
 """
 
 import inspect
@@ -18,8 +17,7 @@ from enhsim_tf.common.errors import InputError
 class CoarseSimulator(Protocol):
     """The interface of a coarse simulator.
 
-    A simulator must apply the scenario or refuse it with an error. One that ignores a scenario would give nominal data under
-    the label of a fault; `simulate` checks this.
+    It must apply a scenario or refuse it: one that is ignored would give nominal data under the label of a fault. `simulate` checks this.
 
     Args:
         columns: Names of the outputs, for example `("voltage", "current")`.
@@ -44,8 +42,8 @@ class FunctionSimulator:
     """A coarse simulator made from a function.
 
     Args:
-        function: Called with the times in seconds, shape `(samples,)`. If it has a parameter `scenario` or `rng`, it receives
-            that too. It returns an array of shape `(samples,)` or `(samples, columns)`.
+        function: Called with the times in seconds, shape `(samples,)`, and with `scenario` and `rng` if it has these parameters. It returns an
+            array of shape `(samples,)` or `(samples, columns)`.
         columns: Names of the outputs.
         name: Name of the simulator in messages. None uses the name of the function.
 
@@ -83,13 +81,7 @@ class FunctionSimulator:
 
 
 def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
-    """Checks the names of a simulator's outputs.
-
-    Args:
-        columns: The names.
-
-    Returns:
-        The names as a tuple.
+    """Returns the names of a simulator's outputs as a tuple.
 
     Raises:
         InputError: If there is none, one is not text, or one occurs twice.
@@ -100,13 +92,7 @@ def check_columns(columns: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def simulate(
-    simulator: CoarseSimulator,
-    time_s: np.ndarray,
-    scenario: Any = None,
-    rng: np.random.Generator | None = None,
-    compare: bool = True,
-) -> np.ndarray:
+def simulate(simulator: CoarseSimulator, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
     """Runs a simulator and checks what it returns.
 
     Args:
@@ -114,14 +100,13 @@ def simulate(
         time_s: Times in seconds, shape `(samples,)`.
         scenario: What differs from nominal operation, or None.
         rng: Random number generator. None: one with seed 0.
-        compare: Whether a run with a scenario is compared with the nominal run, which takes a second run.
 
     Returns:
         float32 array of shape `(samples, columns)`.
 
     Raises:
-        InputError: If the object is no simulator, if it returns another shape, numbers that are not finite, or if the run with
-            a scenario equals the nominal run. A scenario whose attribute `severity` is 0 may equal it.
+        InputError: If the object is no simulator, returns another shape or numbers that are not finite, or if the run with a scenario equals
+            the nominal run, unless the scenario's attribute `severity` is 0.
     """
     name = name_of(simulator)
     if not isinstance(simulator, CoarseSimulator):
@@ -132,7 +117,7 @@ def simulate(
     rng = np.random.default_rng(0) if rng is None else rng
     before = rng.bit_generator.state
     values = _checked(simulator.run(time_s, scenario, rng), name, columns, time_s)
-    if scenario is None or not compare or getattr(scenario, "severity", 1) == 0:
+    if scenario is None or getattr(scenario, "severity", 1) == 0:
         return values
     after, rng.bit_generator.state = rng.bit_generator.state, before
     nominal = _checked(simulator.run(time_s, None, rng), name, columns, time_s)

@@ -1,7 +1,6 @@
 """Brings telemetry and a recorded run of the coarse simulator to one clock (steps 3 and 4 of the pipeline).
 
-The telemetry and the run are cut to the time that they share. A constant delay between them is estimated by cross-correlation,
-unless it is given.
+They are cut to the time that they share. A constant delay between them is estimated by cross-correlation, unless it is given.
 """
 
 import dataclasses
@@ -9,10 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.recording import Recording, seconds_between
+from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.cleaning.report import iso_time
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+from enhsim_tf.telemetry.windows import runs_of
 
 _EQUALLY_GOOD = 0.02  # a maximum with at least 1 - 0.02 of the largest squared correlation is as good; the nearest to 0 is taken
 _LEAST_CORRELATION = 0.1  # below this correlation at every delay, no delay is estimated
@@ -21,12 +21,7 @@ _LEAST_SHARE = 0.5  # a delay is considered only if at least this share of the s
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Pair:
-    """A contiguous stretch of telemetry with the coarse run of the same time.
-
-    Args:
-        telemetry: The telemetry.
-        coarse: The coarse run, delayed, float32 of shape `(samples, columns)`.
-    """
+    """A contiguous stretch of telemetry with the coarse run of the same time, delayed, float32 of shape `(samples, columns)`."""
 
     telemetry: Telemetry
     coarse: np.ndarray
@@ -34,31 +29,15 @@ class Pair:
     def __len__(self) -> int:
         return len(self.telemetry)
 
-    @property
-    def first(self) -> int:
-        """Number of the first sample on the common clock of all pairs."""
-        return round(self.telemetry.offset_s / self.telemetry.interval_s)
-
-    def part(self, start: int, stop: int) -> "Pair":
-        """The samples from `start` up to, but not including, `stop`."""
-        return Pair(self.telemetry.part(start, stop), self.coarse[start:stop])
-
 
 @dataclasses.dataclass(frozen=True)
 class Delay:
-    """A constant delay between the coarse run and the telemetry.
+    """A constant delay between the coarse run and the telemetry."""
 
-    Args:
-        seconds: How much later the telemetry is, in seconds, or in samples if there are no times.
-        column: The coarse column that it was estimated from; None if it was not estimated.
-        correlation: Correlation of that column with the telemetry at this delay.
-        undelayed: The same without a delay.
-    """
-
-    seconds: float
-    column: str | None = None
-    correlation: float = float("nan")
-    undelayed: float = float("nan")
+    seconds: float  # how much later the telemetry is; in samples if there are no times
+    column: str | None = None  # the coarse column that it was estimated from; None if it was not estimated
+    correlation: float = float("nan")  # of that column with the telemetry at this delay
+    undelayed: float = float("nan")  # the same without a delay
 
 
 def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_s: float = 0.0, least_samples: int = 2) -> list[Pair]:
@@ -76,11 +55,11 @@ def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_
     Raises:
         InputError: If the two share no time, or no stretch is long enough.
     """
-    shift_s = seconds_between(parts[0], recording.clock()) + delay_s
+    shift_s = _seconds_between(parts[0], recording) + delay_s
     pairs, longest = [], 0
     for part in parts:
         values = recording.at(part.time_s - shift_s)
-        for first, stop in stretches(np.isfinite(values).all(axis=1)):
+        for first, stop in runs_of(np.isfinite(values).all(axis=1)):
             longest = max(longest, stop - first)
             if stop - first >= least_samples:
                 pairs.append(Pair(part.part(first, stop), values[first:stop]))
@@ -93,7 +72,8 @@ def pair_with_recording(parts: Sequence[Telemetry], recording: Recording, delay_
     if not longest:
         raise InputError(
             f"Expected a coarse run that overlaps the telemetry in time. Received: {_span(parts, 0.0)} for {parts[0].name}, "
-            f"{_span_of(recording, shift_s)} for {recording.name}, in seconds after the telemetry's start. Record the same time, or give --delay."
+            f"{_span(list(map(recording.clock, recording.parts)), shift_s)} for {recording.name}, in seconds after the telemetry's start. "
+            "Record the same time, or give --delay."
         )
     if not pairs:
         raise InputError(
@@ -107,22 +87,24 @@ def _span(parts: Sequence[Telemetry], shift_s: float) -> str:
     return f"{parts[0].offset_s + shift_s:.6g} to {parts[-1].time_s[-1] + shift_s:.6g}"
 
 
-def _span_of(recording: Recording, shift_s: float) -> str:
-    return _span([recording.clock(part) for part in recording.parts], shift_s)
-
-
-def stretches(marks: np.ndarray) -> list[tuple[int, int]]:
-    """Returns the start and the end (exclusive) of each run of True in an array."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(marks, np.int8), [0]])))
-    return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
+def _seconds_between(telemetry: Telemetry, recording: Recording) -> float:
+    """Returns how many seconds the zero of the recording's clock is after that of the telemetry; 0 if neither has times."""
+    clock = recording.clock()
+    if telemetry.has_time != clock.has_time:
+        with_times, without = (telemetry, clock) if telemetry.has_time else (clock, telemetry)
+        raise InputError(
+            f"Expected times in both the telemetry and the coarse run, or in neither. Received: {with_times.name} with times, "
+            f"{without.name} without. Name the time columns, or `none` for both."
+        )
+    zeros = [int(nanoseconds(dataclasses.replace(each, offset_s=0.0), 0, 1)[0]) for each in (telemetry, clock)]
+    return float(zeros[1] - zeros[0]) / 1e9
 
 
 def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples: int) -> Delay:
     """Estimates a constant delay by cross-correlation.
 
-    Each coarse column is correlated with the telemetry at all delays, and the column with the largest squared correlation is
-    used. Among local maxima that are about as high as the highest, the one nearest to no delay is taken, because a periodic
-    signal has a maximum in every period.
+    The coarse column with the largest squared correlation at any delay is used. Among its local maxima that are about as high as the
+    highest, the one nearest to no delay is taken, because a periodic signal has a maximum in every period.
 
     Args:
         parts: Contiguous parts of telemetry on one clock.
@@ -142,7 +124,7 @@ def estimate_delay(parts: Sequence[Telemetry], recording: Recording, max_samples
     for place, part in zip(places, parts, strict=True):
         telemetry[place : place + len(part)] = part.values
     time_s = parts[0].offset_s + interval_s * np.arange(len(telemetry))
-    coarse = recording.at(time_s - seconds_between(parts[0], recording.clock())).astype(np.float64)
+    coarse = recording.at(time_s - _seconds_between(parts[0], recording)).astype(np.float64)
     longest = max(max_samples, len(telemetry) // 4)
     delays = np.arange(-longest, longest + 1)
     found = np.stack([_correlation(telemetry, coarse[:, column], delays) for column in range(coarse.shape[1])])

@@ -1,7 +1,6 @@
 """Recorded runs of a user's simulator: several columns on one clock (step 3 of the pipeline, "which is also recorded").
 
-A recording has the interface of a coarse simulator: it returns the recorded values at given times, and refuses times that it does not
-cover.
+A recording has the interface of a coarse simulator; it refuses scenarios, and times that it does not cover.
 """
 
 import dataclasses
@@ -12,7 +11,7 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, check_columns, name_of, simulate
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.telemetry.series import Telemetry, nanoseconds
+from enhsim_tf.telemetry.series import Telemetry
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,16 +22,10 @@ _TOLERANCE = 1e-3  # in intervals: a time this far outside a part still belongs 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """A regularly sampled run without gaps.
+    """A regularly sampled run without gaps; `carried` are columns that are no inputs, such as `scenario`, with a value per sample each."""
 
-    Args:
-        values: float32 array of shape `(samples, columns)`.
-        offset_s: Time of the first sample in seconds after the start of the recording.
-        carried: Further columns, which are no inputs of the enhancer, such as `scenario`: one value per sample each.
-    """
-
-    values: np.ndarray
-    offset_s: float = 0.0
+    values: np.ndarray  # float32 of shape `(samples, columns)`
+    offset_s: float = 0.0  # time of the first sample in seconds after the start of the recording
     carried: Mapping[str, "pd.Series | np.ndarray"] = dataclasses.field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -44,7 +37,7 @@ class Recording:
     """The recorded output of a simulator.
 
     Args:
-        parts: Runs in chronological order, which share columns, interval and clock. There is more than one if there are gaps.
+        parts: Runs in chronological order, which share columns, interval and clock; more than one if there are gaps.
         columns: Names of the columns.
         interval_s: Sampling interval in seconds; 1 (one sample) if the recording has no times.
         start: Zero of the time axis as ISO 8601 text in UTC, or None if the recording has no times.
@@ -70,15 +63,7 @@ class Recording:
         return sum(map(len, self.parts))
 
     def run(self, time_s: np.ndarray, scenario: Any = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Returns what was recorded at given times, interpolated linearly between samples.
-
-        Args:
-            time_s: Times in seconds after the start of the recording, shape `(samples,)`.
-            scenario: None, because a recording cannot simulate anything else.
-            rng: Not used.
-
-        Returns:
-            float32 array of shape `(samples, columns)`.
+        """Returns what was recorded, as `at`, and refuses all else, see `interface.CoarseSimulator.run`.
 
         Raises:
             InputError: If a scenario is given, or if a time is not covered.
@@ -98,7 +83,7 @@ class Recording:
         return values
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """Returns what was recorded at given times, and NaN where nothing was.
+        """Returns what was recorded at given times, interpolated linearly between samples, and NaN where nothing was.
 
         Args:
             time_s: Times in seconds after the start of the recording, shape `(samples,)`.
@@ -119,15 +104,12 @@ class Recording:
         return values
 
     def clock(self, part: Run | None = None) -> Telemetry:
-        """Returns a series with the times of a part, or of the start of the recording, whose values mean nothing."""
+        """Returns a series with the times of a part, or of the recording's start, whose values mean nothing."""
         length, offset_s = (1, 0.0) if part is None else (len(part), part.offset_s)
         return Telemetry(np.zeros(length, np.float32), self.interval_s, offset_s, self.start, self.name)
 
     def select(self, columns: Sequence[str]) -> "Recording":
-        """Returns the recording with some of its columns, in the given order.
-
-        Args:
-            columns: Names of the columns.
+        """Returns the recording with the named columns, in the given order.
 
         Raises:
             InputError: If a column is missing.
@@ -176,26 +158,3 @@ def record(
     carried = {name: np.broadcast_to(np.asarray(value), len(time_s)) for name, value in (labels or {}).items()}
     run = Run(values, float(time_s[0]), carried)
     return Recording((run,), tuple(simulator.columns), float(steps.mean()), start, name_of(simulator))
-
-
-def seconds_between(first: Telemetry, second: Telemetry) -> float:
-    """Returns how many seconds the zero of one clock is after the zero of another.
-
-    Args:
-        first: A series on the first clock.
-        second: A series on the second clock.
-
-    Returns:
-        `second.start - first.start` in seconds; 0 if neither series has times.
-
-    Raises:
-        InputError: If only one of the two has times.
-    """
-    if first.has_time != second.has_time:
-        with_times, without = (first, second) if first.has_time else (second, first)
-        raise InputError(
-            f"Expected times in both the telemetry and the coarse run, or in neither. Received: {with_times.name} with times, "
-            f"{without.name} without. Name the time columns, or `none` for both."
-        )
-    starts = [nanoseconds(dataclasses.replace(each, offset_s=0.0), 0, 1)[0] for each in (first, second)]
-    return float(starts[1] - starts[0]) / 1e9

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from enhsim_tf.coarse_simulator.pairing import stretches
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.errors import InputError, printable
 from enhsim_tf.telemetry.cleaning.clean import Cleaned, Cleaning, clean
@@ -24,6 +23,7 @@ from enhsim_tf.telemetry.reading.files import read_table
 from enhsim_tf.telemetry.registry import FILES
 from enhsim_tf.telemetry.series import Telemetry, nanoseconds
 from enhsim_tf.telemetry.sources import Source, read_source
+from enhsim_tf.telemetry.windows import runs_of
 
 _TABLES = tuple(ending for ending, reader in FILES.items() if reader.endswith(":read_table_channels"))
 _QUIET = ("constant", "stuck", "quantised", "changing level")
@@ -57,23 +57,21 @@ def read_recording(
     Raises:
         InputError: If the source cannot be read, a column is missing, or the columns have no time in common.
     """
-    cleaning, name = cleaning or Cleaning(), _name_of(source)
+    cleaning, name = cleaning or Cleaning(), "the coarse run"
+    if not isinstance(source, pd.DataFrame | pd.Series):
+        name = printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
     if cleaning.same_time is None:
         cleaning = dataclasses.replace(cleaning, same_time="last")
-    repaired = [] if columns is None else _compare_columns(source, columns, name, cleaning)
+    notes = [] if columns is None else _compare_columns(source, columns, name, cleaning)
     given = read_source(source, columns, time, cleaning)
     raw, stepped = _at_equal_steps(given, interval_s, cleaning)
-    names = list(raw)
-    cleaned = {each: clean(raw[each], cleaning) for each in names}
-    own_s = cleaned[names[0]].report.interval_s
-    has_time = cleaned[names[0]].longest.has_time
-    notes = repaired + [
-        f"{name}, {each}: {finding.text}"
-        for each in names
-        for finding in cleaned[each].report.findings
-        if finding.kind not in _QUIET and finding.action != "accepted"
-    ]
-    notes += [f"{name}: {finding.text}" for finding in cleaned[names[0]].report.findings if finding.kind in _NO_INPUTS]
+    names, cleaned = list(raw), {each: clean(raw[each], cleaning) for each in raw}
+    first = cleaned[names[0]].report
+    own_s, has_time = first.interval_s, cleaned[names[0]].longest.has_time
+    for each, found in cleaned.items():
+        kept = (finding for finding in found.report.findings if finding.kind not in _QUIET and finding.action != "accepted")
+        notes += [f"{name}, {each}: {finding.text}" for finding in kept]
+    notes += [f"{name}: {finding.text}" for finding in first.findings if finding.kind in _NO_INPUTS]
     notes += [f"{name}: {stepped}"] if stepped else []
     grid_s = own_s if interval_s is None else float(interval_s)
     if not has_time and grid_s != 1.0:
@@ -85,35 +83,25 @@ def read_recording(
         notes.append(f"{name}: a sample every {own_s:g} s, averaged to one every {grid_s:g} s")
     elif own_s > (1 + SAME_RATE) * grid_s:
         notes.append(f"{name}: a sample every {own_s:g} s, interpolated to one every {grid_s:g} s")
-    base, values = _on_one_grid(cleaned, grid_s, name)
-    kept = stretches(np.isfinite(values).all(axis=1))
-    kept = [(first, stop) for first, stop in kept if stop - first >= 2]
-    if not kept:
+    base, values = _on_one_grid(cleaned, grid_s)
+    shared = [(begin, end) for begin, end in runs_of(np.isfinite(values).all(axis=1)) if end - begin >= 2]
+    if not shared:
         raise InputError(
             f"Expected coarse columns that share some time. Received: {', '.join(names)[:120]} in {name} without any. Fill the gaps."
         )
-    if len(kept) > 1:
-        notes.append(f"{name}: gaps, at which the run is split into {len(kept)} parts")
-    carried = _carried(source, names, given[names[0]], cleaning)
+    if len(shared) > 1:
+        notes.append(f"{name}: gaps, at which the run is split into {len(shared)} parts")
+    cells, offset_s = _carried(source, names, given[names[0]], cleaning), 0.0 if has_time else base / 1e9
     parts = []
-    for first, stop in kept:
-        rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(first, stop), cleaning) if carried else None
-        parts.append(
-            Run(values[first:stop], grid_s * first, {each: cells.iloc[rows].reset_index(drop=True) for each, cells in carried.items()})
-        )
+    for begin, end in shared:
+        rows = _nearest_rows(given[names[0]], base, grid_s, np.arange(begin, end), cleaning) if len(cells.columns) else []
+        carried = {each: cells[each].iloc[rows].reset_index(drop=True) for each in cells}
+        parts.append(Run(values[begin:end], grid_s * begin + offset_s, carried))
     clock = cleaned[names[0]].report.find("clock")
     counts = bool(clock is not None and clock.details.get("counts"))
     shift_ns = 0 if start is None else _start_ns(start, counts, name)
-    offset_s = 0.0 if has_time else base / 1e9
-    parts = tuple(dataclasses.replace(part, offset_s=part.offset_s + offset_s) for part in parts)
-    begin = iso_time(base + shift_ns) if has_time else None
-    return Recording(parts, tuple(names), grid_s, begin, name, tuple(printable(note) for note in notes), counts and start is None)
-
-
-def _name_of(source: Source) -> str:
-    if isinstance(source, pd.DataFrame | pd.Series):
-        return "the coarse run"
-    return printable(Path(os.fspath(source if isinstance(source, str | os.PathLike) else source[0])).name)
+    zero = iso_time(base + shift_ns) if has_time else None
+    return Recording(tuple(parts), tuple(names), grid_s, zero, name, tuple(map(printable, notes)), counts and start is None)
 
 
 def _start_ns(start: str, counts: bool, name: str) -> int:
@@ -121,7 +109,7 @@ def _start_ns(start: str, counts: bool, name: str) -> int:
         raise InputError(
             f"Expected start (--coarse-start) with times that count from zero. Received: {name}, which has dates or no times. Leave it out."
         )
-    return int(nanoseconds(Telemetry(np.zeros(1, np.float32), start=start), 0, 1)[0])
+    return _begin_ns(Telemetry(np.zeros(1, np.float32), start=start))
 
 
 def _at_equal_steps(raw: Mapping[str, pd.Series], interval_s: float | None, cleaning: Cleaning) -> tuple[dict[str, pd.Series], str]:
@@ -190,35 +178,29 @@ def _compare_columns(source: Source, columns: Sequence[str], name: str, cleaning
     return [f"{name}: columns in another order than in the fit, matched by their names"] if places != sorted(places) else []
 
 
-def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float, name: str) -> tuple[int, np.ndarray]:
+def _on_one_grid(cleaned: Mapping[str, Cleaned], grid_s: float) -> tuple[int, np.ndarray]:
     """Returns the time of the first grid point in nanoseconds, and all columns on the grid, NaN where a column has a gap."""
-    begins = [int(nanoseconds(each.parts[0], 0, 1)[0]) for each in cleaned.values()]
-    base = min(begins)
-    spans = []
-    for each in cleaned.values():
-        for part in each.parts:
-            first_s = (int(nanoseconds(part, 0, 1)[0]) - base) / 1e9
-            spans.append(first_s + part.interval_s * (len(part) - 1))
-    values = np.full((int(np.floor(max(spans) / grid_s + 1e-3)) + 1, len(cleaned)), np.nan, np.float32)
-    times = grid_s * np.arange(len(values))
-    for number, each in enumerate(cleaned.values()):
-        for part in each.parts:
-            first_s = (int(nanoseconds(part, 0, 1)[0]) - base) / 1e9
-            position = (times - first_s) / part.interval_s
-            nearest = np.round(position)
-            position = np.where(np.abs(position - nearest) < 1e-3, nearest, position)  # samples on the grid stay unchanged
-            inside = (position >= 0) & (position <= len(part) - 1)
-            values[inside, number] = np.interp(position[inside], np.arange(len(part)), part.values)
-    return base, values
+    base = min(_begin_ns(each.parts[0]) for each in cleaned.values())
+    columns = []
+    for name, each in cleaned.items():
+        runs = tuple(Run(part.values[:, None], (_begin_ns(part) - base) / 1e9) for part in each.parts)
+        columns.append(Recording(runs, (name,), each.parts[0].interval_s))
+    end_s = max(each.parts[-1].offset_s + each.interval_s * (len(each.parts[-1]) - 1) for each in columns)
+    times = grid_s * np.arange(int(np.floor(end_s / grid_s + 1e-3)) + 1)
+    return base, np.concatenate([each.at(times) for each in columns], axis=1)
 
 
-def _carried(source: Source, names: Sequence[str], model: pd.Series, cleaning: Cleaning) -> dict[str, pd.Series]:
-    """Returns the raw columns of a table that are neither inputs nor times, by name."""
+def _begin_ns(part: Telemetry) -> int:
+    return int(nanoseconds(part, 0, 1)[0])
+
+
+def _carried(source: Source, names: Sequence[str], model: pd.Series, cleaning: Cleaning) -> pd.DataFrame:
+    """Returns the raw columns of a table that are neither inputs nor times."""
     table = _table_of(source, cleaning)
     if table is None:
-        return {}
+        return pd.DataFrame()
     others = [name for name in table.columns if name not in (*names, model.index.name) and not name.startswith(("column ", "Unnamed: "))]
-    return {name: table[name].reset_index(drop=True) for name in others}
+    return table[others]
 
 
 def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, cleaning: Cleaning) -> np.ndarray:
@@ -233,8 +215,5 @@ def _nearest_rows(raw: pd.Series, base: int, grid_s: float, places: np.ndarray, 
     order = np.argsort(times, kind="stable")
     rows, times = rows[order], times[order]
     wanted = base + np.round(places * grid_s * 1e9).astype(np.int64)
-    after = np.clip(np.searchsorted(times, wanted), 1, max(1, len(times) - 1))
-    if len(times) == 1:
-        return np.full(len(wanted), rows[0])
-    nearer = np.where(wanted - times[after - 1] <= times[after] - wanted, after - 1, after)
-    return rows[nearer]
+    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)  # a run has at least two samples
+    return rows[np.where(wanted - times[after - 1] <= times[after] - wanted, after - 1, after)]

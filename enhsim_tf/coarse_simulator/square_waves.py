@@ -1,18 +1,22 @@
-"""The coarse simulator, steps 1 and 2 of the paper's pipeline.
+"""The coarse simulator, steps 1 and 2 of the paper's pipeline: a sum of square waves, or one constant level, and the fit to telemetry.
 
-"A square wave can be used for nearly any periodic waveform" (paper, section 1): the simulator is a sum of square waves, which
-are configured by hand or fitted to telemetry. It does not use a neural network.
+"A square wave can be used for nearly any periodic waveform" (paper, section 1). A wave is found by box least squares (Kovacs, Zucker and Mazeh
+2002): the series is folded at each trial frequency, and the box that explains the most variance is found from cumulative sums.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import _NUM_SHIFTS, Degraded, degrade
-from enhsim_tf.coarse_simulator.period_search import Box, fit_box
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, degrade
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.series import Telemetry, check_telemetry
+
+_NUM_BINS = 200  # bins of a folded period
+_NUM_PEAKS = 12  # highest peaks of the periodogram that are used as trial frequencies
+_OVERSAMPLING = 4  # frequency oversampling of the periodogram
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,8 +72,7 @@ class SquareWaveSimulator:
         InputError: If `waves` is empty.
 
     Example:
-    >>> orbit = SquareWave(period_s=480, low=-0.5, high=0.5)
-    >>> rotation = SquareWave(period_s=120, low=-0.25, high=0.25)
+    >>> orbit, rotation = SquareWave(period_s=480, low=-0.5, high=0.5), SquareWave(period_s=120, low=-0.25, high=0.25)
     >>> SquareWaveSimulator([orbit, rotation]).simulate(np.arange(500.0)[None]).shape
     (1, 500)
     """
@@ -88,7 +91,7 @@ class SquareWaveSimulator:
 
     @property
     def is_constant(self) -> bool:
-        """Whether the simulator has no shape at all, as `constant_level.ConstantLevel`."""
+        """Whether the simulator has no shape at all, as `ConstantLevel`."""
         return False
 
     @property
@@ -101,15 +104,12 @@ class SquareWaveSimulator:
         return sum(wave(time_s) for wave in self.waves)
 
     def simulate(self, time_s: np.ndarray, scenario: Degraded | None = None, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Simulates windows.
+        """Simulates windows, float32 of shape `(windows, samples)`.
 
         Args:
             time_s: Times in seconds, shape `(windows, samples)`.
             scenario: A degraded mode, or None for nominal behaviour.
             rng: Random number generator, used by `friction` and `dropout`. None: a generator with seed 0.
-
-        Returns:
-            float32 array of shape `(windows, samples)`.
         """
         rng = np.random.default_rng(0) if rng is None else rng
         return degrade(self, np.asarray(time_s, np.float64), scenario, self.levels, self.shortest_period_s, rng).astype(np.float32)
@@ -119,57 +119,20 @@ class SquareWaveSimulator:
         return self.simulate(np.asarray(time_s, np.float64)[None], scenario, rng)[0][:, None]
 
     @classmethod
-    def fit(cls, telemetry: Telemetry, max_waves: int = 1, min_explained: float = 0.05, num_levels: int = 2) -> "SquareWaveSimulator":
-        """Fits square waves to telemetry by least squares, one after another, each to the residual of the previous ones.
+    def fit(cls, telemetry: Telemetry) -> "SquareWaveSimulator":
+        """Fits one square wave to telemetry by least squares.
 
         Args:
             telemetry: The series, at least two periods long.
-            max_waves: Largest number of square waves. One suits most channels; further waves usually fit harmonics rather than
-                further mechanisms.
-            min_explained: Smallest fraction of the series' variance that each wave after the first must explain.
-            num_levels: Number of levels of each wave. The fit itself uses two levels.
-
-        Returns:
-            The fitted simulator.
 
         Raises:
             InputError: If `telemetry` is not a `Telemetry`, or no period is found.
         """
         check_telemetry(telemetry)
-        residual = telemetry.values.astype(np.float64)
-        variance, waves = residual.var(), []
-        while len(waves) < max_waves:
-            box = fit_box(residual, telemetry.name)
-            wave, explained = cls._wave_of(box, telemetry), box.explained
-            if explained < min_explained * variance and waves:
-                break
-            residual = residual - wave(telemetry.time_s)
-            waves.append(dataclasses.replace(wave, num_levels=num_levels))
-        return cls(waves)
-
-    @staticmethod
-    def _wave_of(box: Box, telemetry: Telemetry) -> SquareWave:
+        box = fit_box(telemetry.values.astype(np.float64), telemetry.name)
         period_s = telemetry.interval_s / box.frequency
         phase = np.mod(-box.begin - telemetry.offset_s / period_s, 1.0)  # relative to the zero of the series' time axis
-        return SquareWave(period_s, float(phase), box.duty, box.low, box.high)
-
-    def synchronise(self, time_s: np.ndarray, windows: np.ndarray) -> np.ndarray:
-        """Shifts the simulator's time for each window so that its phase matches the telemetry. Only the time is changed.
-
-        A simulator that runs in parallel with a vehicle is synchronised to the vehicle's clock; a free-running one drifts away.
-
-        Args:
-            time_s: Times of the windows in seconds, shape `(windows, samples)`.
-            windows: Telemetry at these times, same shape.
-
-        Returns:
-            Shifted times, same shape, at which the nominal signal correlates best with each window.
-        """
-        time_s, centred = np.asarray(time_s, np.float64), windows - windows.mean(axis=1, keepdims=True)
-        longest_s = max(wave.period_s for wave in self.waves)
-        shifts = np.linspace(-0.5, 0.5, 2 * _NUM_SHIFTS + 1) * longest_s
-        agreement = [np.sum(self(time_s + shift) * centred, axis=1) for shift in shifts]
-        return time_s + shifts[np.argmax(agreement, axis=0)][:, None]
+        return cls([SquareWave(period_s, float(phase), box.duty, box.low, box.high)])
 
     def get_config(self) -> dict:
         """The settings as plain JSON types, from which `from_config` restores the simulator."""
@@ -181,14 +144,132 @@ class SquareWaveSimulator:
         return cls([SquareWave(**wave) for wave in config["waves"]])
 
 
-def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
-    """Computes the normalisation of a coarse simulator.
+class ConstantLevel(SquareWaveSimulator):
+    """A constant level for channels without a shape that repeats, in the form of a square wave whose two levels are equal.
+
+    Everything else that the telemetry does is noise to it, so its enhanced simulator generates noise around levels that occurred.
+    The degraded modes of the sensor, `drift` and `dropout`, change it. Those of a mechanism do not, because nothing moves; but in a
+    series, telemetry that is stuck no longer follows the levels of the record.
 
     Args:
-        coarse: The simulator.
+        level: The level, in the unit of the telemetry.
+        spread: Standard deviation of the telemetry, above 0. Degraded modes take `level - spread` and `level + spread` as the
+            lowest and the highest level.
+        period_s: A time without meaning, for code that expects a period.
 
-    Returns:
-        `(offset, scale)`, so that `(values - offset) / scale` maps the lowest level to -1 and the highest to 1.
+    Raises:
+        InputError: If a number is not finite, or if the spread or the period is not above 0.
     """
+
+    columns = ("constant level",)
+
+    def __init__(self, level: float, spread: float, period_s: float = 1.0):
+        if not (np.isfinite([level, spread]).all() and spread > 0):
+            raise InputError(f"Expected a finite level and a spread above 0. Received: level={level}, spread={spread}.")
+        super().__init__([SquareWave(period_s, low=float(level), high=float(level))])
+        self.level, self.spread = float(level), float(spread)
+
+    @property
+    def is_constant(self) -> bool:
+        """True: no window of this simulator has a shape."""
+        return True
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Lowest and highest level for degraded modes and units."""
+        return self.level - self.spread, self.level + self.spread
+
+    def get_config(self) -> dict:
+        """The settings as plain JSON types, from which `waves_or_level` restores the simulator."""
+        return {"level": self.level, "spread": self.spread, "period_s": self.waves[0].period_s}
+
+
+def waves_or_level(config: Mapping[str, Any]) -> SquareWaveSimulator:
+    """Restores a simulator from the output of `get_config`: a constant level, or square waves."""
+    return ConstantLevel(**config) if "level" in config else SquareWaveSimulator.from_config(config)
+
+
+def level_offset_and_scale(coarse: SquareWaveSimulator) -> tuple[float, float]:
+    """Returns `(offset, scale)`, so that `(values - offset) / scale` maps the lowest level of a simulator to -1 and the highest to 1."""
     low, high = coarse.levels
     return (low + high) / 2, (high - low) / 2 or 1.0
+
+
+def simulate_schedule(
+    coarse: SquareWaveSimulator, time_s: np.ndarray, schedule: Sequence[ScheduledMode], rng: np.random.Generator
+) -> np.ndarray:
+    """Simulates a series that equals the nominal run outside of events, which do not overlap.
+
+    Args:
+        coarse: The coarse simulator.
+        time_s: Times in seconds, shape `(samples,)`.
+        schedule: The events, in the order of time.
+        rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
+
+    Returns:
+        float32 array of shape `(samples,)`.
+    """
+    values = coarse.simulate(time_s[None])[0]
+    for event in schedule:
+        inside = slice(event.begin, event.end)
+        values[inside] = coarse.simulate(time_s[None, inside], Degraded(event.mode, event.severity, 0.0), rng)[0]
+    return values
+
+
+class Box(NamedTuple):
+    """A fitted square wave: one box per cycle, in units of samples."""
+
+    frequency: float  # cycles per sample
+    begin: float  # phase at which the box begins, from 0 to 1, where sample 0 has phase 0
+    duty: float  # fraction of the cycle inside the box
+    low: float  # mean of the series outside the box
+    high: float  # mean of the series inside the box
+
+
+def fit_box(values: np.ndarray, name: str = "the series") -> Box:
+    """Fits a square wave to a series of shape `(samples,)` by least squares; `name` is for the message.
+
+    Raises:
+        InputError: If the series has no period that can be found.
+    """
+    centred, num_samples = values - values.mean(), len(values)
+    index = np.arange(num_samples, dtype=np.float64)
+
+    # trial frequencies: peaks of the periodogram, and one half and one third of each, since harmonics may be stronger than the
+    # fundamental
+    power = np.abs(np.fft.rfft(centred, _OVERSAMPLING * num_samples)) ** 2
+    power[: 2 * _OVERSAMPLING] = 0  # a period must occur at least twice
+    peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
+    peaks = peaks[np.argsort(power[peaks])[::-1][:_NUM_PEAKS]]
+    trials = {peak / (_OVERSAMPLING * num_samples) / divisor for peak in peaks for divisor in (1, 2, 3)}
+    trials = sorted(trial for trial in trials if 2 / num_samples <= trial <= 0.25)
+    if not trials:
+        raise InputError(
+            f"Expected something periodic, at least two periods of at least four samples. Received: {name}, in which no period was found."
+        )
+
+    # refine the frequency until a step moves the last cycle by less than a thousandth of a period
+    best = max(trials, key=lambda trial: _best_box(index * trial, centred)[0])
+    step = 1 / (_OVERSAMPLING * num_samples)
+    while step * num_samples > 1e-3:
+        best = max(best + step * np.arange(-4, 5), key=lambda trial: _best_box(index * trial, centred)[0])
+        step /= 3
+    _, begin, duty = _best_box(index * best, centred)
+    inside = np.mod(index * best - begin, 1.0) < duty
+    return Box(float(best), begin, duty, float(values[~inside].mean()), float(values[inside].mean()))
+
+
+def _best_box(cycles: np.ndarray, centred: np.ndarray) -> tuple[float, float, float]:
+    """Finds the best box of the series folded at `cycles`; returns (explained variance, begin, duty) of the box."""
+    bins = (np.mod(cycles, 1.0) * _NUM_BINS).astype(np.int64)
+    counts = np.bincount(bins, minlength=_NUM_BINS)
+    sums = np.bincount(bins, centred, minlength=_NUM_BINS)
+    totals = np.concatenate([[0], np.cumsum(np.tile(sums, 2))])
+    numbers = np.concatenate([[0], np.cumsum(np.tile(counts, 2))])
+    begin, width = np.arange(_NUM_BINS)[:, None], np.arange(1, _NUM_BINS)[None]
+    total, number = totals[begin + width] - totals[begin], numbers[begin + width] - numbers[begin]
+    rest = len(centred) - number
+    with np.errstate(divide="ignore", invalid="ignore"):
+        explained = np.where((number > 0) & (rest > 0) & (total > 0), total**2 / number + total**2 / rest, 0) / len(centred)
+    row, column = np.unravel_index(np.argmax(explained), explained.shape)
+    return float(explained[row, column]), float(row / _NUM_BINS), float((column + 1) / _NUM_BINS)

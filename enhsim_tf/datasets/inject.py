@@ -14,8 +14,7 @@ from enhsim_tf.coarse_simulator.recording import Recording
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import series_table
 from enhsim_tf.datasets.places import Place, draw_between, length_limits, parse_length, parse_place
-from enhsim_tf.detection.anomalies import INJECTIONS
-from enhsim_tf.detection.injection import Anomaly, check_kind, draw_begin, estimate_noise_sd, inject_anomalies
+from enhsim_tf.detection.anomalies import INJECTIONS, Anomaly, check_kind, draw_begin, estimate_noise_sd, inject_anomalies
 from enhsim_tf.telemetry.series import Telemetry
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ class InjectOptions:
         at: Anomalies at given places, `KIND[:SEVERITY]@BEGIN/LENGTH`. BEGIN is a sample number or a time. The severity is drawn if it
             is not given.
         gap: Least number of samples between a drawn anomaly and any other. None: the length of the longest drawn anomaly.
-        noise_sd: Standard deviation of the noise, in the unit of the channel. None: `injection.estimate_noise_sd`.
+        noise_sd: Standard deviation of the noise, in the unit of the channel. None: `anomalies.estimate_noise_sd`.
         seed: Random seed. Each channel draws from its own generator, which depends on the seed and the name of the channel.
 
     Raises:
@@ -94,7 +93,7 @@ def inject_channel(parts: Sequence[Telemetry], options: InjectOptions) -> "pd.Da
 
     Returns:
         A data frame with the index of `sources.to_series` and the columns `value` and `label_columns.LABELS`. `frame.attrs` holds
-        `noise_sd`, and `anomalies`, a list of `injection.Anomaly` in the order of time. Samples that are not marked keep the value
+        `noise_sd`, and `anomalies`, a list of `anomalies.Anomaly` in the order of time. Samples that are not marked keep the value
         of the telemetry.
 
     Raises:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.common.atomic_files import make_folder, replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import parquet_options, series_table, window_schema, window_table
 from enhsim_tf.datasets.places import parse_start
-from enhsim_tf.detection.injection import TRIES, draw_begin
+from enhsim_tf.detection.anomalies import TRIES, draw_begin
 from enhsim_tf.simulator.changes import fade_length
 
 if TYPE_CHECKING:

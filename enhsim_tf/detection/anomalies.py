@@ -1,28 +1,31 @@
-"""Synthetic anomalies that are injected into nominal windows, to evaluate detectors (title and abstract of the paper).
+"""Synthetic anomalies that are injected into nominal windows and series, to evaluate detectors (title and abstract of the paper).
 
-The severity of an anomaly is stated in units of the standard deviation of the noise. The position of an anomaly is the first
-random number that is drawn. The same seed therefore gives the same positions for every kind and severity, so that detectors
-are always compared on the same windows.
+The severity of an anomaly is stated in units of the standard deviation of the noise. Its position is drawn first, so that the same seed
+gives the same positions for every kind and severity, and detectors are always compared on the same windows.
 
-Each kind of anomaly is a function. Its arguments are the samples to change, of shape `(windows, duration)`, the severity in
-the unit of the telemetry, the mean of each whole window, of shape `(windows, 1)`, and a random number generator. It returns
-the changed samples.
+Each kind is a function of the samples to change, shape `(windows, duration)`, the severity in the unit of the telemetry, the mean of each
+whole window, shape `(windows, 1)`, and a random number generator. It returns the changed samples. `inject` changes each of many windows;
+`inject_anomalies` changes one series, which may consist of parts with gaps between them.
 """
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
 
-SEVERITIES = (0.5, 1.0, 2.0, 4.0, 8.0)
-"""Severities of the experiments, in units of the standard deviation of the noise."""
-
-DURATIONS = (25, 100, 250)
-"""Durations of the experiments, in samples."""
-
+SEVERITIES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the experiments, in units of the standard deviation of the noise
+DURATIONS = (25, 100, 250)  # of the experiments, in samples
 SPIKE_INTERVAL = 25  # number of samples from one spike of an anomaly to the next
 OSCILLATION_PERIOD = 20  # in samples; shorter than the shortest duration, and much shorter than the periods of the telemetry
+TRIES = 100  # drawn places of an anomaly, before the series is said to have no place where it changes a sample
+_NORMAL_MAD = 1.482602218505602  # standard deviation of a normal distribution, in units of its median absolute deviation
+
+
+def _sides(pieces: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Draws a sign, -1 or 1, for each window."""
+    return rng.choice([-1.0, 1.0], (len(pieces), 1))
 
 
 def _spike(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -44,10 +47,7 @@ def _ramp(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Ge
 
 
 def _stuck(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Simulates a stuck sensor: holds each value until the true value differs by more than the severity, and then takes that value.
-
-    An infinite severity holds the first value throughout.
-    """
+    """Simulates a stuck sensor: holds each value until the true one differs by more than the severity; if infinite, throughout."""
     changed = pieces.copy()
     for place in range(1, pieces.shape[1]):
         held = changed[:, place - 1]
@@ -66,18 +66,12 @@ def _oscillation(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.ra
 
 
 def _dropout(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Simulates the loss of a signal: replaces all samples by a constant, which lies below the first sample by the severity.
-
-    Unlike for the other kinds, a severity of 0 changes the samples: it holds the first value.
-    """
+    """Simulates the loss of a signal: a constant, below the first sample by the severity. A severity of 0 holds the first value."""
     return np.repeat(pieces[:, :1] - size, pieces.shape[1], axis=1)
 
 
 def _gain(pieces: np.ndarray, size: float, centre: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Amplifies the deviations from the mean of the window, such that the root mean square of the change is the severity.
-
-    Samples that all equal the mean are not changed.
-    """
+    """Amplifies the deviations from the mean of the window, such that the root mean square of the change is the severity."""
     deviation = pieces - centre
     square = np.mean(deviation**2, axis=1, keepdims=True)
     return pieces + size * deviation / np.sqrt(np.where(square > 0, square, 1))
@@ -96,6 +90,18 @@ INJECTIONS: dict[str, Callable[[np.ndarray, float, np.ndarray, np.random.Generat
 """Maps each kind of anomaly to the function that changes the samples."""
 
 
+def check_kind(kind: str, severity: float) -> None:
+    """Checks a kind of anomaly and its severity.
+
+    Raises:
+        InputError: If the kind is unknown, or the severity is not a number of at least 0. Only `stuck` may be infinite.
+    """
+    if kind not in INJECTIONS:
+        raise InputError(f"Expected a kind of anomaly, one of: {', '.join(INJECTIONS)}. Received: {kind!r}. Name one of these.")
+    if not severity >= 0 or (severity == np.inf and kind != "stuck"):
+        raise InputError(f"Expected a severity of 0 or more, which may be infinite only for stuck. Received: {kind} at {severity}.")
+
+
 def inject(
     windows: np.ndarray, kind: str, severity: float, duration: int, noise_sd: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -107,61 +113,25 @@ def inject(
         severity: Severity of the anomaly, in units of `noise_sd`.
         duration: Duration of the anomaly, in samples.
         noise_sd: Standard deviation of the noise, in the unit of the telemetry.
-        rng: Random number generator. Positions are drawn first, so that the same state gives the same positions for every
-            kind and severity.
+        rng: Random number generator. The same state gives the same positions for every kind and severity.
 
     Returns:
-        `(anomalous, mask)`: float32 windows, and a boolean array that marks the anomalous samples. Both have the shape of
-        `windows`.
+        The float32 windows, and a boolean array that marks the anomalous samples, both of the shape of `windows`.
 
     Raises:
         InputError: If the kind is unknown, if the anomaly is longer than a window, or if the severity is negative.
     """
-    _check(kind, severity, duration, windows.shape[1])
+    check_kind(kind, severity)
+    if not 1 <= duration <= windows.shape[1]:
+        raise InputError(f"Expected a duration of 1 to {windows.shape[1]} samples. Received: duration={duration}.")
     begins = rng.integers(0, windows.shape[1] - duration + 1, len(windows))
-    return _put(windows, np.arange(len(windows))[:, None], begins[:, None] + np.arange(duration), kind, severity * noise_sd, rng)
+    return put_anomalies(windows, np.arange(len(windows))[:, None], begins[:, None] + np.arange(duration), kind, severity * noise_sd, rng)
 
 
-def inject_into_trace(
-    trace: np.ndarray, kind: str, severity: float, duration: int, noise_sd: float, num_ranges: int, gap: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """Injects anomalies of one kind into a continuous trace, at positions drawn uniformly from all possible arrangements.
-
-    Args:
-        trace: Nominal telemetry, shape `(samples,)`. It is not modified.
-        kind: Kind of the anomalies, a key of `INJECTIONS`.
-        severity: Severity of the anomalies, in units of `noise_sd`.
-        duration: Duration of each anomaly, in samples.
-        noise_sd: Standard deviation of the noise, in the unit of the telemetry.
-        num_ranges: Number of anomalies.
-        gap: Minimum number of nominal samples between two anomalies, before the first and after the last.
-        rng: Random number generator. Positions are drawn first.
-
-    Returns:
-        `(anomalous, labels)`: the float32 trace, and a boolean array that marks the anomalous samples. Both have the shape of
-        `trace`.
-
-    Raises:
-        InputError: If the kind is unknown, if the anomalies do not fit into the trace, or if the severity is negative.
-    """
-    _check(kind, severity, duration, len(trace))
-    free = len(trace) - num_ranges * (duration + gap) - gap
-    if free < 0 or num_ranges < 1:
-        raise InputError(
-            f"Expected at least one anomaly, and a trace of at least {len(trace) - free} samples. "
-            f"Received: num_ranges={num_ranges} and {len(trace)} samples."
-        )
-    steps = np.sort(rng.choice(free + num_ranges, num_ranges, replace=False))  # an arrangement, with each anomaly shrunk to one sample
-    begins = gap + steps + np.arange(num_ranges) * (duration + gap - 1)
-    rows, columns = np.zeros((num_ranges, 1), int), begins[:, None] + np.arange(duration)
-    anomalous, labels = _put(np.asarray(trace)[None], rows, columns, kind, severity * noise_sd, rng)
-    return anomalous[0], labels[0]
-
-
-def _put(
+def put_anomalies(
     windows: np.ndarray, rows: np.ndarray, columns: np.ndarray, kind: str, size: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Changes the samples at `columns` of the windows `rows`, and returns the changed windows and the mask."""
+    """Changes the samples at `columns` of the windows `rows`; returns the changed windows and the mask, as `inject`."""
     means = np.mean(windows, axis=1, dtype=np.float64)
     pieces = INJECTIONS[kind](np.asarray(windows[rows, columns], np.float64), size, means[rows], rng)
     anomalous, mask = np.array(windows, np.float32), np.zeros(windows.shape, bool)
@@ -170,16 +140,171 @@ def _put(
     return anomalous, mask
 
 
-def _sides(pieces: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Draws a sign, -1 or 1, for each window."""
-    return rng.choice([-1.0, 1.0], (len(pieces), 1))
+@dataclasses.dataclass(frozen=True)
+class Anomaly:
+    """An anomaly at a place in a series.
+
+    Raises:
+        InputError: If the kind is unknown or a number is out of range.
+    """
+
+    kind: str  # a key of `INJECTIONS`
+    severity: float  # in units of the standard deviation of the noise; it may be infinite for `stuck`
+    begin: int  # first sample
+    length: int  # number of samples
+
+    def __post_init__(self):
+        check_kind(self.kind, self.severity)
+        if self.begin < 0 or self.length < 1:
+            raise InputError(f"Expected an anomaly of at least one sample, from sample 0 on. Received: {self}.")
+
+    @property
+    def end(self) -> int:
+        """First sample after the anomaly."""
+        return self.begin + self.length
 
 
-def _check(kind: str, severity: float, duration: int, samples: int) -> None:
-    """Checks the arguments of `inject` and `inject_into_trace`."""
-    if kind not in INJECTIONS:
-        raise InputError(f"Expected one of {', '.join(INJECTIONS)}. Received: kind={kind!r}.")
-    if not 1 <= duration <= samples:
-        raise InputError(f"Expected a duration of 1 to {samples} samples. Received: duration={duration}.")
-    if not severity >= 0 or (severity == np.inf and kind != "stuck"):
-        raise InputError(f"Expected a severity of 0 or more, which may be infinite only for kind='stuck'. Received: severity={severity}.")
+def estimate_noise_sd(parts: Sequence[np.ndarray]) -> float:
+    """Estimates the standard deviation of the noise of a smooth signal from its second differences.
+
+    The second difference of white noise with the standard deviation s has the standard deviation s * sqrt(6), which is estimated by the
+    median absolute deviation, so that jumps of the signal do not count (Gasser, Sroka and Jennen-Steinmetz 1986, with a robust scale). If
+    more than half of the differences are zero, as in telemetry with few levels, their root mean square is used instead. Noise that is
+    correlated between neighbouring samples is underestimated.
+
+    Args:
+        parts: The series, or the parts between its gaps, each of shape `(samples,)`.
+
+    Returns:
+        The standard deviation in the unit of the series. It is 0 if no part has a second difference other than 0.
+    """
+    differences = np.concatenate([np.zeros(0), *(np.diff(np.asarray(part, np.float64), 2) for part in parts if len(part) > 2)])
+    if not len(differences):
+        return 0.0
+    robust = _NORMAL_MAD * np.median(np.abs(differences))
+    return float((robust or np.sqrt(np.mean(differences**2))) / np.sqrt(6))
+
+
+def inject_anomalies(
+    parts: Sequence[np.ndarray],
+    given: Sequence[Anomaly],
+    drawn: Sequence[tuple[str, float, int]],
+    noise_sd: float,
+    gap: int,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray, list[Anomaly]]:
+    """Injects anomalies into a series. They do not overlap, and none extends over a gap of the series.
+
+    Drawn anomalies are placed one after the other, the longest first, each uniformly among all places that are free. A place where the
+    anomaly would change no sample is drawn again: for example, `stuck` changes nothing where the telemetry is constant.
+
+    Args:
+        parts: The nominal series, or the parts between its gaps, each of shape `(samples,)`. They are not modified.
+        given: Anomalies at given places. Samples are counted over all parts.
+        drawn: Kind, severity and length of each anomaly whose place is drawn.
+        noise_sd: Standard deviation of the noise, in the unit of the series.
+        gap: Least number of samples between a drawn anomaly and any other.
+        rng: Random number generator.
+
+    Returns:
+        `(values, mask, anomalies)`: the float32 series of all parts, a boolean array that marks exactly the changed samples, both of
+        shape `(samples,)`, and the anomalies in the order of time, with `begin` and `length` of the samples that have changed.
+
+    Raises:
+        InputError: If anomalies overlap, lie outside a part, do not fit, or change no sample.
+    """
+    edges = np.concatenate([[0], np.cumsum([len(part) for part in parts])]).tolist()
+    bounds = list(zip(edges[:-1], edges[1:], strict=True))
+    nominal = np.concatenate([np.asarray(part, np.float32) for part in parts])
+    values = nominal.copy()
+    taken: list[tuple[int, int]] = []
+    found: list[Anomaly] = []
+
+    def put(anomaly: Anomaly) -> bool:
+        """Whether an anomaly changes the series; then it is kept."""
+        changed = _put_one(values, nominal, anomaly, bounds, noise_sd, rng)
+        if changed is not None:
+            taken.append((anomaly.begin, anomaly.end))
+            found.append(changed)
+        return changed is not None
+
+    for anomaly in sorted(given, key=lambda each: each.begin):
+        _check_place(anomaly, bounds, taken)
+        if not put(anomaly):
+            raise InputError(
+                f"Expected an anomaly that changes the telemetry. Received: {_text(anomaly)}, which changes no sample. "
+                "Choose another place, a longer one or a higher severity."
+            )
+    for kind, severity, length in sorted(drawn, key=lambda each: -each[2]):
+        if not any(put(Anomaly(kind, severity, draw_begin(bounds, taken, length, gap, rng), length)) for _ in range(TRIES)):
+            raise InputError(
+                f"Expected a place where the anomaly changes a sample. Received: {kind} at {severity:g} sd over {length} samples, which changes "
+                f"none at {TRIES} drawn places. Leave it out, or give it a higher severity or a greater length."
+            )
+    return values, values != nominal, sorted(found, key=lambda each: each.begin)
+
+
+def _put_one(
+    values: np.ndarray, nominal: np.ndarray, anomaly: Anomaly, bounds: Sequence[tuple[int, int]], noise_sd: float, rng: np.random.Generator
+) -> Anomaly | None:
+    """Changes the samples of an anomaly and returns the anomaly as it is, or None if no sample has changed."""
+    start, stop = next(each for each in bounds if each[0] <= anomaly.begin < each[1])
+    here, nominal_here = slice(anomaly.begin, anomaly.end), nominal[anomaly.begin : anomaly.end]
+    columns = np.arange(anomaly.begin - start, anomaly.end - start)[None]
+    with np.errstate(over="ignore"):
+        changed, _ = put_anomalies(
+            nominal[None, start:stop], np.zeros((1, 1), int), columns, anomaly.kind, anomaly.severity * noise_sd, rng
+        )
+    values[here] = changed[0, columns[0]]
+    if not np.isfinite(values[here]).all():
+        raise InputError(f"Expected anomalies within the range of float32. Received: {_text(anomaly)}. Choose a lower severity.")
+    places = np.flatnonzero(values[here] != nominal_here)
+    if not len(places):
+        return None
+    return dataclasses.replace(anomaly, begin=anomaly.begin + int(places[0]), length=int(places[-1] - places[0]) + 1)
+
+
+def draw_begin(bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]], length: int, gap: int, rng: np.random.Generator) -> int:
+    """Draws the first sample of an event uniformly from all samples at which it fits.
+
+    Args:
+        bounds: First sample and end of each part of the series. An event lies within one part.
+        taken: First sample and end of each event that is placed already.
+        length: Number of samples of the event.
+        gap: Least number of samples between two events.
+        rng: Random number generator.
+
+    Raises:
+        InputError: If the event fits nowhere.
+    """
+    places = [np.zeros(0, np.int64)]
+    for start, stop in bounds:
+        begin = start
+        for first, end in [*sorted(each for each in taken if start <= each[0] < stop), (stop + gap, stop)]:
+            places.append(np.arange(begin, first - gap - length + 1))
+            begin = end + gap
+    free = np.concatenate(places)
+    if not len(free):
+        raise InputError(
+            f"Expected room for events that do not overlap. Received: {bounds[-1][1]:,} samples, in which {len(taken)} events are placed and "
+            f"{length} samples with a gap of {gap} on each side are nowhere free. Ask for fewer or shorter ones."
+        )
+    return int(free[rng.integers(len(free))])
+
+
+def _check_place(anomaly: Anomaly, bounds: Sequence[tuple[int, int]], taken: Sequence[tuple[int, int]]) -> None:
+    """Checks that an anomaly lies within one part and overlaps no other."""
+    if not any(start <= anomaly.begin and anomaly.end <= stop for start, stop in bounds):
+        raise InputError(
+            f"Expected an anomaly within a part of the telemetry, of {len(bounds)} parts with {bounds[-1][1]:,} samples. "
+            f"Received: {_text(anomaly)}. Choose a place that no gap and no end cuts."
+        )
+    for first, end in taken:
+        if anomaly.begin < end and first < anomaly.end:
+            raise InputError(
+                f"Expected anomalies that do not overlap. Received: {_text(anomaly)}, and another from sample {first} to {end}. Move one."
+            )
+
+
+def _text(anomaly: Anomaly) -> str:
+    return f"{anomaly.kind} at {anomaly.severity:g} sd from sample {anomaly.begin} to {anomaly.end}"

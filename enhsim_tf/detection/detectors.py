@@ -1,14 +1,16 @@
 """Anomaly detectors without neural networks, and trivial detectors as controls (title and abstract of the paper).
 
-All detectors have the interface `Detector`: `fit(windows)` takes nominal windows, and `score(windows)` returns one score for each
-window, where higher is more anomalous. Windows have the shape `(windows, samples)` or `(windows, samples, channels)`; several channels are
-given in units of their standard deviations. `registry` lists all detectors by name.
+All have the interface `Detector`. Windows have the shape `(windows, samples)` or `(windows, samples, channels)`; several channels are given in
+units of their standard deviations. `registry` lists all detectors by name.
 """
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.common.window_features import window_features
+
+_WIDTH = 25  # samples of a moving deviation
+_MOST_ROWS = 40_000  # samples from which the linear prediction of `Innovation` is fitted
 
 
 def flat(windows: np.ndarray) -> np.ndarray:
@@ -29,26 +31,15 @@ def _with_channels(windows: np.ndarray) -> np.ndarray:
 
 
 class LimitCheck:
-    """Limit check, as it is common in ground stations: the distance by which a window leaves the range of the training samples.
-
-    Args:
-        low: Quantile of the training samples that defines the lower limit.
-        high: Quantile of the training samples that defines the upper limit.
-    """
-
-    def __init__(self, low: float = 0.001, high: float = 0.999):
-        self.low, self.high = low, high
+    """Limit check, as it is common in ground stations: the distance by which a window leaves the range of the training samples."""
 
     def fit(self, windows: np.ndarray) -> "LimitCheck":
-        """Computes the limits from nominal windows."""
-        self._limits = np.quantile(windows, [self.low, self.high], axis=(0, 1))
+        """Computes the limits, the quantiles of 0.1 % and 99.9 % of nominal samples."""
+        self._limits = np.quantile(windows, [0.001, 0.999], axis=(0, 1))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns the largest distance outside the limits, in the unit of the telemetry.
-
-        The score of a window within the limits is negative: its magnitude is the remaining margin.
-        """
+        """Returns the largest distance outside the limits, in the unit of the telemetry; within them, minus the remaining margin."""
         beyond = np.maximum(self._limits[0] - windows.min(axis=1), windows.max(axis=1) - self._limits[1])
         return beyond if windows.ndim == 2 else beyond.max(axis=1)
 
@@ -109,18 +100,17 @@ class IsolationForestOnFeatures:
     """Isolation forest (Liu, Ting and Zhou 2008) on the fourteen features of `window_features`.
 
     Args:
-        num_trees: Number of trees.
         seed: Seed for the trees.
     """
 
-    def __init__(self, num_trees: int = 200, seed: int = 0):
-        self.num_trees, self.seed = num_trees, seed
+    def __init__(self, seed: int = 0):
+        self.seed = seed
 
     def fit(self, windows: np.ndarray) -> "IsolationForestOnFeatures":
         """Fits the forest to nominal windows."""
         from sklearn.ensemble import IsolationForest
 
-        self._forest = IsolationForest(n_estimators=self.num_trees, random_state=self.seed).fit(features(windows))
+        self._forest = IsolationForest(n_estimators=200, random_state=self.seed).fit(features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -129,23 +119,16 @@ class IsolationForestOnFeatures:
 
 
 class OneClassSVMOnFeatures:
-    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`.
-
-    Args:
-        nu: Upper bound on the share of training windows outside the decision boundary.
-    """
-
-    def __init__(self, nu: float = 0.01):
-        self.nu = nu
+    """One-class support vector machine (Schölkopf 2001) on the standardised features of `window_features`."""
 
     def fit(self, windows: np.ndarray) -> "OneClassSVMOnFeatures":
-        """Fits the decision boundary to nominal windows."""
+        """Fits the decision boundary, which leaves at most 1 % of the nominal windows outside."""
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
         from sklearn.svm import OneClassSVM
 
         with threadpool_limits(1):
-            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=self.nu)).fit(features(windows))
+            self._machine = make_pipeline(StandardScaler(), OneClassSVM(nu=0.01)).fit(features(windows))
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -157,8 +140,7 @@ class OneClassSVMOnFeatures:
 class JointMeans:
     """Mahalanobis distance of the means of all channels in equal parts of a window.
 
-    A small change of one channel against the others is large where the channels hardly move apart otherwise. The covariance is not
-    shrunk: shrinkage hides just these small differences.
+    A small change of one channel against the others is large where they hardly move apart otherwise; shrinkage of the covariance would hide it.
 
     Args:
         num_parts: Number of parts of a window.
@@ -198,30 +180,11 @@ class JointSize:
         return np.maximum(*(scale.score(windows) / unit for scale, unit in zip(self._scales, self._units, strict=True)))
 
 
-class RandomScore:
-    """Control: random scores, independent of the windows. Each call continues the random sequence.
-
-    Args:
-        seed: Seed for the scores.
-    """
-
-    def __init__(self, seed: int = 0):
-        self._rng = np.random.default_rng(seed)
-
-    def fit(self, windows: np.ndarray) -> "RandomScore":
-        """Does nothing, because this control has no parameters to fit."""
-        return self
-
-    def score(self, windows: np.ndarray) -> np.ndarray:
-        """Returns random numbers that are uniformly distributed between 0 and 1."""
-        return self._rng.random(len(windows))
-
-
 class LargestStep:
     """Control: the largest absolute first difference. Anomalies that it finds are trivial to detect (Wu and Keogh 2021)."""
 
     def fit(self, windows: np.ndarray) -> "LargestStep":
-        """Does nothing, because this control has no parameters to fit."""
+        """Does nothing: there is nothing to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
@@ -230,23 +193,16 @@ class LargestStep:
 
 
 class MovingDeviation:
-    """Control: the largest moving standard deviation.
-
-    Args:
-        width: Width of the moving window in samples.
-    """
-
-    def __init__(self, width: int = 25):
-        self.width = width
+    """Control: the largest standard deviation of 25 neighbouring samples."""
 
     def fit(self, windows: np.ndarray) -> "MovingDeviation":
-        """Does nothing, because this control has no parameters to fit."""
+        """Does nothing: there is nothing to fit."""
         return self
 
     def score(self, windows: np.ndarray) -> np.ndarray:
         """Returns the largest moving standard deviation of each window, in the unit of the telemetry."""
         centred = np.asarray(windows, np.float64) - np.mean(windows, axis=1, keepdims=True, dtype=np.float64)
-        centred, width = centred.reshape(*windows.shape[:2], -1), min(self.width, windows.shape[1])
+        centred, width = centred.reshape(*windows.shape[:2], -1), min(_WIDTH, windows.shape[1])
         sums = np.cumsum(np.pad([centred, centred**2], ((0, 0), (0, 0), (1, 0), (0, 0))), axis=2)
         mean, square = (sums[:, :, width:] - sums[:, :, :-width]) / width
         return np.sqrt(np.maximum(square - mean**2, 0).max(axis=(1, 2)))
@@ -260,17 +216,16 @@ class Innovation:
 
     Args:
         order: Number of past samples of each channel; less in short windows.
-        most_rows: Number of samples from which it is fitted at most.
     """
 
-    def __init__(self, order: int = 48, most_rows: int = 40_000):
-        self.order, self.most_rows = order, most_rows
+    def __init__(self, order: int = 48):
+        self.order = order
 
     def fit(self, windows: np.ndarray) -> "Innovation":
         """Fits the prediction and the covariance of its errors to nominal windows."""
         values = _with_channels(windows)
         self._mean, order = values.mean(axis=(0, 1)), max(1, min(self.order, values.shape[1] // 4))
-        number = max(1, self.most_rows // (values.shape[1] - order))
+        number = max(1, _MOST_ROWS // (values.shape[1] - order))
         centred = (values - self._mean)[np.linspace(0, len(values) - 1, min(number, len(values))).astype(int)]
         view = np.lib.stride_tricks.sliding_window_view(centred, order + 1, axis=1)  # (windows, places, channels, order + 1)
         past = view[..., :-1].reshape(-1, centred.shape[2] * order)

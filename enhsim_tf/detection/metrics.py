@@ -1,8 +1,7 @@
 """Thresholds and performance measures of anomaly detectors, as functions of their scores (title and abstract of the paper).
 
-Higher scores are more anomalous. A score raises an alarm if it is strictly above the threshold. Every threshold of this project
-comes from `threshold`, or from `finite_threshold` where a finite one is needed. Scores are never adjusted by the labels ("point
-adjustment"), because that makes even random scores look good.
+A score raises an alarm if it is strictly above the threshold. Scores are never adjusted by the labels ("point adjustment"), because that
+makes even random scores look good.
 """
 
 import numpy as np
@@ -13,17 +12,15 @@ from enhsim_tf.common.errors import InputError
 def threshold(scores: np.ndarray, rate: float) -> float:
     """Computes the split conformal threshold for a false-alarm rate, with the finite-sample conformal correction.
 
-    The threshold is the score of rank `ceil((n + 1) (1 - rate))` among `n` scores. If a new score is exchangeable with these,
-    the probability that it exceeds the threshold is at most `rate`. If there are no ties, the probability is also at least
-    `rate - 1 / (n + 1)`.
+    The threshold is the score of rank `ceil((n + 1) (1 - rate))` among `n` scores. If a new score is exchangeable with these, it exceeds
+    the threshold with a probability of at most `rate`, and, without ties, of at least `rate - 1 / (n + 1)`.
 
     Args:
         scores: Scores of held-out nominal windows.
         rate: Largest acceptable false-alarm rate, between 0 and 1.
 
     Returns:
-        The threshold. It is infinite if there are fewer than `1 / rate - 1` scores, because no finite threshold then
-        guarantees the rate.
+        The threshold; infinite if there are fewer than `1 / rate - 1` scores, because no finite one then guarantees the rate.
 
     Raises:
         InputError: If the rate is not between 0 and 1, or if there are no scores.
@@ -34,11 +31,6 @@ def threshold(scores: np.ndarray, rate: float) -> float:
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
 
 
-def smallest_rate(num_scores: int) -> float:
-    """Returns the smallest false-alarm rate for which the conformal threshold of so many scores is finite: `1 / (num_scores + 1)`."""
-    return 1 / (num_scores + 1)
-
-
 def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | None = None) -> tuple[float, float]:
     """Computes the conformal threshold, or the largest score if there are too few scores for the rate.
 
@@ -47,17 +39,14 @@ def finite_threshold(scores: np.ndarray, rate: float, num_independent: int | Non
 
     Args:
         scores: Scores of held-out nominal windows.
-        rate: Largest acceptable false-alarm rate, between 0 and 1.
+        rate: Largest acceptable false-alarm rate, as for `threshold`.
         num_independent: Number of independent scores, if the scores of overlapping windows are correlated. None: all of them.
 
     Returns:
         The threshold and the false-alarm rate that it is set for, which is `rate` or larger.
-
-    Raises:
-        InputError: As for `threshold`.
     """
     conformal = threshold(scores, rate)
-    smallest = smallest_rate(num_independent or len(scores))
+    smallest = 1 / ((num_independent or len(scores)) + 1)  # the least rate with a finite conformal threshold
     return (float(np.max(scores)), smallest) if rate < smallest * (1 - 1e-9) else (conformal, rate)
 
 

@@ -27,12 +27,9 @@ BUILT_IN = {
 }
 """Maps each detector's name to the path `module:class` of its class, the simplest detector first and the networks last."""
 
-BUILT_IN_CONTROLS = {
-    "random score": "enhsim_tf.detection.detectors:RandomScore",
-    "largest step": "enhsim_tf.detection.detectors:LargestStep",
-    "moving deviation": "enhsim_tf.detection.detectors:MovingDeviation",
-}
-"""The same for the controls: trivial scores that every useful detector should outperform."""
+RESIDUAL = "residual"
+"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`residual_size`). It needs a
+simulator, so it is no member of `DETECTORS`."""
 
 
 def _build(path: str, seed: int) -> "Detector":
@@ -45,20 +42,17 @@ def _build(path: str, seed: int) -> "Detector":
 DETECTORS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path) for name, path in BUILT_IN.items()}
 """Maps a name to a factory, which takes a seed and returns an unfitted detector."""
 
-CONTROLS: dict[str, Callable[[int], "Detector"]] = {name: partial(_build, path) for name, path in BUILT_IN_CONTROLS.items()}
-"""The same for the controls."""
-FURTHER: dict[str, Callable[[int], "Detector"]] = {"innovation": partial(_build, "enhsim_tf.detection.detectors:Innovation")}
-"""Detectors that `score` offers besides `DETECTORS`, on which the studies' published tables are."""
-
-
-RESIDUAL = "residual"
-"""Name of the detector that judges the size of the difference between telemetry and a fitted simulator (`residual_size`). It needs a
-simulator, so it is no member of `DETECTORS`."""
+FURTHER: dict[str, Callable[[int], "Detector"]] = {
+    name: partial(_build, f"enhsim_tf.detection.detectors:{kind}")
+    for name, kind in (("innovation", "Innovation"), ("largest step", "LargestStep"), ("moving deviation", "MovingDeviation"))
+}
+"""Detectors that `score` offers besides `DETECTORS`, on which the studies' published tables are. The last two are controls: trivial scores
+that every useful detector should outperform."""
 
 
 def all_detectors() -> dict[str, Callable[[int], "Detector"]]:
     """All detectors that need no simulator, by name."""
-    return {**DETECTORS, **FURTHER, **{name: CONTROLS[name] for name in ("largest step", "moving deviation")}}
+    return DETECTORS | FURTHER
 
 
 def option_name(name: str) -> str:
@@ -69,47 +63,26 @@ def option_name(name: str) -> str:
 def register(name: str, factory: Callable[[int], Any]) -> None:
     """Adds a detector to `DETECTORS`.
 
-    The factory may return a detector of this package's interface, or an estimator of another library:
-
-    - scikit-learn: `fit(X)` and `score_samples(X)`, where higher is more normal;
-    - PyOD: `fit(X)` and `decision_function(X)`, where higher is more anomalous.
-
-    An estimator that has `score_samples` is taken for one of scikit-learn, whose outlier detectors also have a
-    `decision_function` of the opposite sign. The studies run the detectors of `BUILT_IN`.
-
     Args:
         name: The detector's name in tables, and the value of `ScoreOptions.detector`.
-        factory: Takes a seed and returns an unfitted detector or estimator, a new one at each call.
+        factory: Takes a seed and returns, a new one at each call, an unfitted detector, or an estimator of scikit-learn or PyOD; see
+            `interface.EstimatorDetector`.
 
     Raises:
-        InputError: If a detector or control of this name exists already, or the factory cannot be called.
+        InputError: If a detector of this name exists already, or the factory cannot be called.
 
     Example:
     >>> from sklearn.neighbors import LocalOutlierFactor
     >>> register("local outlier factor", lambda seed: LocalOutlierFactor(novelty=True))
     """
-    if option_name(name) in map(option_name, (*DETECTORS, *CONTROLS)):
+    if option_name(name) in map(option_name, (RESIDUAL, *all_detectors())):
         raise InputError(f"Expected a name that no detector has yet. Received: name={name!r}. Choose another name.")
     if not callable(factory):
         raise InputError(f"Expected a factory that takes a seed. Received: {type(factory).__name__}. Wrap it, as in `lambda seed: ...`.")
     DETECTORS[name] = partial(_build_registered, factory)
 
 
-def unregister(name: str) -> None:
-    """Removes a detector that `register` added.
-
-    Args:
-        name: The detector's name.
-
-    Raises:
-        InputError: If `register` did not add a detector of this name.
-    """
-    if name in BUILT_IN or name not in DETECTORS:
-        raise InputError(f"Expected the name of a registered detector. Received: name={name!r}. Built-in detectors cannot be removed.")
-    del DETECTORS[name]
-
-
 def _build_registered(factory: Callable[[int], Any], seed: int) -> "Detector":
-    from enhsim_tf.detection.estimators import as_detector
+    from enhsim_tf.detection.interface import as_detector
 
     return as_detector(factory(seed))

@@ -1,18 +1,17 @@
 """The candidates for the enhancer, from the coarse simulator itself to the paper's network, and the choice among them (section 2.2).
 
-The paper's network is one of several maps from coarse to realistic windows. Each is judged on blocks of time that it was not fitted to,
-from cheap to dear. The simplest one whose error is within one standard error, or within 1 %, of the best is used. What no linear map can
-learn is left to random rectified features (Rahimi and Recht 2007): a network whose hidden layer is drawn and whose output layer is a ridge
-regression, which takes a second. The paper's network is trained only if it is asked for.
+Each is judged on blocks of time that it was not fitted to. The simplest one whose error is within one standard error, or within 1 %, of the
+best is used. What no linear map can learn is left to random rectified features (Rahimi and Recht 2007): a network whose hidden layer is
+drawn and whose output layer is a ridge regression. The paper's network is trained only if it is asked for.
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import BEST, CANDIDATES, COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
@@ -22,7 +21,9 @@ _PAPER_RATE = 1e-3  # its initial learning rate, which falls to zero along a cos
 _BATCH_SIZE = 15  # as in the paper
 _NUM_FEATURES = 1_000  # random rectified features
 _NEGLIGIBLE = 0.02  # share of the best candidate's squared error: 1 % of its error
-
+NUM_FOLDS = 3  # folds of interleaved blocks, so that each fold covers the beginning, the middle and the end of the time
+_MOST_BLOCKS = 9
+_WINDOWS_IN_BLOCK = 3  # preferred minimum length of a block, in windows
 
 Layers = Sequence[tuple[np.ndarray, np.ndarray]]
 """Kernel and bias of each Dense layer."""
@@ -30,20 +31,12 @@ Layers = Sequence[tuple[np.ndarray, np.ndarray]]
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """The error of one candidate on held-out time.
+    """The error of one candidate on held-out time, with standard errors from disjoint stretches of one window each."""
 
-    Args:
-        name: One of `CANDIDATES`.
-        error: Root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all channels.
-        standard_error: Standard error of `error`, from its variation between disjoint stretches of one window each.
-        behind: Mean squared error minus that of the best candidate, divided by the targets' variance.
-        behind_standard_error: Standard error of `behind`, from the same stretches.
-    """
-
-    name: str
-    error: float
+    name: str  # one of `CANDIDATES`
+    error: float  # root-mean-square error, divided by the standard deviation of the targets (NRMSE), over all channels
     standard_error: float
-    behind: float
+    behind: float  # mean squared error minus that of the best candidate, divided by the targets' variance
     behind_standard_error: float
 
     @property
@@ -54,19 +47,12 @@ class Judged:
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """The chosen enhancer.
+    """The chosen enhancer."""
 
-    Args:
-        enhancer: The candidate, fitted to all windows.
-        judged: The held-out error of each candidate that was tried.
-        edges: Edges of the blocks of time; the blocks of fold 0 were held out.
-        without_fold: The chosen candidate as it was judged, fitted without the held-out blocks.
-    """
-
-    enhancer: Enhancer
-    judged: tuple[Judged, ...]
-    edges: np.ndarray
-    without_fold: Enhancer
+    enhancer: Enhancer  # fitted to all windows
+    judged: tuple[Judged, ...]  # the held-out error of each candidate that was tried
+    edges: np.ndarray  # of the blocks of time; the blocks of fold 0 were held out
+    without_fold: Enhancer  # the chosen candidate as it was judged, fitted without the held-out blocks
 
 
 def choose_enhancer(
@@ -107,21 +93,14 @@ def choose_enhancer(
     variance = np.var(targets[held_out], axis=(0, 1), dtype=np.float64)
     variance = np.where(variance > 0, variance, 1.0)
     fitted: dict[str, Enhancer] = {}
-    penalties: list[float] = []  # chosen once, by blocks of the time that is not held out
     squared: dict[str, np.ndarray] = {}
-
-    def by_stretch(predicted: np.ndarray) -> np.ndarray:
-        errors = np.mean((predicted - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
-        return np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
-
-    def try_candidate(name: str) -> None:
+    penalties: list[float] = []  # chosen once, by blocks of the time that is not held out
+    for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
         on_candidate(name)
         fitted[name] = fit_enhancer(name, inputs[learnt], targets[learnt], starts[learnt], seed, epochs, penalties)
         penalties.extend(fitted[name].penalties[len(penalties) :])
-        squared[name] = by_stretch(fitted[name].predict(inputs[held_out]))
-
-    for name in CANDIDATES[:-1] if wanted == BEST else dict.fromkeys([COARSE, RIDGE, wanted]):
-        try_candidate(name)
+        errors = np.mean((fitted[name].predict(inputs[held_out]) - targets[held_out]) ** 2, axis=1, dtype=np.float64) / variance
+        squared[name] = np.bincount(stretches, errors.mean(axis=1)) / np.bincount(stretches)
     judged = judge(squared)
     chosen = next(each.name for each in judged if each.is_within) if wanted == BEST else wanted
     return Choice(fit_enhancer(chosen, inputs, targets, starts, seed, epochs, penalties), judged, edges, fitted[chosen])
@@ -132,9 +111,6 @@ def judge(squared: Mapping[str, np.ndarray]) -> tuple[Judged, ...]:
 
     Args:
         squared: For each candidate, the mean squared error on each stretch, divided by the targets' variance, shape `(stretches,)`.
-
-    Returns:
-        The comparison of each candidate, in the given order.
     """
     best = min(squared, key=lambda name: np.mean(squared[name]))
     judged = []
@@ -187,12 +163,8 @@ def fit_enhancer(
     linear, factors, layers = np.zeros(outputs.shape[1]), (), ()
     if name != NETWORK:
         ridge = fit_ridge(rows, outputs, starts, num_channels=channels, chosen=penalties or None)
-        penalties = ridge.chosen
-        maps = [ridge.weights] if ridge.factors is None else list(ridge.factors)
-        moved = ridge.input_mean.ravel()
-        for each in maps:
-            moved = moved @ each
-        linear = ridge.target_mean - moved
+        penalties, maps = ridge.chosen, list(ridge.factors)
+        linear = ridge.target_mean - functools.reduce(np.matmul, maps, ridge.input_mean.ravel())
         maps[0] = maps[0] / column_scale[:, None]
         maps[-1] = maps[-1] * output_unit
         factors = tuple(each.astype(np.float32) for each in maps)
@@ -245,7 +217,7 @@ def _random_features(rows: np.ndarray, left: np.ndarray, starts: np.ndarray, cha
     kernel = rng.standard_normal((rows.shape[1], _NUM_FEATURES)) / np.sqrt(rows.shape[1])
     shift = rng.uniform(-1, 1, _NUM_FEATURES)
     ridge = fit_ridge(np.maximum(rows @ kernel + shift, 0)[:, None, :], left, starts, num_channels=channels)
-    weights = ridge.weights if ridge.factors is None else ridge.factors[0] @ ridge.factors[1]
+    weights = functools.reduce(np.matmul, ridge.factors)
     return [(kernel, shift), (weights, ridge.target_mean - ridge.input_mean.ravel() @ weights)]
 
 
@@ -272,3 +244,45 @@ def check_windows(inputs: np.ndarray, targets: np.ndarray, starts: np.ndarray) -
     if not (np.isfinite(inputs).all() and np.isfinite(targets).all()):
         raise InputError("Expected finite windows. Received: NaN or infinite values. Fill or cut them.")
     return inputs, targets, starts
+
+
+def block_edges(begin: int, end: int, window: int) -> np.ndarray:
+    """Cuts the samples from `begin` to before `end` into contiguous blocks of about equal length, on which enhancers are judged.
+
+    Returns:
+        The edges in samples, in ascending order; block `b` covers the samples from `edges[b]` to before `edges[b + 1]`.
+
+    Raises:
+        InputError: If a block would be shorter than a window.
+    """
+    num_blocks = int(np.clip((end - begin) // (_WINDOWS_IN_BLOCK * window), NUM_FOLDS, _MOST_BLOCKS))
+    edges = np.linspace(begin, end, num_blocks + 1).round().astype(np.int64)
+    if np.diff(edges).min() < window:
+        raise InputError(
+            f"Expected at least {NUM_FOLDS} windows of {window} samples, one after another. Received: {end - begin} samples. "
+            "Give longer telemetry or a smaller window."
+        )
+    return edges
+
+
+def split_fold(starts: np.ndarray, window: int, edges: np.ndarray, fold: int) -> tuple[np.ndarray, np.ndarray]:
+    """Splits windows, which may overlap, into training windows and held-out windows that share no sample.
+
+    Block `b` is held out if `b % NUM_FOLDS == fold`. A window that lies across the edge of a held-out block is in neither set.
+
+    Args:
+        starts: First sample of each window, shape `(windows,)`, in any order.
+        window: Length of a window in samples.
+        edges: Edges of the blocks, as returned by `block_edges`.
+        fold: Number of the fold, from 0.
+
+    Returns:
+        The indices of the training windows, and the indices of the held-out windows.
+    """
+    starts = np.asarray(starts)
+    inside, touched = np.zeros((2, len(starts)), bool)
+    for block in range(fold, len(edges) - 1, NUM_FOLDS):
+        low, high = edges[block], edges[block + 1]
+        inside |= (starts >= low) & (starts + window <= high)
+        touched |= (starts < high) & (starts + window > low)
+    return np.flatnonzero(~touched), np.flatnonzero(inside)

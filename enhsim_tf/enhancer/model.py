@@ -1,13 +1,13 @@
-"""A fitted enhancer: maps coarse windows of all columns to telemetry windows of all channels (section 2.2). It needs no TensorFlow."""
+"""A fitted enhancer: maps coarse windows of all columns to telemetry windows of all channels, or a whole run (section 2.2, without TensorFlow)."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 _CHUNK = 4_096  # windows that are mapped at a time
-_MOST_LAYERS = 100
+_AVERAGED = 512  # overlapping windows that are enhanced at a time
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,31 +97,48 @@ class Enhancer:
             arrays: As `Enhancer.arrays`.
 
         Raises:
-            ValueError: If they are not those of an enhancer; the message gives the reason.
+            ValueError, KeyError, IndexError, TypeError: If they are not those of an enhancer.
         """
         window, columns, channels = (int(settings[name]) for name in ("window", "columns", "channels"))
-        factors = tuple(arrays[f"factor_{number}"] for number in range(2) if f"factor_{number}" in arrays)
-        number = sum(name.startswith("kernel_") for name in arrays)
-        if number > _MOST_LAYERS or min(window, columns, channels) < 1:
-            raise ValueError("an enhancer of impossible size")
-        layers = tuple((arrays[f"kernel_{each}"], arrays[f"bias_{each}"]) for each in range(number))
-        main = (arrays["column"], arrays["gain"]) if "column" in arrays else None
-        for chain in (factors, [kernel for kernel, _ in layers]):
-            sizes = [window * columns, *(each.shape[-1] if each.ndim == 2 else -1 for each in chain)]
-            fits = all(each.ndim == 2 and len(each) == size for each, size in zip(chain, sizes, strict=False))
-            if chain and not (fits and sizes[-1] == window * channels):
-                raise ValueError("matrices of the enhancer that do not fit together")
-        if arrays["centre"].shape != (columns,) or arrays["bias"].shape != (window * channels,):
-            raise ValueError("an enhancer whose centre or bias has another shape")
-        if any(bias.shape != kernel.shape[1:] for kernel, bias in layers):
-            raise ValueError("a layer of the enhancer with a bias of another shape")
-        if main is not None and not (main[0].shape == main[1].shape == (channels,) and ((main[0] >= 0) & (main[0] < columns)).all()):
-            raise ValueError("an enhancer with columns that do not exist")
-        if not (factors or layers or main) or not all(np.isfinite(each).all() for each in arrays.values()):
-            raise ValueError("an enhancer without a map, or whose numbers are not finite")
-        as_float = {name: each.astype(np.float32) for name, each in arrays.items()}
-        factors = tuple(each.astype(np.float32) for each in factors)
-        layers = tuple((kernel.astype(np.float32), bias.astype(np.float32)) for kernel, bias in layers)
-        if main is not None:
-            main = (main[0].astype(np.int64), main[1].astype(np.float32))
-        return cls(str(settings["name"]), window, columns, channels, as_float["centre"], as_float["bias"], factors, layers, main)
+        if not all(np.isfinite(each).all() for each in arrays.values()):
+            raise ValueError("an enhancer whose numbers are not finite")
+        known = {name: each.astype(np.float32) for name, each in arrays.items()}
+        factors = tuple(known[name] for name in ("factor_0", "factor_1") if name in known)
+        layers = tuple(
+            (known[f"kernel_{each}"], known[f"bias_{each}"]) for each in range(sum(name.startswith("kernel_") for name in known))
+        )
+        main = (arrays["column"].astype(np.int64), known["gain"]) if "column" in arrays else None
+        if known["centre"].shape != (columns,) or known["bias"].shape != (window * channels,) or (main is not None and main[0].min() < 0):
+            raise ValueError("an enhancer whose arrays do not fit together")
+        made = cls(str(settings["name"]), window, columns, channels, known["centre"], known["bias"], factors, layers, main)
+        made.predict(np.zeros((1, window, columns)))  # fails if the other arrays do not fit together
+        return made
+
+
+def run_starts(num_samples: int, window: int) -> np.ndarray:
+    """Returns the starts of overlapping windows that cover a run, one each quarter of a window and the last one at its end."""
+    return np.unique(np.append(np.arange(0, num_samples - window + 1, max(1, window // 4)), num_samples - window))
+
+
+def average_windows(windows_at: Callable[[slice], np.ndarray], starts: np.ndarray, window: int, num_samples: int) -> np.ndarray:
+    """Averages overlapping windows into one continuous series, with weights that fall to zero at both ends of a window.
+
+    Args:
+        windows_at: Function from a slice of the window numbers to these windows, shape `(windows, window, channels)`.
+        starts: Start of each window in samples, shape `(windows,)`.
+        window: Length of a window in samples.
+        num_samples: Length of the series.
+
+    Returns:
+        float32 array of shape `(num_samples, channels)`.
+    """
+    fade = (np.sin(np.pi * (np.arange(window) + 0.5) / window) ** 2)[:, None]
+    series, total = None, np.zeros((num_samples, 1))
+    for first in range(0, len(starts), _AVERAGED):
+        rows = slice(first, min(first + _AVERAGED, len(starts)))
+        windows = windows_at(rows)
+        series = np.zeros((num_samples, windows.shape[2])) if series is None else series
+        for start, values in zip(starts[rows], windows, strict=True):
+            series[start : start + window] += fade * values
+            total[start : start + window] += fade
+    return (series / total).astype(np.float32)

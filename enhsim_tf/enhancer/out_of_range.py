@@ -4,8 +4,6 @@ The score is computed from coarse windows only. It needs neither a network nor t
 error of the coarse simulator itself.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -13,34 +11,24 @@ from enhsim_tf.common.errors import InputError
 
 _CHUNK = 2_048  # number of windows scored at a time
 _MAX_KEPT = 10_000  # maximum number of training windows whose coordinates are kept
-_FITTED = ("mean", "unit", "components", "coordinates")
+_EXPLAINED = 0.95  # share of the training windows' variance that the components explain
+_WEIGHT = 0.25  # of the distance within the subspace; with 1, the score is about the distance to the nearest training window
 
 
 class OutOfRange:
     """Distance of a coarse window from the training windows, weighting the residual outside their PCA subspace by 1.
 
-    A principal component analysis (PCA) of the training windows splits each window into two parts: its coordinates in the
-    subspace of the leading components, and the residual outside that subspace. The enhancer has learned nothing about
-    residual directions. Within the subspace, it interpolates between training windows. The score is
+    A principal component analysis (PCA) of the training windows splits each window into its coordinates in the subspace of the leading
+    components, between which the enhancer interpolates, and the residual, about which it has learned nothing. The score is
 
-        sqrt(mean squared residual + weight * mean squared distance to the nearest training window's coordinates) / unit
+        sqrt(mean squared residual + 0.25 * mean squared distance to the nearest training window's coordinates) / unit
 
-    where `unit` is the standard deviation of the training windows. Nominal windows have a small positive score rather than
-    zero. To obtain a limit, apply `enhsim_tf.detection.metrics.threshold` to the scores of held-out nominal windows.
+    where `unit` is the standard deviation of the training windows. Nominal windows have a small positive score. To obtain a limit, apply
+    `enhsim_tf.detection.metrics.threshold` to the scores of held-out nominal windows.
 
-    The form was chosen among four candidates by their rank correlation with the true error of the paper's enhancer, over
-    degraded modes of all severities and over square waves with other proportions and phases:
-
-    - The residual alone ranks degraded modes equally well, but it does not respond to nominal waves in proportions and
-      phases that are absent from training.
-    - The distance to the nearest training window alone responds to those, but it ranks degraded modes worse, because it
-      gives full weight to shifts along directions that the enhancer follows well.
-    - The Mahalanobis distance within the subspace decreases when most of the degraded modes become more severe.
-
-    Args:
-        explained: Share of the training windows' variance that the components explain, between 0 and 1.
-        weight: Weight of the distance within the subspace, from 0 to 1. With 1, the score is approximately the distance to the
-            nearest training window.
+    Of four candidates, this form ranks degraded modes and waves in unseen phases best by the true error of the paper's enhancer: the
+    residual alone is blind to unseen phases, the distance alone gives full weight to shifts that the enhancer follows well, and the
+    Mahalanobis distance decreases when most degraded modes become more severe.
 
     Example:
     >>> out_of_range = OutOfRange().fit(coarse_training_windows)
@@ -48,19 +36,8 @@ class OutOfRange:
     >>> trusted = out_of_range.score(coarse_degraded_windows) <= limit
     """
 
-    def __init__(self, explained: float = 0.95, weight: float = 0.25):
-        if not (0 < explained < 1 and 0 <= weight <= 1):
-            raise InputError(f"Expected 0 < explained < 1 and 0 <= weight <= 1. Received: explained={explained}, weight={weight}.")
-        self.explained, self.weight = explained, weight
-
     def fit(self, coarse_windows: np.ndarray) -> "OutOfRange":
-        """Fits the principal components and stores the coordinates of the training windows.
-
-        Args:
-            coarse_windows: The enhancer's training windows, shape `(windows, samples)`. Duplicate windows are counted once.
-
-        Returns:
-            This object, fitted.
+        """Fits to the enhancer's training windows, shape `(windows, samples)`. Duplicate windows are counted once.
 
         Raises:
             InputError: If there are fewer than two distinct windows, or if a value is not finite.
@@ -75,26 +52,21 @@ class OutOfRange:
         with threadpool_limits(1):
             _, values, directions = np.linalg.svd(centred, full_matrices=False)
             share = np.cumsum(values**2) / np.sum(values**2)
-            self._components = directions[: np.searchsorted(share, self.explained) + 1].copy()
+            self._components = directions[: np.searchsorted(share, _EXPLAINED) + 1].copy()
             coordinates = centred[:: -(-len(centred) // _MAX_KEPT)] @ self._components.T
         self._coordinates = coordinates.astype(np.float32)
         return self
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
-        """Computes the score of each window.
+        """Scores coarse windows of shape `(windows, samples)`; returns float64 of shape `(windows,)`.
 
-        Args:
-            coarse_windows: Coarse windows, shape `(windows, samples)`.
-
-        Returns:
-            float64 array of shape `(windows,)`. Windows within the training range score close to 0. A window that is one
-            standard deviation of the training windows away scores about 1.
+        Windows within the training range score close to 0, and one that is a standard deviation of the training windows away about 1.
 
         Raises:
-            InputError: If the score is not fitted, if the windows differ in length from the training windows, or if a value
-                is not finite.
+            InputError: If the score is not fitted, the windows have another length, or a value is not finite.
         """
-        self._check_fitted()
+        if not hasattr(self, "_mean"):
+            raise InputError("Expected a fitted score. Received: OutOfRange before fit. Call fit with the training windows.")
         windows = _checked(coarse_windows, len(self._mean))
         with threadpool_limits(1):
             chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]
@@ -107,39 +79,7 @@ class OutOfRange:
         coordinates = centred @ self._components.T
         left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
         nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
-        return np.sqrt((left + self.weight * nearest) / windows.shape[1]) / self._unit
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The numbers of the fitted score by name, usually much less than one megabyte.
-
-        Raises:
-            InputError: If the score is not fitted.
-        """
-        self._check_fitted()
-        return {name: np.asarray(getattr(self, name)) for name in ("explained", "weight")} | {
-            name: np.asarray(getattr(self, f"_{name}")) for name in _FITTED
-        }
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "OutOfRange":
-        """Restores a score from its `arrays`.
-
-        Args:
-            arrays: The numbers by name.
-
-        Raises:
-            ValueError: If the arrays are not those of a score.
-        """
-        restored = cls(float(arrays["explained"]), float(arrays["weight"]))
-        for name in _FITTED:
-            setattr(restored, f"_{name}", arrays[name])
-        restored._score(np.zeros((1, len(restored._mean))))  # fails if the shapes of the arrays do not match
-        return restored
-
-    def _check_fitted(self) -> None:
-        if not hasattr(self, "_mean"):
-            raise InputError("Expected a fitted score. Received: OutOfRange before fit. Call fit with the training windows.")
+        return np.sqrt((left + _WEIGHT * nearest) / windows.shape[1]) / self._unit
 
 
 def _checked(windows: np.ndarray, num_samples: int | None = None) -> np.ndarray:

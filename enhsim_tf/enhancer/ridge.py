@@ -12,6 +12,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.telemetry.windows import time_blocks
 
 PENALTIES = tuple(float(penalty) for penalty in np.logspace(-3, 6, 19))  # of standardised inputs, so they fit every unit
+_NUM_BLOCKS = 5  # of time, for cross-validation
 _ROUNDING = 1e-12  # a column whose deviation is below this share of its largest value is constant
 
 
@@ -20,26 +21,22 @@ class Ridge:
     """A fitted ridge regression from input windows to target windows.
 
     Args:
-        weights: Change of each output for a change of each input, float64 of shape `(samples * columns, outputs)`.
+        factors: Matrices, float64, whose product is the change of each output for a change of each input, shape
+            `(samples * columns, outputs)`: one, or two for few windows with many columns, which hold fewer numbers.
         input_mean: Mean training window, float64 of shape `(samples, columns)`.
         target_mean: Mean training target, float64 of shape `(outputs,)`.
-        penalty: The chosen penalty; of several channels, the smallest.
-        penalties: The penalties that were tried, shape `(penalties,)`.
-        errors: Cross-validated error of each penalty: root-mean-square error divided by the standard deviation of the
-            targets about their mean window, shape `(penalties,)`; of several channels, shape `(penalties, channels)`. NaN if there was
-            a single window.
-        factors: For few windows with many columns, two matrices whose product is `weights`, with fewer numbers; otherwise None.
         chosen: The penalty of each channel.
     """
 
-    weights: np.ndarray | None
+    factors: tuple[np.ndarray, ...]
     input_mean: np.ndarray
     target_mean: np.ndarray
-    penalty: float
-    penalties: np.ndarray
-    errors: np.ndarray
-    factors: tuple[np.ndarray, np.ndarray] | None = None
-    chosen: tuple[float, ...] = ()
+    chosen: tuple[float, ...]
+
+    @property
+    def penalty(self) -> float:
+        """The chosen penalty; of several channels, the smallest."""
+        return min(self.chosen)
 
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Predicts the targets of input windows.
@@ -59,8 +56,9 @@ class Ridge:
                 f"Expected windows of (samples, columns) {self.input_mean.shape}, as in training. Received: {windows.shape[1:]}. "
                 "Cut windows of the same length with the same columns."
             )
-        rows = _flat(windows - self.input_mean)
-        mapped = rows @ self.weights if self.factors is None else rows @ self.factors[0] @ self.factors[1]
+        mapped = _flat(windows - self.input_mean)
+        for factor in self.factors:
+            mapped = mapped @ factor
         return (self.target_mean + mapped).astype(np.float32)
 
 
@@ -70,7 +68,6 @@ def fit_ridge(
     starts: np.ndarray | None = None,
     *,
     penalties: Sequence[float] = PENALTIES,
-    num_blocks: int = 5,
     num_channels: int = 1,
     chosen: Sequence[float] | None = None,
 ) -> Ridge:
@@ -83,11 +80,8 @@ def fit_ridge(
     Args:
         inputs: Input windows of shape `(windows, samples)` or `(windows, samples, columns)`.
         targets: Target windows of shape `(windows, outputs)`.
-        starts: Position of each window in time, in samples, shape `(windows,)`. If None, the windows are in the order of time
-            and share no sample.
-        penalties: Penalties to choose from. The sum of squared weights of the standardised inputs is multiplied by them and
-            added to the sum of squared errors.
-        num_blocks: Number of blocks of time.
+        starts: First sample of each window, shape `(windows,)`. None: the windows are in the order of time and share no sample.
+        penalties: Penalties to choose from: factors of the sum of squared weights of the standardised inputs.
         num_channels: Number of channels of the targets. Output `o` belongs to channel `o % num_channels`.
         chosen: Penalty of each channel, if it was chosen before; nothing is cross-validated then.
 
@@ -98,34 +92,30 @@ def fit_ridge(
         InputError: If shapes do not match, values are not finite, or penalties are not positive.
     """
     windows, targets, starts = _checked(inputs, targets, starts)
-    penalties = np.asarray(penalties, np.float64)
+    if chosen is None:
+        chosen = _choose_penalties(windows, targets, starts, np.asarray(penalties, np.float64), num_channels)
+    solution, each = _Solution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
+    left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
+    is_low_rank = left.size + right.size < len(left) * right.shape[1]
+    factors = (left, right) if is_low_rank else (left @ right,)
+    return Ridge(factors, solution.input_mean, solution.target_mean, tuple(map(float, chosen)))
+
+
+def _choose_penalties(
+    windows: np.ndarray, targets: np.ndarray, starts: np.ndarray, penalties: np.ndarray, num_channels: int
+) -> list[float]:
+    """Returns the penalty of each channel with the least error on held-out blocks of time; of a single window, the largest."""
     if penalties.ndim != 1 or not len(penalties) or not (np.isfinite(penalties) & (penalties > 0)).all():
         raise InputError(f"Expected penalties above 0. Received: {penalties.tolist()}. Leave `penalties` at its default.")
     squares, power = np.zeros((len(penalties), num_channels)), np.zeros(num_channels)
-    blocks = time_blocks(starts, num_blocks, windows.shape[1]) if chosen is None else []
-    for training, held_out in blocks:
+    for training, held_out in time_blocks(starts, _NUM_BLOCKS, windows.shape[1]):
         solution = _Solution(windows[training], targets[training])
         inner, centred = solution.project(windows[held_out]), targets[held_out] - solution.target_mean
         power += _by_channel((targets[held_out] - targets.mean(axis=0)) ** 2, num_channels)
         for number, penalty in enumerate(penalties):
             squares[number] += _by_channel((centred - inner @ solution.coefficients(penalty)) ** 2, num_channels)
-    is_known = len(windows) > 1 and chosen is None
-    errors = np.sqrt(squares / np.where(power > 0, power, 1.0)) if is_known else np.full(squares.shape, np.nan)
-    if chosen is None:
-        chosen = [penalties[found == found.min()].max() if is_known else penalties.max() for found in errors.T]
-    solution, each = _Solution(windows, targets), np.tile(chosen, targets.shape[1] // num_channels)
-    left, right = solution.basis / solution.scale[:, None], solution.coefficients(each)
-    is_low_rank = left.size + right.size < len(left) * right.shape[1]
-    return Ridge(
-        None if is_low_rank else left @ right,
-        solution.input_mean,
-        solution.target_mean,
-        float(min(chosen)),
-        penalties,
-        errors[:, 0] if num_channels == 1 else errors,
-        (left, right) if is_low_rank else None,
-        tuple(map(float, chosen)),
-    )
+    errors = np.sqrt(squares / np.where(power > 0, power, 1.0))
+    return [penalties[found == found.min()].max() for found in errors.T]
 
 
 def _by_channel(squares: np.ndarray, num_channels: int) -> np.ndarray:

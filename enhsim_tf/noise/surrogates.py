@@ -7,12 +7,25 @@ import numpy as np
 from enhsim_tf.common.errors import InputError
 
 
-class GaussianNoise:
-    """White Gaussian noise with the standard deviations of the real noise and its correlation between channels, the simplest baseline.
+class _Stationary:
+    """Noise that does not depend on the signal, drawn by `_draw` in windows or in one series."""
+
+    window: int
+
+    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws windows of noise, float32 of shape `(number, samples, channels)`, or without the last axis. The signal has no effect."""
+        return self._draw((number, self.window), rng)
+
+    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
+        """Draws one series of any length, float32 of shape `(num_samples, channels)`, or without the last axis."""
+        return self._draw((1, num_samples), rng)[0]
+
+
+class GaussianNoise(_Stationary):
+    """White Gaussian noise with the standard deviations of the real noise and its correlation between channels.
 
     Args:
-        root: A root of the covariance of the channels, `root @ root.T`, shape `(channels, channels)`; or the standard deviation of
-            a single channel.
+        root: A root of the channels' covariance `root @ root.T`, shape `(channels, channels)`; or the deviation of a single channel.
         window: Number of samples in a window.
     """
 
@@ -27,14 +40,6 @@ class GaussianNoise:
         rows = windows.reshape(-1, windows.shape[2])
         return cls(_root(np.cov(rows, rowvar=False, bias=True).reshape(rows.shape[1], -1)), windows.shape[1])
 
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no effect."""
-        return self._draw((number, self.window), rng)
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples, channels)`."""
-        return self._draw((1, num_samples), rng)[0]
-
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
         if self.root.ndim == 0:
             return (self.root * rng.standard_normal(shape)).astype(np.float32)
@@ -47,7 +52,7 @@ def _root(covariance: np.ndarray) -> np.ndarray:
     return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
-class JointAutoregression:
+class JointAutoregression(_Stationary):
     """Gaussian autoregressive noise of several channels: one `GaussianAutoregression` each, with correlated innovations.
 
     Args:
@@ -57,7 +62,7 @@ class JointAutoregression:
 
     def __init__(self, channels: "Sequence[GaussianAutoregression]", correlation: np.ndarray):
         self.channels, self.correlation = tuple(channels), np.asarray(correlation, np.float64)
-        self._root = _root(self.correlation)
+        self.window, self._root = self.channels[0].window, _root(self.correlation)
 
     @classmethod
     def fit(cls, windows: np.ndarray, max_order: int = 40) -> "JointAutoregression":
@@ -69,24 +74,13 @@ class JointAutoregression:
         left = [lfilter([1.0, *-each.coefficients], [1.0], windows[:, :, k], axis=1)[:, most:].ravel() for k, each in enumerate(found)]
         return cls(found, np.corrcoef(left).reshape(len(found), -1))
 
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples, channels)`. The signal has no effect."""
-        return self._draw((number, self.channels[0].window), rng)
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples, channels)`."""
-        return self._draw((1, num_samples), rng)[0]
-
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
         draws = rng.standard_normal((*shape, len(self.channels))) @ self._root.T
         return np.stack([each.filtered(draws[:, :, channel]) for channel, each in enumerate(self.channels)], axis=2)
 
 
-class GaussianAutoregression:
-    """Gaussian autoregressive noise with the spectrum of the real noise.
-
-    The order is chosen by the Akaike information criterion (AIC). The model reproduces the second-order
-    properties of the noise, that is its spectrum and autocorrelation, and no others.
+class GaussianAutoregression(_Stationary):
+    """Gaussian autoregressive noise: it has the spectrum of the real noise, and no other property of it.
 
     Args:
         coefficients: Autoregressive coefficients, from lag 1 upwards. An empty sequence gives white noise.
@@ -103,9 +97,7 @@ class GaussianAutoregression:
 
     @classmethod
     def fit(cls, windows: np.ndarray, max_order: int = 40) -> "GaussianAutoregression":
-        """Fits the model to noise windows by Burg's method (1975), with the prediction errors pooled over the windows.
-
-        Burg's method minimises the squared forward and backward prediction errors. It always gives a stationary process.
+        """Fits by Burg's method (1975), which always gives a stationary process; the Akaike information criterion chooses the order.
 
         Args:
             windows: Noise windows of shape `(windows, samples)`.
@@ -134,17 +126,6 @@ class GaussianAutoregression:
             criteria.append(windows.size * np.log(variance) + 2 * order)
         coefficients, variance = orders[int(np.argmin(criteria))]
         return cls(coefficients, np.sqrt(variance), windows.shape[1])
-
-    def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows of noise, float32 of shape `(number, samples)`. The signal has no effect.
-
-        Each window is stationary from its first sample on.
-        """
-        return self._draw((number, self.window), rng)
-
-    def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws one series of any length, float32 of shape `(num_samples,)`."""
-        return self._draw((1, num_samples), rng)[0]
 
     def _draw(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
         return self.filtered(rng.standard_normal(shape))

@@ -19,14 +19,11 @@ _LAST_START = 2**60  # the end of a window is still an integer of 64 bits
 class WindowBootstrap:
     """Draws whole windows of real noise.
 
-    A call first draws windows that share no sample with those it drew before: among windows that are drawn with replacement, or overlap,
-    a classifier recognises what it has seen, whatever the noise is like. When no such window is left, all are drawn with replacement
-    (Efron 1979). Drawing them in turn instead would put the same windows into training and threshold of a detector.
+    A call first draws windows that share no sample with those it drew before, because a classifier recognises what it has seen. When none is
+    left, all are drawn with replacement (Efron 1979). All channels are drawn together, so their cross-correlation is that of the real noise.
 
-    Within a window, the noise is real, with all its correlations. A longer series consists of windows that overlap by a quarter
-    and are cross-faded with a sine and a cosine. The squares of these weights add up to one, which preserves the variance,
-    because two windows that are drawn at random are uncorrelated, or nearly so if there are few. The mean of all windows is not faded.
-    All channels are drawn together, so their cross-correlation is that of the real noise.
+    A longer series consists of windows that overlap by a quarter and are cross-faded with a sine and a cosine. The squares of these
+    weights add up to one, which preserves the variance of windows that are uncorrelated. The mean of all windows is not faded.
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
@@ -39,14 +36,17 @@ class WindowBootstrap:
     def __init__(self, windows: np.ndarray, starts: np.ndarray | None = None):
         self.windows, self.starts = _checked(windows, starts)
 
-    @classmethod
-    def fit(cls, windows: np.ndarray, starts: np.ndarray | None = None) -> "WindowBootstrap":
-        """Stores windows of noise, and where they start."""
-        return cls(windows, starts)
-
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws windows, float32 of shape `(number, samples, channels)`. The signal has no effect."""
-        return self.windows[_draw_sparingly(_Sparing(self.starts, *self.windows.shape[:2]), number, rng)]
+        sparing, drawn = _Sparing(self.starts, *self.windows.shape[:2]), []
+        for candidate in rng.permutation(len(self.windows)).tolist():
+            if len(drawn) == number:
+                break
+            if sparing.is_free[candidate]:
+                sparing.take(candidate)
+                drawn.append(candidate)
+        again = rng.integers(0, len(self.windows), number - len(drawn))
+        return self.windows[np.concatenate([np.array(drawn, np.int64), again])]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
         """Draws a series of any length without seams, float32 of shape `(num_samples, channels)`. The signal has no effect."""
@@ -57,16 +57,12 @@ class WindowBootstrap:
 class MatchedWindowBootstrap:
     """Draws whole windows of real noise whose signal is similar to the one that the noise is added to.
 
-    The noise of many sensors depends on what they measure, and residuals contain errors of the enhancer, which do, too. A window of
-    noise is drawn at random from those with the nearest signals: as many as the square root of the number of all windows, and all
-    whose signal is the same. The distance of two signals is that of their means over 64 segments. The neighbours of a signal are those of
-    the stored signal that is nearest to it, so that they are found once for all draws. The idea, and the number of
-    neighbours, are those of the nearest-neighbour bootstrap of Lall and Sharma (1996), which resamples the successors of similar
-    pasts instead. Of these windows, one is drawn as by `WindowBootstrap`. If the signal never repeats, the nearest windows can be few
-    stretches of the record.
+    The noise of many sensors depends on what they measure, and so do the errors of the enhancer that residuals contain. A window is drawn,
+    as by `WindowBootstrap`, from those with the nearest signals: as many as the square root of the number of all windows (Lall and Sharma
+    1996), and all whose signal is the same. The distance of two signals is that of their means over 64 segments. The neighbours of a
+    signal are those of the stored signal nearest to it. If the signal never repeats, these can be few stretches of the record.
 
-    In a longer series, the mean of the candidates, which neighbouring windows have in common, is cross-faded with weights that add
-    up to one, and the rest as by `WindowBootstrap`.
+    In a longer series, the mean of the neighbours is cross-faded with weights that add up to one, and the rest as by `WindowBootstrap`.
 
     Args:
         windows: Windows of real noise, float32 of shape `(windows, samples, channels)`, or without the last axis.
@@ -89,45 +85,22 @@ class MatchedWindowBootstrap:
         return cls(windows, _segment_means(signal, np.shape(windows)), starts)
 
     def generate(self, number: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws windows.
-
-        Args:
-            number: Number of windows.
-            rng: Random number generator.
-            signal: The signal that the noise is added to, shape `(number, samples, channels)`, in the unit of the fit.
-
-        Returns:
-            float32 array of shape `(number, samples, channels)`.
+        """Draws windows, float32 of the shape of `signal`, the signal that the noise is added to, in the unit of the fit.
 
         Raises:
-            InputError: If there is no finite signal of this shape.
+            InputError: If the signal is not finite, or has another shape than `(number, samples, channels)`.
         """
-        near = self._nearest(signal, number)
-        return self.windows[_draw_near(near, self._neighbours.of, _Sparing(self.starts, *self.windows.shape[:2]), rng)]
+        return self.windows[self._draw(self._nearest(signal, number), rng)]
 
     def generate_series(self, num_samples: int, rng: np.random.Generator, signal: np.ndarray | None = None) -> np.ndarray:
-        """Draws a series of any length without seams.
-
-        Args:
-            num_samples: Length of the series.
-            rng: Random number generator.
-            signal: The signal that the noise is added to, shape `(num_samples, channels)`, in the unit of the fit.
-
-        Returns:
-            float32 array of shape `(num_samples, channels)`.
-        """
-        window, signal = self.windows.shape[1], np.asarray(signal, np.float32)
-        if signal.shape != (num_samples, *self.windows.shape[2:]):
-            raise InputError(
-                f"Expected the enhanced signal of shape {(num_samples, *self.windows.shape[2:])}, which this noise follows. Received: {signal.shape}."
-            )
+        """Draws a series of any length without seams, float32 of the shape of `signal`: `(num_samples, channels)`; see `generate`."""
+        window, signal = self.windows.shape[1], _checked_signal(signal, (num_samples, *self.windows.shape[2:])).astype(np.float32)
 
         def draw(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             near = self._nearest(signal[np.clip(starts[:, None] + np.arange(window), 0, num_samples - 1)], len(starts))
-            chosen = _draw_near(near, self._neighbours.of, _Sparing(self.starts, *self.windows.shape[:2]), rng)
             used, place = np.unique(near, return_inverse=True)
             means = np.stack([self.windows[self._neighbours.of[each]].mean(axis=0) for each in used])
-            return self.windows[chosen], means[place]
+            return self.windows[self._draw(near, rng)], means[place]
 
         return _cross_faded(window, num_samples, rng, draw)
 
@@ -135,6 +108,23 @@ class MatchedWindowBootstrap:
         signal = _checked_signal(signal, (number, *self.windows.shape[1:]))
         with threadpool_limits(1):  # several threads take longer for products of this size
             return self._neighbours.nearest(signal.reshape(*signal.shape[:2], -1))
+
+    def _draw(self, near: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Draws one of the neighbours of each landmark, one that shares no sample with those drawn before if there is one."""
+        neighbours, sparing = self._neighbours.of, _Sparing(self.starts, *self.windows.shape[:2])
+        sizes = np.array([len(some) for some in neighbours])
+        begins, places = np.cumsum(sizes) - sizes, rng.random(len(near))
+        chosen, spent = np.concatenate(neighbours)[begins[near] + (places * sizes[near]).astype(int)], set()
+        for row, landmark in enumerate(near.tolist()):
+            if landmark in spent:
+                continue
+            free = neighbours[landmark][sparing.is_free[neighbours[landmark]]]
+            if len(free):
+                chosen[row] = free[int(places[row] * len(free))]
+                sparing.take(chosen[row])
+            else:
+                spent.add(landmark)  # what was drawn is never free again
+        return chosen
 
     @functools.cached_property
     def _neighbours(self) -> "_Neighbours":
@@ -144,16 +134,9 @@ class MatchedWindowBootstrap:
 class _Neighbours:
     """Which stored signals are nearest to a given one.
 
-    One of each group of stored signals that count as equal is a landmark; of very many, some are. A given signal is compared with the landmarks
-    on the principal components that hold all but a share of `_EQUAL**2` of the variance, each channel in its own unit.
-
-    Args:
-        signals: Means of the stored signals over segments, shape `(windows, segments * channels)`.
-        window: Length of a window in samples.
-        channels: Number of channels.
-
-    Attributes:
-        of: For each landmark, the numbers of the stored signals that are nearest to it.
+    One of each group of stored signals that count as equal is a landmark; of very many, some are. `of` holds, for each landmark, the numbers of
+    the stored signals nearest to it. A given signal is compared with the landmarks on the principal components that hold all but a
+    share of `_EQUAL**2` of the variance, each channel in its own unit.
     """
 
     def __init__(self, signals: np.ndarray, window: int, channels: int):
@@ -198,31 +181,8 @@ def _nearest_of(places: np.ndarray, known: np.ndarray, equal: float) -> list[np.
     return found
 
 
-def _draw_near(near: np.ndarray, neighbours: list[np.ndarray], sparing: "_Sparing", rng: np.random.Generator) -> np.ndarray:
-    """Draws one of the neighbours of each landmark, one that shares no sample with those drawn before if there is one."""
-    sizes = np.array([len(some) for some in neighbours])
-    begins, places = np.cumsum(sizes) - sizes, rng.random(len(near))
-    chosen, spent = np.concatenate(neighbours)[begins[near] + (places * sizes[near]).astype(int)], set()
-    for row, landmark in enumerate(near.tolist()):
-        if landmark in spent:
-            continue
-        free = neighbours[landmark][sparing.is_free[neighbours[landmark]]]
-        if len(free):
-            chosen[row] = free[int(places[row] * len(free))]
-            sparing.take(chosen[row])
-        else:
-            spent.add(landmark)  # what was drawn is never free again
-    return chosen
-
-
 class _Sparing:
-    """Which windows share no sample with those that were drawn before.
-
-    Args:
-        starts: First sample of each window, shape `(windows,)`; None: no two windows overlap.
-        number: Number of windows.
-        window: Length of a window in samples.
-    """
+    """Which windows share no sample with those that were drawn before, given their starts; None: no two windows overlap."""
 
     def __init__(self, starts: np.ndarray | None, number: int, window: int):
         starts = window * np.arange(number) if starts is None else starts
@@ -233,18 +193,6 @@ class _Sparing:
     def take(self, chosen: int) -> None:
         """Notes that a window was drawn."""
         self.is_free[self._order[self._first[chosen] : self._last[chosen]]] = False
-
-
-def _draw_sparingly(sparing: _Sparing, number: int, rng: np.random.Generator) -> np.ndarray:
-    """Draws windows that share no sample, in random order, as long as there are any, and the others with replacement."""
-    drawn = []
-    for candidate in rng.permutation(len(sparing.is_free)).tolist():
-        if len(drawn) == number:
-            break
-        if sparing.is_free[candidate]:
-            sparing.take(candidate)
-            drawn.append(candidate)
-    return np.concatenate([np.array(drawn, np.int64), rng.integers(0, len(sparing.is_free), number - len(drawn))])
 
 
 def _checked(windows: np.ndarray, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
@@ -287,20 +235,10 @@ def _segment_means(signal: np.ndarray | None, shape: tuple[int, ...]) -> np.ndar
 def _cross_faded(
     window: int, num_samples: int, rng: np.random.Generator, draw: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | float]]
 ) -> np.ndarray:
-    """Joins windows of noise to a series without seams.
-
-    Args:
-        window: Length of a window in samples.
-        num_samples: Length of the series.
-        rng: Draws where the first window begins, so that every sample of the series has the same distribution.
-        draw: Draws windows, given where they begin in the series, and what neighbouring windows have in common.
-
-    Returns:
-        float32 array of shape `(num_samples, channels)`.
-    """
+    """Joins windows of noise to a series without seams; `draw` returns windows that begin at given samples, and what neighbours have in common."""
     fade = window // 4
     hop = window - fade
-    lead = int(rng.integers(0, hop))
+    lead = int(rng.integers(0, hop))  # where the first window begins, so that every sample has the same distribution
     num_windows = -(-(num_samples + lead + fade) // hop)
     rise = np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade)
     weights = np.concatenate([rise, np.ones(window - 2 * fade), rise[::-1]])

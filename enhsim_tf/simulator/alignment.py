@@ -6,13 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.constant_level import waves_or_level
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, held_samples
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import pair_with_recording
 from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, held_samples, simulate_schedule
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator, level_offset_and_scale, simulate_schedule, waves_or_level
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.joint import cut, telemetry_of
 

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from enhsim_tf.coarse_simulator.commands import CommandTraces
-from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
-from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
+from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.options import FEWEST_SAMPLES, LEAST_LEARNT, LEAST_WINDOW, MOST_WINDOW, default_window
 from enhsim_tf.telemetry.series import Telemetry

@@ -8,14 +8,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from enhsim_tf.coarse_simulator.commands import CommandTraces
-from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.pairing import Delay, estimate_delay
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
+from enhsim_tf.coarse_simulator.square_waves import ConstantLevel
 from enhsim_tf.common.console import SILENT, Progress
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.candidates import Choice, choose_enhancer, fit_enhancer
-from enhsim_tf.enhancer.held_out_blocks import NUM_FOLDS, split_fold
+from enhsim_tf.enhancer.candidates import NUM_FOLDS, Choice, choose_enhancer, fit_enhancer, split_fold
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
 from enhsim_tf.noise.names import BEST as BEST_NOISE

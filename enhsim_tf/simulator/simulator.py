@@ -12,15 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode, check_schedule
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
 from enhsim_tf.coarse_simulator.recording import Recording, Run, record
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.enhancer.model import Enhancer
-from enhsim_tf.enhancer.overlapping import average_windows, run_starts
-from enhsim_tf.noise.candidates import NoiseModel
-from enhsim_tf.noise.states import model_from, state_of
+from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
+from enhsim_tf.noise.candidates import NoiseModel, model_from, state_of
 from enhsim_tf.simulator.alignment import Alignment, Drawn, Runs, Waves
 from enhsim_tf.simulator.changes import add_changed, blend_changes, fade_length, hold_values, spans, tolerance_of
 from enhsim_tf.simulator.checks import check_counts, check_finite
@@ -485,14 +482,14 @@ class EnhancedSimulator:
             InputError: If the folder contains something other than a saved simulator, or if a number is not finite; the folder is left
                 unchanged.
         """
-        noise, nominal = state_of(self.noise), self.nominal
-        arrays = {"enhancer": self.enhancer.arrays, "noise": noise.arrays, "alignment": self.alignment.arrays}
+        (noise, noise_arrays), nominal = state_of(self.noise), self.nominal
+        arrays = {"enhancer": self.enhancer.arrays, "noise": noise_arrays, "alignment": self.alignment.arrays}
         arrays |= {} if self.levels is None else {"levels": {"rows": self.levels}}
         arrays |= {} if nominal is None else {"nominal": {f"part_{number}": part.values for number, part in enumerate(nominal.parts)}}
         settings = {
             "alignment": self.alignment.settings,
             "enhancer": self.enhancer.settings,
-            "noise": dict(noise.settings),
+            "noise": noise,
             "window": self.window,
             "channels": list(self.channels),
             "interval_s": self.interval_s,

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enhsim_tf.detection import metrics
+from enhsim_tf.enhancer.model import average_windows, run_starts
 from enhsim_tf.enhancer.out_of_range import OutOfRange
-from enhsim_tf.enhancer.overlapping import average_windows, run_starts
 from enhsim_tf.simulator.joint import cut
 
 if TYPE_CHECKING:

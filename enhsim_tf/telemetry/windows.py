@@ -90,6 +90,16 @@ def disjoint_rows(starts: np.ndarray, window: int) -> np.ndarray:
     return np.array(chosen, np.int64)
 
 
+def runs_of(marks: np.ndarray) -> list[tuple[int, int]]:
+    """Returns the first sample and the end (exclusive) of each run of true samples.
+
+    Args:
+        marks: Boolean array of shape `(samples,)`.
+    """
+    edges = np.flatnonzero(np.diff(np.asarray(marks, bool), prepend=False, append=False))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
 def mean_over_windows(scores: np.ndarray, begins: np.ndarray, window: int, num_samples: int) -> np.ndarray:
     """Converts scores of windows to scores of samples: the mean score of the windows that contain a sample.
 

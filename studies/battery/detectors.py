@@ -8,8 +8,7 @@ import numpy as np
 
 from enhsim_tf.detection import metrics
 from enhsim_tf.detection.registry import DETECTORS
-from enhsim_tf.enhancer.candidates import fit_enhancer
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
+from enhsim_tf.enhancer.candidates import block_edges, fit_enhancer, split_fold
 from studies.battery.faults import ALL, Fault, columns_of
 from studies.battery.orbits import ORBIT_SAMPLES
 from studies.battery.record import WINDOW, PairWindows, Recorded, coarse_windows, judged_windows, pair_windows

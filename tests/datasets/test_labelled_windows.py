@@ -7,8 +7,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import MODES, Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode
+from enhsim_tf.coarse_simulator.degraded import MODES, Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.datasets.label_columns import LABELS, write_table
 from enhsim_tf.datasets.labelled_windows import Share, divide_windows, series_labelled, write_windows_labelled

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode, simulate_schedule
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
+from enhsim_tf.coarse_simulator.square_waves import simulate_schedule
 from enhsim_tf.datasets.labelled_windows import draw_schedule
 from enhsim_tf.datasets.places import (
     Place,

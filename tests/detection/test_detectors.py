@@ -3,34 +3,20 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.detection import registry
 from enhsim_tf.detection.autoencoders import ConvolutionalAutoencoder, DenseAutoencoder
 from enhsim_tf.detection.detectors import (
     Innovation,
-    IsolationForestOnFeatures,
     JointMeans,
     JointSize,
     LargestStep,
     LimitCheck,
     MovingDeviation,
     NearestNeighbours,
-    OneClassSVMOnFeatures,
     PCAResidual,
-    RandomScore,
 )
+from enhsim_tf.detection.registry import all_detectors
 
-DETECTORS = {
-    "limit check": lambda seed=0: LimitCheck(),
-    "PCA residual": lambda seed=0: PCAResidual(seed=seed),
-    "nearest neighbours": lambda seed=0: NearestNeighbours(),
-    "isolation forest": lambda seed=0: IsolationForestOnFeatures(num_trees=50, seed=seed),
-    "one-class SVM": lambda seed=0: OneClassSVMOnFeatures(),
-    "dense autoencoder": lambda seed=0, epochs=20: DenseAutoencoder(num_hidden=64, epochs=epochs, seed=seed),
-    "convolutional autoencoder": lambda seed=0, epochs=20: ConvolutionalAutoencoder(epochs=epochs, seed=seed),
-    "largest step": lambda seed=0: LargestStep(),
-    "moving deviation": lambda seed=0: MovingDeviation(width=20),
-    "innovation": lambda seed=0: Innovation(order=20),
-}
+DETECTORS = all_detectors()
 SEEDED = ("isolation forest", "dense autoencoder", "convolutional autoencoder")
 MUST_SEE = {  # anomalies that each detector should find; a constant window is not anomalous for a network with a short receptive field
     "limit check": ["spike", "noisy", "shifted"],
@@ -59,42 +45,28 @@ def waves(number, seed, noise_sd=0.1):
     return (5 + np.sin(2 * np.pi * np.arange(100) / 40 + phases) + noise_sd * rng.standard_normal((number, 100))).astype(np.float32)
 
 
-def changed(windows, change):
-    windows = windows.copy()
-    change(windows)
+def anomalous(kind):
+    """Windows of one kind of anomaly."""
+    windows = waves(60, 1, noise_sd=0.4 if kind == "noisy" else 0.1)
+    if kind == "stuck":
+        windows[:, 30:] = windows[:, 30:31]
+    elif kind == "spike":
+        windows[:, 50] += 3
+    elif kind == "shifted":
+        windows[:, 40:70] += 3
     return windows
-
-
-def stick(windows):
-    windows[:, 30:] = windows[:, 30:31]
-
-
-def strike(windows):
-    windows[:, 50] += 3
-
-
-def shift(windows):
-    windows[:, 40:70] += 3
-
-
-ANOMALIES = {
-    "stuck": changed(waves(60, 1), stick),
-    "noisy": waves(60, 2, noise_sd=0.4),
-    "spike": changed(waves(60, 6), strike),
-    "shifted": changed(waves(60, 7), shift),
-}
 
 
 @pytest.fixture(scope="module", params=DETECTORS)
 def fitted(request):
     """The name of a detector, and the detector fitted to 400 nominal windows."""
-    return request.param, DETECTORS[request.param]().fit(waves(400, 0))
+    return request.param, DETECTORS[request.param](0).fit(waves(400, 0))
 
 
-@pytest.mark.parametrize("anomaly", ANOMALIES)
+@pytest.mark.parametrize("anomaly", ["stuck", "noisy", "spike", "shifted"])
 def test_planted_anomalies_are_found(fitted, anomaly):
     name, detector = fitted
-    nominal, scores = detector.score(waves(60, 3)), detector.score(ANOMALIES[anomaly])
+    nominal, scores = detector.score(waves(60, 3)), detector.score(anomalous(anomaly))
     assert scores.shape == nominal.shape == (60,) and np.isfinite(scores).all()
     if anomaly in MUST_SEE[name]:
         assert area(scores, nominal) > 0.95
@@ -108,23 +80,12 @@ def test_nominal_windows_are_not_told_from_nominal_windows(fitted):
 @pytest.mark.parametrize("name", DETECTORS)
 def test_same_seed_same_scores(name):
     training, windows = waves(120, 0), waves(20, 1)
-    options = {"epochs": 1} if "autoencoder" in name else {}
-    first, again, other = (DETECTORS[name](seed, **options).fit(training).score(windows) for seed in (3, 3, 4))
+    first, again, other = (DETECTORS[name](seed).fit(training).score(windows) for seed in (3, 3, 4))
     assert (first == again).all()
     if name in SEEDED:
         assert (first != other).any()
     else:  # the PCA's solver is random, its components are not
         np.testing.assert_allclose(first, other, rtol=0.1)
-
-
-def test_every_detector_and_control_has_a_name():
-    assert set(DETECTORS) <= set(registry.all_detectors()) and len(set(registry.all_detectors())) == len(registry.all_detectors())
-    assert list(registry.CONTROLS) == ["random score", "largest step", "moving deviation"]
-    made = {name: make(5) for name, make in {**registry.all_detectors(), **registry.CONTROLS}.items()}
-    assert {name: type(detector) for name, detector in made.items() if name in DETECTORS} == {
-        name: type(make()) for name, make in DETECTORS.items()
-    }
-    assert [made[name].seed for name in (*SEEDED, "PCA residual")] == [5] * 4
 
 
 # several channels
@@ -140,12 +101,12 @@ def both_ways(number, seed, noise_sd=0.1):
 
 @pytest.mark.parametrize("name", [name for name in DETECTORS if "autoencoder" not in name])
 def test_an_anomaly_of_one_channel_of_several_is_found(name):
-    detector = DETECTORS[name]().fit(both_ways(400, 0))
-    nominal, anomalous = both_ways(60, 3), both_ways(60, 4)
+    detector = DETECTORS[name](0).fit(both_ways(400, 0))
+    nominal, changed = both_ways(60, 3), both_ways(60, 4)
     for begin, end in ((50, 51), (60, 90)):
-        anomalous[:, begin:end, 1] += 3
-    anomalous[:, 20:60, 1] += np.random.default_rng(9).standard_normal((60, 40))
-    scores, plain = detector.score(anomalous), detector.score(nominal)
+        changed[:, begin:end, 1] += 3
+    changed[:, 20:60, 1] += np.random.default_rng(9).standard_normal((60, 40))
+    scores, plain = detector.score(changed), detector.score(nominal)
     assert scores.shape == plain.shape == (60,) and area(scores, plain) > 0.95
 
 
@@ -178,8 +139,8 @@ def test_innovations_of_a_known_vector_autoregression_are_white_and_those_of_ano
     assert area(LimitCheck().fit(fresh).score(swapped), LimitCheck().fit(fresh).score(fresh)) < 0.6
 
 
-def test_innovations_use_a_quarter_of_a_short_window_and_some_of_many_samples():
-    detector = Innovation(order=48, most_rows=500).fit(vector_autoregression(300, 0, 12))
+def test_innovations_use_a_quarter_of_a_short_window():
+    detector = Innovation(order=48).fit(vector_autoregression(300, 0, 12))
     assert detector.score(vector_autoregression(300, 1, 12)).mean() == pytest.approx(2, rel=0.1)
 
 
@@ -192,12 +153,9 @@ def test_innovation_of_a_channel_that_is_a_copy_of_another_is_finite():
 
 
 def test_limit_check_by_hand():
-    detector = LimitCheck(low=0.25, high=0.75).fit(np.arange(5.0)[None])  # limits 1 and 3
-    assert detector.score(np.array([[2.0, 2.5], [2, 3.5], [-1, 3.5], [1, 3], [9, -9]])).tolist() == [-0.5, 0.5, 2, 0, 10]
-    training = waves(400, 0)
-    low, high = np.quantile(training, [0.001, 0.999])
-    flat = np.full((1, 100), high + 0.25, np.float32)
-    assert LimitCheck().fit(training).score(flat) == pytest.approx(0.25, abs=1e-5)
+    detector = LimitCheck().fit(np.arange(1_001.0)[None])  # limits 1 and 999
+    windows = np.array([[2.0, 2.5], [2, 999.5], [-1, 999.5], [1, 999], [9, -9]])
+    assert detector.score(windows) == pytest.approx([-1, 0.5, 2, 0, 10])
 
 
 def test_distance_to_the_neighbours_by_hand():
@@ -212,28 +170,15 @@ def test_distance_to_the_neighbours_by_hand():
 def test_controls_by_hand():
     windows = np.array([[0.0, 1, -2, -2], [5, 5, 5, 5]])
     assert LargestStep().fit(windows).score(windows).tolist() == [3, 0]
-    assert MovingDeviation(2).fit(windows).score(windows) == pytest.approx([1.5, 0])
-    assert MovingDeviation(4).fit(windows).score(windows) == pytest.approx(np.std(windows, axis=1))
+    assert MovingDeviation().fit(windows).score(windows) == pytest.approx(np.std(windows, axis=1))
     random = waves(5, 0) + 1e4
     stretches = np.lib.stride_tricks.sliding_window_view(random.astype(np.float64), 25, axis=1)
     assert MovingDeviation().score(random) == pytest.approx(stretches.std(axis=2).max(axis=1))
 
 
-def test_random_scores_depend_on_the_seed_only():
-    detector, again = RandomScore(3), RandomScore(3)
-    first, second = detector.fit(waves(5, 0)).score(waves(200, 0)), detector.score(waves(200, 0))
-    assert (first == again.score(waves(200, 1))).all() and (first != second).all()
-    assert area(first, second) == pytest.approx(0.5, abs=5 * np.sqrt(401 / (12 * 200**2)))
-
-
-def test_convolutional_autoencoder_takes_windows_of_odd_length():
-    windows = waves(40, 0)[:, :63]
-    assert ConvolutionalAutoencoder(epochs=1).fit(windows).score(windows[:7]).shape == (7,)
-
-
 @pytest.mark.parametrize("kind", [ConvolutionalAutoencoder, DenseAutoencoder])
 def test_autoencoders_take_several_channels_one_after_the_other(kind):
-    windows = both_ways(40, 0)
+    windows = both_ways(40, 0)[:, :63]  # of odd length
     joined = np.concatenate([windows[:, :, 0], windows[:, :, 1]], axis=1)
     scores = (kind(epochs=1, seed=2).fit(each).score(each) for each in (windows, joined))
     np.testing.assert_array_equal(*scores)
@@ -251,29 +196,16 @@ def test_pca_residual_is_the_energy_outside_the_span():
     assert detector.score(outside) == pytest.approx(energies / 50)
 
 
-def test_pca_takes_no_more_components_than_there_are_windows():
-    windows = waves(10, 0)
-    assert PCAResidual(num_components=20).fit(windows).score(windows) == pytest.approx(np.zeros(10), abs=1e-6)
-
-
 def test_autoencoder_scores_in_units_of_the_training_variance():
     training, windows = waves(150, 0), waves(30, 1)
-    plain, stretched = DenseAutoencoder(64, 16, 4).fit(training), DenseAutoencoder(64, 16, 4).fit(-900 + 64 * training)
+    plain, stretched = DenseAutoencoder(4).fit(training), DenseAutoencoder(4).fit(-900 + 64 * training)
     np.testing.assert_allclose(plain.score(windows), stretched.score(-900 + 64 * windows), rtol=0.02)
-    # an untrained network answers next to nothing of the input: about its variance; a trained one less
-    assert DenseAutoencoder(64, 16, 40).fit(training).score(windows).mean() < 0.2 < plain.score(windows).mean()
-
-
-def test_the_joint_size_of_its_own_windows_is_one_in_any_unit_and_mixture():
-    windows = np.random.default_rng(0).standard_normal((200, 40, 3)) + [1.0, -2.0, 5.0]
-    scores = JointMeans().fit(windows).score(windows)
-    assert scores.mean() == pytest.approx(199 / 200)  # the trace of a covariance times its inverse, of n - 1 in n
-    mixed = windows @ np.array([[1e3, 0.1, 0.0], [0.0, 1e-3, 2.0], [1.0, 0.0, 1.0]])
-    np.testing.assert_allclose(JointMeans().fit(mixed).score(mixed), scores, rtol=1e-4)
 
 
 def test_a_channel_that_leaves_the_others_is_far_although_its_values_are_usual():
     rng = np.random.default_rng(1)
+    own = rng.standard_normal((200, 40, 3)) + [1.0, -2.0, 5.0]
+    assert JointMeans().fit(own).score(own).mean() == pytest.approx(199 / 200)  # a covariance times its inverse, of n - 1 in n
     common = rng.standard_normal((2_000, 1, 1))
     windows = common + 0.1 * rng.standard_normal((2_000, 20, 2))
     apart = windows[:1].copy()
@@ -287,11 +219,6 @@ def test_both_a_short_change_and_a_lasting_one_are_far():
     short, lasting = windows[:500].copy(), windows[:500].copy()
     short[:, 10:20, 0] += 1.6  # 5 deviations of the mean of a quarter, 2.5 of the mean of the window
     lasting[:, :, 0] += 0.8  # 2.5 deviations of the mean of each quarter, 5 of that of the window
-    limit = np.quantile(JointSize().fit(windows).score(windows), 0.99)
-    shares = {
-        parts: np.mean(JointMeans(parts).fit(windows).score(short) > np.quantile(JointMeans(parts).fit(windows).score(windows), 0.99))
-        for parts in (1, 4)
-    }
-    assert shares[4] > shares[1] + 0.2
+    detector = JointSize().fit(windows)
     for changed in (short, lasting):
-        assert np.mean(JointSize().fit(windows).score(changed) > limit) > 0.8
+        assert np.mean(detector.score(changed) > np.quantile(detector.score(windows), 0.99)) > 0.8

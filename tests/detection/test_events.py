@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day, runs_of
+from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
+from enhsim_tf.telemetry.windows import runs_of
 
 
 def marks(text):
@@ -41,12 +42,3 @@ def test_false_alarms_per_day_have_the_exact_poisson_interval():
         _, low, high = false_alarms_per_day(int(count), 3 * 86_400)
         covered += low <= 2 <= high
     assert covered / 2_000 >= 0.94  # an exact interval covers at least 95 % of the time
-
-
-def test_wrong_arguments_are_refused(refused):
-    with refused("one shape"):
-        events_of(np.ones(3, bool), np.ones(4))
-    with refused("gap"):
-        events_of(np.ones(3, bool), gap=-1)
-    with refused("duration"):
-        false_alarms_per_day(1, 0)

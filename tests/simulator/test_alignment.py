@@ -3,11 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode
-from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
+from enhsim_tf.coarse_simulator.square_waves import ConstantLevel, SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.alignment import Runs, Waves, least_squares
 from tests.simulator.conftest import coarse_run, series

@@ -7,7 +7,7 @@ import pytest
 from enhsim_tf.coarse_simulator.recording import Recording, Run
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.registry import register, unregister
+from enhsim_tf.detection.registry import DETECTORS, register
 from enhsim_tf.simulator.joint import join_channels
 from enhsim_tf.simulator.options import ScoreOptions
 from enhsim_tf.simulator.scoring import Scorer, check_fits, event_rows, events_table, score, write_scores
@@ -161,7 +161,7 @@ def largest():
         register(name, lambda seed, added=added: Largest(added))
     yield list(names)
     for name in names:
-        unregister(name)
+        del DETECTORS[name]
 
 
 def by_hand(series, window=24):

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.degraded import Degraded
+from enhsim_tf.coarse_simulator.degraded import Degraded, ScheduledMode
 from enhsim_tf.coarse_simulator.interface import FunctionSimulator
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from tests.simulator.conftest import PERIOD, WINDOW, coarse_run, smooth_wave

@@ -12,7 +12,7 @@ import pytest
 
 from enhsim_tf.common import measures as fidelity
 from studies.robustness.real_floor import MEASURES, RealFloor, evaluate
-from tests.noise import negative_controls
+from tests.studies.robustness import negative_controls
 
 pytestmark = pytest.mark.slow
 NUM_WINDOWS, SAMPLES = 200, 500

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
-from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import DETECTORS
+from studies.common.controls import CONTROLS
 from studies.common.settings import make_settings
 from studies.robustness import replicate, run
 from studies.robustness.degraded_modes import METHODS, SEVERITIES

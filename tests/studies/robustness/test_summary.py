@@ -8,7 +8,8 @@ import pytest
 
 from enhsim_tf.coarse_simulator.degraded import MODES
 from enhsim_tf.common.errors import InputError
-from enhsim_tf.detection.registry import CONTROLS, DETECTORS
+from enhsim_tf.detection.registry import DETECTORS
+from studies.common.controls import CONTROLS
 from studies.common.environments import NOISES
 from studies.robustness import summary
 from studies.robustness.degraded_modes import METHODS

@@ -15,13 +15,7 @@ Control = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 
 
 def process(num_windows: int, samples: int, rng: np.random.Generator) -> np.ndarray:
-    """Windows of the process, float32 of shape `(num_windows, samples)`.
-
-    Args:
-        num_windows: Number of windows.
-        samples: Samples of each.
-        rng: Random generator.
-    """
+    """Windows of the process, float32 of shape `(num_windows, samples)`."""
     from scipy.signal import lfilter
 
     values = lfilter([1.0], [1.0, -0.7], rng.standard_t(5, (num_windows, samples + 100)), axis=1)[:, 100:]

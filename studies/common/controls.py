@@ -1,0 +1,34 @@
+"""Controls beside the detectors: trivial scores that every useful detector should outperform."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from enhsim_tf.detection.interface import Detector
+from enhsim_tf.detection.registry import FURTHER
+
+
+class RandomScore:
+    """Random scores, independent of the windows. Each call continues the random sequence.
+
+    Args:
+        seed: Seed for the scores.
+    """
+
+    def __init__(self, seed: int = 0):
+        self._rng = np.random.default_rng(seed)
+
+    def fit(self, windows: np.ndarray) -> "RandomScore":
+        """Does nothing, because this control has no parameters to fit."""
+        return self
+
+    def score(self, windows: np.ndarray) -> np.ndarray:
+        """Returns random numbers that are uniformly distributed between 0 and 1."""
+        return self._rng.random(len(windows))
+
+
+CONTROLS: dict[str, Callable[[int], Detector]] = {
+    "random score": RandomScore,
+    **{name: FURTHER[name] for name in ("largest step", "moving deviation")},
+}
+"""Maps each control's name to a factory, which takes a seed."""
