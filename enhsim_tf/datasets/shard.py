@@ -20,7 +20,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.datasets.label_columns import NOMINAL
 from enhsim_tf.datasets.labelled_windows import value_names, window_arrays, window_columns
 from enhsim_tf.datasets.plan import FORMAT, Plan
-from enhsim_tf.simulator.saving import MANIFEST
+from enhsim_tf.simulator.model_folder import MANIFEST
 
 if TYPE_CHECKING:
     import pyarrow as pa

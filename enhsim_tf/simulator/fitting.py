@@ -20,7 +20,6 @@ from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.names import COARSE, RIDGE
 from enhsim_tf.noise.names import BEST as BEST_NOISE
 from enhsim_tf.simulator.alignment import Runs, Waves, pair_recordings
-from enhsim_tf.simulator.checks import check_size
 from enhsim_tf.simulator.coarse_choice import COMMANDS, LEAST_SAMPLES, choose_coarse
 from enhsim_tf.simulator.detector_choice import choose_detector, judge_detectors
 from enhsim_tf.simulator.joint import cut, join_channels, long_enough, split_end, telemetry_of, times_of
@@ -38,6 +37,7 @@ _NUM_LEVELS = 500  # most windows whose offset and gain are kept
 _LEAST_FOLLOWED = 0.1  # share of the windows that have to follow a square wave for a shape to be learnt from them
 _MOST_VALUES = 1_500_000  # of all training windows, which bounds time and memory of a fit of many channels
 _LEAST_WINDOWS = 300  # training windows, however many channels
+_LEAST_SPAN, _MOST_SIZE = 1e-12, 1e15  # beyond them, squares of the noise or of the values leave the range of float32
 
 
 def fit(
@@ -67,11 +67,20 @@ def fit(
     options, recording = options or FitOptions(), _recording_of(telemetry)
     for channel, name in enumerate(recording.columns):
         values = np.concatenate([part.values[:, channel] for part in recording.parts])
-        check_size(check_values(values, name), name)
+        _check_size(check_values(values, name), name)
     with threadpool_limits(1):  # several threads take longer for arrays of this size, and round differently
         if coarse is not None:
             return _fit_runs(recording, coarse, options, progress)
         return _fit_waves(recording, options, progress, commands)
+
+
+def _check_size(values: np.ndarray, name: str) -> None:
+    low, high = float(np.min(values)), float(np.max(values))
+    if not (max(-low, high) <= _MOST_SIZE and high - low >= _LEAST_SPAN):
+        raise InputError(
+            f"Expected values up to {_MOST_SIZE:g} that span at least {_LEAST_SPAN:g}. Received: {name}, from {low:g} to {high:g}. "
+            "Give it in another unit."
+        )
 
 
 def _recording_of(telemetry: Any) -> Recording:

@@ -106,7 +106,7 @@ class Scorer:
     def _of_generated(self, length: int, seed: int) -> np.ndarray:
         series = self.simulator.generate_series(length * self.window, seed=seed)
         if self.simulator.is_run_model:
-            series = series - self.simulator._nominal_series(len(series), 0.0)
+            series = series - self.simulator.nominal_series(len(series))
         return self._raw(series)
 
     def _of_nominal(self, nominal: Recording | None, run: Recording | None) -> np.ndarray:

@@ -10,7 +10,7 @@ from enhsim_tf.common.console import Progress
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection.registry import CONTROLS, DETECTORS
 from enhsim_tf.noise.surrogates import GaussianAutoregression, GaussianNoise
-from enhsim_tf.simulator.checks import check_finite
+from enhsim_tf.simulator.simulator import check_finite
 from enhsim_tf.telemetry.series import Telemetry
 from enhsim_tf.telemetry.windows import cut_windows, evenly_spaced_starts, random_window_starts
 from studies.common.block_bootstrap import BlockBootstrap

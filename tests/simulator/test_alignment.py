@@ -6,7 +6,6 @@ import pytest
 from enhsim_tf.coarse_simulator.constant_level import ConstantLevel
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.recording import Recording, Run
-from enhsim_tf.coarse_simulator.schedule import ScheduledMode
 from enhsim_tf.coarse_simulator.square_waves import SquareWave, SquareWaveSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.alignment import Runs, Waves, least_squares
@@ -103,20 +102,21 @@ def test_a_series_is_drawn_with_what_stands_still(waves):
     square = np.where((5 + np.arange(200)) % 40 < 20, 1.0, -1.0)  # begins at 5 s
     stuck = square.copy()
     stuck[50:100] = square[50]  # the second half of the first hundred samples
-    drawn = waves.draw_series(200, 5.0, Degraded("stuck", 1.0, 0.5, "a"), (), 100, np.random.default_rng(0))
+    drawn = waves.draw_series(200, 5.0, [(Degraded("stuck", 1.0, 0.5, "a"), 0, 100)], np.random.default_rng(0))
     np.testing.assert_array_equal(drawn.nominal, np.stack([square, np.zeros(200)], axis=1)[None])
     np.testing.assert_array_equal(drawn.coarse, np.stack([stuck, np.zeros(200)], axis=1)[None])
-    assert drawn.held == [(0, 0, 50, 100)]
+    places = np.arange(200)
+    np.testing.assert_array_equal(drawn.held[0].T, [np.where((places >= 50) & (places < 100), 50, places), places])
     stuck = square.copy()
     stuck[30:50] = square[30]
-    drawn = waves.draw_series(200, 5.0, None, [ScheduledMode("stuck", 1.0, 30, 20)], 200, np.random.default_rng(0))
+    drawn = waves.draw_series(200, 5.0, [(Degraded("stuck", 1.0, 0.0), 30, 50)], np.random.default_rng(0))
     np.testing.assert_array_equal(drawn.coarse[0, :, 0], stuck)
-    assert drawn.held == [(0, 0, 30, 50), (0, 1, 30, 50)]
+    assert (drawn.held[0, 30:50] == 30).all() and (drawn.held[0, 50:] == places[50:, None]).all()
 
 
 def test_windows_name_what_stands_still_in_them(waves):
     drawn = waves.draw(np.array([0, 7, 9]), [None, Degraded("stuck", 1.0, 0.25, "b"), Degraded("drift", 1.0)], np.random.default_rng(0))
-    assert drawn.held == [(1, 1, 20, 80)]
+    assert (drawn.held != np.arange(80)[:, None]).sum(axis=1).tolist() == [[0, 0], [0, 59], [0, 0]] and (drawn.held[1, 20:, 1] == 20).all()
     assert (drawn.coarse != drawn.nominal).any(axis=1).tolist() == [
         [False, False],
         [False, False],
@@ -156,7 +156,7 @@ def test_windows_of_a_run_begin_again_after_the_last():
     values = coarse_run(100).parts[0].values
     drawn = Runs(coarse_run(100), 80).draw(np.array([0, 20, 21, 43]), [None] * 4, np.random.default_rng(0))
     np.testing.assert_array_equal(drawn.coarse, [values[:80], values[20:], values[:80], values[1:81]])
-    assert drawn.held == [] and drawn.nominal is drawn.coarse
+    assert drawn.held is None and drawn.nominal is drawn.coarse
 
 
 def test_a_saved_run_is_the_same_and_one_that_is_not_finite_is_none():
