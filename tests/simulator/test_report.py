@@ -3,9 +3,8 @@ import json
 import numpy as np
 import pytest
 
+from enhsim_tf.simulator.figures import report_figure, score_figure
 from enhsim_tf.simulator.report import correlation_of
-from enhsim_tf.simulator.report_figure import report_figure
-from enhsim_tf.simulator.score_figure import score_figure
 from enhsim_tf.simulator.scoring import score
 from tests.simulator.conftest import joint
 

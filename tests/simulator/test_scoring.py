@@ -71,9 +71,9 @@ def test_the_same_seed_gives_the_same_scores(single, telemetry):
 
 
 def test_events_join_flags_within_a_window_and_count_them_by_hand():
-    scores = np.full(100, 0.5)
-    scores[10:13], scores[20], scores[60:62], scores[90] = (2.0, 3.0, 2.0), 1.5, 4.0, 1.0  # the threshold itself is no alarm
-    rows = event_rows(scores, 1_000, np.full(400, 0.9), 10, 2.0)
+    scores = np.full(1_100, 0.5)
+    scores[1_010:1_013], scores[1_020], scores[1_060:1_062], scores[1_090] = (2.0, 3.0, 2.0), 1.5, 4.0, 1.0  # the threshold is no alarm
+    rows = event_rows(scores, [0, 1_000, 1_100], np.full(400, 0.9), 10, 2.0)
     assert [(row["begin"], row["end"], row["peak"], row["num_flagged"], row["duration_s"]) for row in rows] == [
         (1_010, 1_021, 1_011, 4, 22.0),
         (1_060, 1_062, 1_060, 2, 4.0),
