@@ -4,8 +4,6 @@ The score is computed from coarse windows only. It needs neither a network nor t
 error of the coarse simulator itself.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -13,7 +11,6 @@ from enhsim_tf.common.errors import InputError
 
 _CHUNK = 2_048  # number of windows scored at a time
 _MAX_KEPT = 10_000  # maximum number of training windows whose coordinates are kept
-_FITTED = ("mean", "unit", "components", "coordinates")
 
 
 class OutOfRange:
@@ -25,17 +22,10 @@ class OutOfRange:
 
         sqrt(mean squared residual + weight * mean squared distance to the nearest training window's coordinates) / unit
 
-    where `unit` is the standard deviation of the training windows. Nominal windows have a small positive score rather than
-    zero. To obtain a limit, apply `enhsim_tf.detection.metrics.threshold` to the scores of held-out nominal windows.
-
-    The form was chosen among four candidates by their rank correlation with the true error of the paper's enhancer, over
-    degraded modes of all severities and over square waves with other proportions and phases:
-
-    - The residual alone ranks degraded modes equally well, but it does not respond to nominal waves in proportions and
-      phases that are absent from training.
-    - The distance to the nearest training window alone responds to those, but it ranks degraded modes worse, because it
-      gives full weight to shifts along directions that the enhancer follows well.
-    - The Mahalanobis distance within the subspace decreases when most of the degraded modes become more severe.
+    where `unit` is the standard deviation of the training windows. Nominal windows have a small positive score rather than zero.
+    Of four candidates, this form ranks degraded modes and nominal waves in other proportions and phases best by the true error of the
+    paper's enhancer: the residual alone does not see such waves, the distance alone overrates shifts that the enhancer follows well, and the
+    Mahalanobis distance decreases when most of the modes become more severe.
 
     Args:
         explained: Share of the training windows' variance that the components explain, between 0 and 1.
@@ -54,13 +44,7 @@ class OutOfRange:
         self.explained, self.weight = explained, weight
 
     def fit(self, coarse_windows: np.ndarray) -> "OutOfRange":
-        """Fits the principal components and stores the coordinates of the training windows.
-
-        Args:
-            coarse_windows: The enhancer's training windows, shape `(windows, samples)`. Duplicate windows are counted once.
-
-        Returns:
-            This object, fitted.
+        """Fits the principal components to training windows of shape `(windows, samples)`; duplicates are counted once.
 
         Raises:
             InputError: If there are fewer than two distinct windows, or if a value is not finite.
@@ -81,20 +65,13 @@ class OutOfRange:
         return self
 
     def score(self, coarse_windows: np.ndarray) -> np.ndarray:
-        """Computes the score of each window.
+        """Computes the score of each window of shape `(windows, samples)`, float64 of shape `(windows,)`.
 
-        Args:
-            coarse_windows: Coarse windows, shape `(windows, samples)`.
-
-        Returns:
-            float64 array of shape `(windows,)`. Windows within the training range score close to 0. A window that is one
-            standard deviation of the training windows away scores about 1.
+        Windows within the training range score close to 0, one that is a standard deviation of the training windows away about 1.
 
         Raises:
-            InputError: If the score is not fitted, if the windows differ in length from the training windows, or if a value
-                is not finite.
+            InputError: If the windows differ in length from the training windows, or if a value is not finite.
         """
-        self._check_fitted()
         windows = _checked(coarse_windows, len(self._mean))
         with threadpool_limits(1):
             chunks = [self._score(windows[begin : begin + _CHUNK]) for begin in range(0, len(windows), _CHUNK)]
@@ -108,38 +85,6 @@ class OutOfRange:
         left = np.sum((centred - coordinates @ self._components) ** 2, axis=1)
         nearest = cdist(coordinates, self._coordinates, "sqeuclidean").min(axis=1)
         return np.sqrt((left + self.weight * nearest) / windows.shape[1]) / self._unit
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The numbers of the fitted score by name, usually much less than one megabyte.
-
-        Raises:
-            InputError: If the score is not fitted.
-        """
-        self._check_fitted()
-        return {name: np.asarray(getattr(self, name)) for name in ("explained", "weight")} | {
-            name: np.asarray(getattr(self, f"_{name}")) for name in _FITTED
-        }
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "OutOfRange":
-        """Restores a score from its `arrays`.
-
-        Args:
-            arrays: The numbers by name.
-
-        Raises:
-            ValueError: If the arrays are not those of a score.
-        """
-        restored = cls(float(arrays["explained"]), float(arrays["weight"]))
-        for name in _FITTED:
-            setattr(restored, f"_{name}", arrays[name])
-        restored._score(np.zeros((1, len(restored._mean))))  # fails if the shapes of the arrays do not match
-        return restored
-
-    def _check_fitted(self) -> None:
-        if not hasattr(self, "_mean"):
-            raise InputError("Expected a fitted score. Received: OutOfRange before fit. Call fit with the training windows.")
 
 
 def _checked(windows: np.ndarray, num_samples: int | None = None) -> np.ndarray:

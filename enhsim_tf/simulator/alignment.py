@@ -17,6 +17,7 @@ from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.joint import cut, telemetry_of
 
 MIN_GAIN = 0.1  # of the amplitude of the square wave; a window with a smaller gain is too flat to learn a shape from
+START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 _NUM_PHASES = 400  # phases of one period at which a window is compared with the waveform
 _SAME_PERIOD = 0.02  # largest relative difference of periods that are one clock
 
@@ -85,11 +86,7 @@ class Waves:
         return self._in_unit(channel, self.simulators[channel].simulate(starts[:, None] + self.interval_s * np.arange(self.window)))
 
     def align(self, targets: np.ndarray) -> Aligned:
-        """Finds phase, offset and gain of each window and channel.
-
-        Args:
-            targets: Telemetry windows, shape `(windows, samples, channels)`.
-        """
+        """Finds phase, offset and gain of each channel in telemetry windows of shape `(windows, samples, channels)`."""
         coarse = np.zeros(targets.shape, np.float32)
         shift, gain = np.zeros((2, len(targets), targets.shape[2]))
         for channel, simulator in enumerate(self.simulators):
@@ -117,9 +114,6 @@ class Waves:
         """Returns the waves with one period where periods are nearly equal, at the distance in phase that telemetry windows show.
 
         Periods that are fitted to each channel alone differ a little, and over a long time every relation of their phases would occur.
-
-        Args:
-            targets: Telemetry windows, shape `(windows, samples, channels)`.
         """
         simulators = list(self.simulators)
         moving = [number for number, each in enumerate(simulators) if not each.is_constant]
@@ -141,13 +135,7 @@ class Waves:
         return gain < MIN_GAIN * waves
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Degraded | None], rng: np.random.Generator) -> Drawn:
-        """Simulates coarse windows.
-
-        Args:
-            starts: First sample of each window on the clock of the waves, shape `(windows,)`.
-            scenarios: Degraded mode of each window, or None.
-            rng: Draws what is random in a degraded mode.
-        """
+        """Simulates coarse windows that begin at these samples of the clock of the waves, each with its scenario or None."""
         starts, rows_of = np.asarray(starts), {}
         for row, scenario in enumerate(scenarios):
             if scenario is not None:
@@ -156,16 +144,9 @@ class Waves:
         changes = [(channel, rows, scenario, 0, self.window) for scenario, rows in rows_of.items() for channel in self._concerned(scenario)]
         return self._degraded(nominal, self._times(starts), changes, rng) if changes else Drawn(nominal, nominal)
 
-    def draw_series(self, num_samples: int, start_s: float, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
-        """Simulates one coarse series, as a single window.
-
-        Args:
-            num_samples: Its length.
-            start_s: Time of its first sample.
-            events: Degraded modes, each with its first sample and its end.
-            rng: Draws what is random in a degraded mode.
-        """
-        times, numbers = (start_s + self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
+    def draw_series(self, num_samples: int, events: Sequence[tuple[Degraded, int, int]], rng: np.random.Generator) -> Drawn:
+        """Simulates one coarse series, as a single window of `num_samples`; each event is a mode, its first sample and its end."""
+        times, numbers = (self.interval_s * np.arange(num_samples))[None], range(len(self.simulators))
         nominal = np.stack([self._in_unit(channel, self.simulators[channel].simulate(times)) for channel in numbers], axis=2)
         changes = [(channel, [0], *event) for channel in numbers for event in events if channel in self._concerned(event[0])]
         return self._degraded(nominal, times, changes, rng)
@@ -312,35 +293,48 @@ class Runs:
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """The parts of the nominal run by name."""
-        return {f"part_{number}": part.values for number, part in enumerate(self.nominal.parts)}
+        return arrays_of_recording(self.nominal)[0]
 
     @property
     def settings(self) -> dict[str, Any]:
         """All else, in plain JSON types."""
-        kept = {"columns": list(self.columns), "start": self.nominal.start, "offsets_s": [part.offset_s for part in self.nominal.parts]}
-        return {"kind": self.kind, "delay_s": self.delay_s, "name": self.name, "commands": self.commands} | kept
+        own = {"kind": self.kind, "delay_s": self.delay_s, "name": self.name, "commands": self.commands, "columns": list(self.columns)}
+        return own | arrays_of_recording(self.nominal)[1]
 
     @classmethod
     def from_arrays(
         cls, settings: Mapping[str, Any], arrays: Mapping[str, np.ndarray], channels: Sequence[str], interval_s: float, window: int
     ) -> "Runs":
         """Builds the alignment again; raises ValueError if it is none."""
-        runs = tuple(Run(arrays[f"part_{number}"], float(offset)) for number, offset in enumerate(settings["offsets_s"]))
-        nominal = Recording(runs, tuple(settings["columns"]), interval_s, settings["start"], str(settings["name"]))
-        if not np.isfinite([settings["delay_s"], *settings["offsets_s"]]).all() or any(run.values.dtype != np.float32 for run in runs):
+        nominal = recording_of(arrays, settings, tuple(settings["columns"]), interval_s, str(settings["name"]))
+        if not np.isfinite([settings["delay_s"], *settings["offsets_s"]]).all() or any(
+            run.values.dtype != np.float32 for run in nominal.parts
+        ):
             raise ValueError("a nominal run that is not finite, or of another type")
-        return cls(nominal, window, settings["delay_s"], None, str(settings["name"]), settings["commands"])
+        return cls(nominal, window, settings["delay_s"], None, nominal.name, settings["commands"])
+
+
+def arrays_of_recording(recording: Recording) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """What is saved of a recording: its parts as arrays by name, and its times in plain JSON types."""
+    arrays = {f"part_{number}": part.values for number, part in enumerate(recording.parts)}
+    return arrays, {"start": recording.start, "offsets_s": [part.offset_s for part in recording.parts]}
+
+
+def recording_of(
+    arrays: Mapping[str, np.ndarray], settings: Mapping[str, Any], columns: tuple[str, ...], interval_s: float, name: str
+) -> Recording:
+    """Builds a recording again from what `arrays_of_recording` returns; raises ValueError if a value is not finite."""
+    parts = tuple(Run(arrays[f"part_{number}"], float(offset)) for number, offset in enumerate(settings["offsets_s"]))
+    if not all(np.isfinite(part.values).all() for part in parts):
+        raise ValueError("a recording that is not finite")
+    return Recording(parts, columns, interval_s, settings["start"], name)
 
 
 Alignment = Waves | Runs
 
 
 def pair_recordings(telemetry: Recording, run: Recording, delay_s: float, least_samples: int) -> tuple[Recording, Recording]:
-    """Cuts telemetry and a coarse run to the stretches that both cover; see `pairing.pair_with_recording`.
-
-    Returns:
-        The telemetry and the run, with the same parts on the clock of the telemetry.
-    """
+    """Cuts telemetry and a coarse run to the same parts, which both cover, on the clock of the telemetry; see `pair_with_recording`."""
     values, coarse, interval_s = [], [], telemetry.interval_s
     for pair in pair_with_recording(telemetry_of(telemetry), run, delay_s, least_samples):
         low = pair.telemetry.offset_s

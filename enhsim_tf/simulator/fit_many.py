@@ -36,14 +36,7 @@ THREADS = 1  # of a worker
 
 @dataclasses.dataclass(frozen=True)
 class CoarseRun:
-    """Where the recorded run of a coarse simulator is.
-
-    Args:
-        source: A source of telemetry, see `sources.read_source`.
-        columns: Names of the columns that are inputs; None: all numeric columns.
-        time: Name of the time column; None: it is detected.
-        start: Time of its zero in UTC, if its times count from zero; None: its times are those of the telemetry.
-    """
+    """Where the recorded run of a coarse simulator is; see `recording_files.read_recording` for its columns, time and start."""
 
     source: str
     columns: Sequence[str] | None = None

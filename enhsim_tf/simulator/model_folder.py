@@ -48,19 +48,14 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
     models = Path(os.path.abspath(models))  # so that "." has a name too
     if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
-    folders = sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else []
-    if not folders:
+    found = {
+        urllib.parse.unquote(manifest.parent.name): manifest.parent
+        for manifest in (sorted(models.glob(f"[!.]*/{MANIFEST}")) if os.path.isdir(models) else [])
+    }
+    if not found:
         raise InputError(
             f"Expected a folder of fitted simulators. Received: {printable(str(models))[:200]}, which contains none. Make one with `fit`."
         )
-    found: dict[str, Path] = {}
-    for folder in (manifest.parent for manifest in folders):
-        name = urllib.parse.unquote(folder.name)
-        if name in found:
-            raise InputError(
-                f"Expected one folder per channel. Received: {found[name].name} and {folder.name}, both of {name!r}. Remove one."
-            )
-        found[name] = folder
     return found
 
 
@@ -94,10 +89,10 @@ def refuse_foreign(folder: str | os.PathLike) -> None:
 
 
 def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.ndarray]], settings: Mapping[str, Any]) -> None:
-    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged.
+    """Writes a simulator to a folder atomically: if a step fails, the folder is left unchanged. A simulator that was there is replaced.
 
     Args:
-        folder: The folder. A simulator that was saved there before is replaced.
+        folder: The folder.
         arrays: For each part of the simulator, such as `enhancer`, its arrays by name.
         settings: All other settings, in plain JSON types.
 
@@ -171,14 +166,7 @@ def channels_of(folder: str | os.PathLike) -> tuple[str, ...]:
 
 
 def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, Mapping[str, np.ndarray]], Mapping[str, Any]], Any]) -> Any:
-    """Loads a saved simulator.
-
-    Args:
-        folder: A folder written by `write_saved`.
-        make: Function that creates the simulator from the arrays of each part and the settings.
-
-    Returns:
-        What `make` returns.
+    """Loads a saved simulator; `make` creates it from the arrays of each part and the settings.
 
     Raises:
         InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.

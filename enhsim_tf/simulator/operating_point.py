@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from enhsim_tf.enhancer.overlapping import run_starts
 from enhsim_tf.simulator.joint import cut
 from enhsim_tf.simulator.simulator import EnhancedSimulator
 from enhsim_tf.telemetry.windows import evenly_spaced_starts
@@ -19,12 +20,9 @@ _NUM_WINDOWS = 400  # windows of which properties are measured
 
 
 class Departure(NamedTuple):
-    """A lasting departure from what was learnt.
+    """A lasting departure from what was learnt: its first sample, and what differs, as `changed_properties` names it.
 
-    Args:
-        begin: Its first sample.
-        what: What differs: names of `properties`, the clearest first; `shape` if none of them does.
-        scores: Scores of all samples, from `begin` on those of the telemetry moved back to the nominal level and amplitude.
+    From there on, `scores` are those of the telemetry moved back to the nominal level and amplitude.
     """
 
     begin: int
@@ -40,11 +38,8 @@ def find_departure(
 ) -> Departure | None:
     """Finds a departure that lasts until the end of the telemetry; None if the flags do not last.
 
-    Args:
-        simulator: The simulator.
-        score_series: Scores every sample of a series of shape `(samples, channels)`.
-        scores: Scores of all samples, shape `(samples,)`, NaN where nothing was scored.
-        judged: For each scored stretch its first sample, and what was judged, shape `(samples, channels)`.
+    Scores have the shape `(samples,)`, with NaN where nothing was scored; `score_series` is that of a `Scorer`, and `judged` what it has judged:
+    for each stretch its first sample and a series of shape `(samples, channels)`.
     """
     window, nominal, has_left = simulator.window, _nominal_windows(simulator), scores > 1
     if nominal is not None:
@@ -75,12 +70,8 @@ def find_departure(
 def lasting(has_left: np.ndarray, is_scored: np.ndarray, window: int) -> int | None:
     """Returns the first sample of a departure that lasts until the end, or None.
 
-    From there on at least `LEAST_FLAGGED` of the scored samples have left what was learnt, over at least `LEAST_WINDOWS` windows.
-
-    Args:
-        has_left: Whether a sample is flagged, or in a window whose level or amplitude was never seen, shape `(samples,)`.
-        is_scored: Whether a sample has a score.
-        window: Length of a window in samples.
+    From there on at least `LEAST_FLAGGED` of the scored samples are flagged, or in a window whose level or amplitude was never seen, over at
+    least `LEAST_WINDOWS` windows.
     """
     places = np.flatnonzero(is_scored)
     flags = has_left[places]
@@ -91,14 +82,8 @@ def lasting(has_left: np.ndarray, is_scored: np.ndarray, window: int) -> int | N
 
 
 def beyond(series: np.ndarray, limits: tuple[np.ndarray, np.ndarray], window: int) -> np.ndarray:
-    """Marks the samples of windows whose level or amplitude leaves the limits, shape `(samples,)`.
-
-    Args:
-        series: Shape `(samples, channels)`, with at least a window of samples.
-        limits: Lowest and highest level and amplitude of each channel, each of shape `(2, channels)`.
-        window: Length of a window in samples.
-    """
-    starts = np.unique(np.append(np.arange(0, len(series) - window + 1, max(1, window // 2)), len(series) - window))
+    """Marks the samples of windows whose level or amplitude leaves the lowest and highest ones, each of shape `(2, channels)`."""
+    starts = run_starts(len(series), window, max(1, window // 2))
     found = _level_and_amplitude(cut([series], starts, window))
     marks = np.zeros(len(series), bool)
     for start in starts[((found < limits[0]) | (found > limits[1])).any(axis=(1, 2))]:
@@ -131,14 +116,10 @@ def changed_properties(nominal: np.ndarray, after: np.ndarray) -> tuple[str, ...
 
 
 def properties(windows: np.ndarray) -> dict[str, np.ndarray]:
-    """Measures level, amplitude, period and the relation of the channels of each window.
+    """Measures level, amplitude, period and the relation of the channels of each window of shape `(samples, channels)`.
 
-    Args:
-        windows: Shape `(windows, samples, channels)`.
-
-    Returns:
-        For each property an array of shape `(windows, values)`: the mean, the standard deviation, the logarithm of the mean frequency, and the
-        correlations of all pairs of channels.
+    They are the mean, the standard deviation, the logarithm of the mean frequency, and the correlations of all pairs of channels, each of shape
+    `(windows, values)`.
     """
     values = np.asarray(windows, np.float64)
     centred = values - values.mean(axis=1, keepdims=True)
@@ -157,15 +138,8 @@ def properties(windows: np.ndarray) -> dict[str, np.ndarray]:
 
 def _nominal_windows(simulator: EnhancedSimulator) -> np.ndarray | None:
     """What a detector sees of the nominal telemetry of the fit; None if there is none."""
-    nominal, window = simulator.nominal, simulator.window
-    long = [] if nominal is None else [number for number, part in enumerate(nominal.parts) if len(part) >= window]
-    if not long:
-        return None
-    series = [nominal.parts[number].values for number in long]
-    if simulator.is_run_model:
-        runs = simulator.alignment.nominal.parts
-        series = [each - simulator.enhance_run(runs[number].values) for number, each in zip(long, series, strict=True)]
-    return _windows_of(series, window)
+    series = [] if simulator.nominal is None else simulator.judged_series(simulator.nominal, simulator.nominal_run)
+    return _windows_of(series, simulator.window) if series else None
 
 
 def _windows_of(series: Sequence[np.ndarray], window: int) -> np.ndarray:

@@ -4,6 +4,7 @@ The threshold is the larger of two: that of generated telemetry, and that of the
 threshold, and never undercuts what real nominal time shows.
 """
 
+import dataclasses
 import functools
 import itertools
 import os
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording
+from enhsim_tf.coarse_simulator.recording import SAME_RATE, Recording, Run
 from enhsim_tf.common.atomic_files import replace_file
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.detection import metrics
@@ -22,6 +23,7 @@ from enhsim_tf.detection.detectors import JointSize
 from enhsim_tf.detection.events import Event, confidences, events_of, false_alarms_per_day
 from enhsim_tf.detection.registry import RESIDUAL, all_detectors
 from enhsim_tf.detection.residual_size import ResidualSize, root_mean_square
+from enhsim_tf.enhancer.overlapping import run_starts
 from enhsim_tf.simulator.joint import cut, telemetry_of
 from enhsim_tf.simulator.operating_point import Departure, find_departure
 from enhsim_tf.simulator.options import ScoreOptions
@@ -49,19 +51,11 @@ class Scorer:
     channels the distance of `JointSize`.
 
     Args:
-        simulator: The simulator.
+        simulator: The simulator, whose nominal telemetry bounds the threshold from below.
         options: Options of the scoring.
-        nominal: Nominal telemetry that bounds the threshold from below. None: that of the fit.
-        run: Its coarse run, for recorded runs. None: that of the fit.
     """
 
-    def __init__(
-        self,
-        simulator: EnhancedSimulator,
-        options: ScoreOptions | None = None,
-        nominal: Recording | None = None,
-        run: Recording | None = None,
-    ):
+    def __init__(self, simulator: EnhancedSimulator, options: ScoreOptions | None = None):
         self.simulator, self.options = simulator, options or ScoreOptions()
         self.window, self.stride = simulator.window, max(1, simulator.window // _STRIDES)
         self.name = self.options.detector or ScoreOptions(str(simulator.trained.get("detector", DEFAULT))).detector
@@ -80,9 +74,7 @@ class Scorer:
         else:
             self.detector.fit(self._judged(training))
         generated, self.rate = metrics.finite_threshold(self._of_generated(seed + 1), self.options.false_alarm_rate, self._length)
-        if nominal is None:
-            nominal, run = simulator.nominal, simulator.alignment.nominal if simulator.is_run_model else None
-        real, self.nominal_threshold = self._of_nominal(nominal, run), -np.inf
+        real, self.nominal_threshold = self._of_nominal(), -np.inf
         if len(real):
             self.nominal_threshold = metrics.finite_threshold(real, self.options.false_alarm_rate, len(real) // self.window)[0]
         self.threshold = max(generated, self.nominal_threshold)
@@ -95,8 +87,7 @@ class Scorer:
     @functools.cached_property
     def nominal_scores(self) -> np.ndarray:
         """Scores of a further generated series, on which alarms are counted."""
-        with threadpool_limits(1):
-            return self._relative(self._of_generated(self.options.seed + 2))
+        return self._relative(self._of_generated(self.options.seed + 2))
 
     def _generated_windows(self, number: int, seed: int) -> np.ndarray:
         if not self.simulator.is_run_model:
@@ -109,20 +100,21 @@ class Scorer:
             series = series - self.simulator.nominal_series(len(series))
         return self._raw(series)
 
-    def _of_nominal(self, nominal: Recording | None, run: Recording | None) -> np.ndarray:
-        """Scores nominal telemetry, at most so many values of it, evenly spread."""
+    def _of_nominal(self) -> np.ndarray:
+        """Scores the nominal telemetry of the fit: of parts with too many values the middle."""
+        nominal, run = self.simulator.nominal, self.simulator.nominal_run
         if nominal is None:
             return np.zeros(0)
-        kept = [number for number, part in enumerate(nominal.parts) if len(part) >= self.window]
-        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, len(kept))))
-        found = [np.zeros(0)]
-        for number in kept:
-            first = (len(nominal.parts[number]) - most) // 2 if len(nominal.parts[number]) > most else 0
-            part = nominal.parts[number].values[first : first + most]
-            if run is not None:
-                part = part - self.simulator.enhance_run(run.parts[number].values[first : first + most])
-            found.append(self._raw(part))
-        return np.concatenate(found)
+        kept = sum(len(part) >= self.window for part in nominal.parts)
+        most = max(self.window, _NOMINAL_VALUES // (len(self.simulator.channels) * max(1, kept)))
+
+        def middle(recording: Recording) -> Recording:
+            firsts = [max(0, (len(part) - most) // 2) for part in recording.parts]
+            parts = [Run(part.values[first : first + most]) for part, first in zip(recording.parts, firsts, strict=True)]
+            return dataclasses.replace(recording, parts=tuple(parts))
+
+        series = self.simulator.judged_series(middle(nominal), None if run is None else middle(run))
+        return np.concatenate([np.zeros(0), *map(self._raw, series)])
 
     def _judged(self, windows: np.ndarray) -> np.ndarray:
         """What the detector sees of windows: one channel as it is, several in units of their standard deviations."""
@@ -132,7 +124,7 @@ class Scorer:
 
     def _raw(self, series: np.ndarray) -> np.ndarray:
         """Scores each sample of a series of shape `(samples, channels)`, without dividing by the threshold."""
-        begins = np.unique(np.append(np.arange(0, len(series) - self.window + 1, self.stride), len(series) - self.window))
+        begins = run_starts(len(series), self.window, self.stride)
         step = max(1, _CHUNK_VALUES // (self.window * series.shape[1]))
         chunks = (begins[first : first + step] for first in range(0, len(begins), step))
         scores = np.concatenate([self.score_windows(cut([series], chunk, self.window)) for chunk in chunks])
@@ -150,11 +142,7 @@ class Scorer:
         return np.hypot(sizes, np.sqrt(np.mean(beyond**2, axis=1)))
 
     def score_windows(self, windows: np.ndarray) -> np.ndarray:
-        """Scores single windows, which are not in the order of time, without dividing by the threshold.
-
-        Args:
-            windows: Telemetry, or for recorded runs residuals, shape `(windows, samples, channels)`.
-        """
+        """Scores what `judged_series` returns in single windows of any order, without dividing by the threshold."""
         if self.name == RESIDUAL:
             return self._sizes(windows)
         return self.detector.score(self._judged(windows))
@@ -163,8 +151,7 @@ class Scorer:
         """Scores every sample.
 
         Args:
-            series: Telemetry without gaps, or for recorded runs telemetry minus the enhanced run, shape `(samples, channels)`, with at least a
-                window of samples.
+            series: A series of `EnhancedSimulator.judged_series`, shape `(samples, channels)`, with at least a window of samples.
 
         Returns:
             float64 array of shape `(samples,)`, scaled so that the threshold is 1.
@@ -302,13 +289,7 @@ def event_rows(
 ) -> list[dict]:
     """Returns the events in plain JSON types. Flags of a part within a window of each other are one event, as they share windows.
 
-    Args:
-        scores: Score of each sample, scaled so that the threshold is 1, shape `(samples,)`.
-        edges: First sample of each part, and the number of samples.
-        nominal_scores: Scores of a generated nominal series, shape `(samples,)`.
-        window: Length of a window in samples.
-        interval_s: Sampling interval in seconds.
-        departure: First sample of a lasting departure, which is one event, or None.
+    `edges` are the first samples of the parts and the number of samples; from the first sample of a departure on, all is one event.
     """
     found, before = [], len(scores) if departure is None else departure
     for first, end in itertools.pairwise(edges):

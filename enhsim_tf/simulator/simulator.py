@@ -15,22 +15,22 @@ import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.coarse_simulator.interface import CoarseSimulator, name_of
-from enhsim_tf.coarse_simulator.recording import Recording, Run, record
+from enhsim_tf.coarse_simulator.recording import Recording, record
 from enhsim_tf.coarse_simulator.schedule import ScheduledMode, check_schedule
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.enhancer.model import Enhancer
 from enhsim_tf.enhancer.overlapping import average_windows, run_starts
 from enhsim_tf.noise.candidates import NoiseModel
 from enhsim_tf.noise.states import model_from, state_of
-from enhsim_tf.simulator.alignment import Alignment, Drawn, Runs, Waves
+from enhsim_tf.simulator.alignment import START_RANGE, Alignment, Drawn, Runs, Waves, arrays_of_recording, recording_of
 from enhsim_tf.simulator.changes import LEAST_TOLERANCE, TOLERANCE, fade_length, put_changes
-from enhsim_tf.simulator.joint import cut
+from enhsim_tf.simulator.joint import cut, rounded
 from enhsim_tf.simulator.model_folder import read_saved, write_saved
 from enhsim_tf.telemetry.quantisation import Levels
+from enhsim_tf.telemetry.windows import evenly_spaced_starts
 
 _CHUNK_VALUES = 2_000_000  # values that are generated at a time
 _NUM_NOISE = 256  # windows of generated noise from which its standard deviation is computed
-_START_RANGE = 1_000_000  # windows begin at a random sample below this one, so that every phase of the waves occurs
 
 
 class EnhancedSimulator:
@@ -86,6 +86,11 @@ class EnhancedSimulator:
         """Whether the coarse simulator is recorded runs on the clock of the telemetry."""
         return isinstance(self.alignment, Runs)
 
+    @property
+    def nominal_run(self) -> Recording | None:
+        """The coarse run of the nominal telemetry; None for square waves."""
+        return self.alignment.nominal if self.is_run_model else None
+
     @functools.cached_property
     def noise_sd(self) -> np.ndarray:
         """Standard deviation of the generated noise of each channel, shape `(channels,)`."""
@@ -107,7 +112,7 @@ class EnhancedSimulator:
         Args:
             coarse: Coarse windows of shape `(windows, samples, columns)`.
             shift: Offset of each window and channel, shape `(windows, channels)`, or None.
-            gain: Factor of each window and channel, same shape, or None.
+            gain: Factor likewise.
 
         Returns:
             float32 array of shape `(windows, samples, channels)`, in the telemetry's unit.
@@ -152,6 +157,26 @@ class EnhancedSimulator:
         left = targets - bounded * enhanced
         return (left - left.mean(axis=1, keepdims=True)).astype(np.float32)
 
+    def windows_and_signal(self, telemetry: Recording, run: Recording | None, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns so many evenly spaced windows of telemetry, shape `(windows, samples, channels)`, and the enhanced signal of the same times.
+
+        For recorded runs, `run` is the coarse run with the same parts.
+        """
+        series = [part.values for part in telemetry.parts]
+        starts = evenly_spaced_starts(series, self.window, number)
+        windows = cut(series, starts, self.window)
+        if run is None:
+            return windows, self.enhance(*self.alignment.align(windows))
+        return windows, cut([self.enhance_run(part.values) for part in run.parts], starts, self.window)
+
+    def judged_series(self, telemetry: Recording, run: Recording | None) -> list[np.ndarray]:
+        """Returns what detectors judge: the parts of the telemetry that have a window, without the enhanced run of the same parts, if given."""
+        long = [number for number, part in enumerate(telemetry.parts) if len(part) >= self.window]
+        series = [telemetry.parts[number].values for number in long]
+        if run is None:
+            return series
+        return [each - self.enhance_run(run.parts[number].values) for number, each in zip(long, series, strict=True)]
+
     # noise
 
     def draw_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -161,13 +186,7 @@ class EnhancedSimulator:
 
     def add_noise(self, clean: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Adds noise to an enhanced signal and rounds quantised channels to their levels."""
-        return self._rounded(clean + self.draw_noise(clean, rng))
-
-    def _rounded(self, values: np.ndarray) -> np.ndarray:
-        for channel, levels in enumerate(self.quantisation):
-            if levels is not None:
-                values[..., channel] = levels.round(values[..., channel])
-        return values
+        return rounded(clean + self.draw_noise(clean, rng), self.quantisation)
 
     # windows
 
@@ -205,7 +224,7 @@ class EnhancedSimulator:
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         _check_count("num_windows", num_windows, 0)
         rng = np.random.default_rng(seed)
-        starts = rng.integers(0, _START_RANGE, num_windows)
+        starts = rng.integers(0, START_RANGE, num_windows)
         rows = np.random.default_rng([seed, 2]).integers(0, 1 if self.levels is None else len(self.levels), num_windows)
         chunk = max(1, _CHUNK_VALUES // (self.window * len(self.channels)))
         for first in range(0, num_windows, chunk):
@@ -230,8 +249,8 @@ class EnhancedSimulator:
             noise_rng: Random generator of the noise, or None for windows without noise.
 
         Returns:
-            `(windows, mask)`, float32 and boolean of shape `(windows, samples, channels)`. Noise that follows the signal follows the nominal
-            one, so all samples that are not marked equal the nominal ones to the bit.
+            float32 windows and a boolean mask of shape `(windows, samples, channels)`. Noise follows the nominal signal, so samples that are
+            not marked equal the nominal ones to the bit.
         """
         shift, gain = (None, None) if levels is None else (levels[..., 0], levels[..., 1])
         clean = self.enhance(drawn.nominal, shift, gain)
@@ -253,35 +272,29 @@ class EnhancedSimulator:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Adds noise that follows the nominal signal; where rounding removes a change, it is not marked."""
         noise = self.draw_noise(clean, rng)
-        values = self._rounded(check_finite(windows + noise))
+        values = rounded(check_finite(windows + noise), self.quantisation)
         if mask.any():
             is_quantised = [levels is not None for levels in self.quantisation]
-            mask[..., is_quantised] &= (values != self._rounded(clean + noise))[..., is_quantised]
+            mask[..., is_quantised] &= (values != rounded(clean + noise, self.quantisation))[..., is_quantised]
         return values, mask
 
     # series
 
-    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, start_s: float = 0.0) -> np.ndarray:
+    def generate_series(self, num_samples: int, scenario: Degraded | None = None, seed: int = 0) -> np.ndarray:
         """Generates one continuous series of any length, without visible joins between windows.
 
         Args:
             num_samples: Length of the series in samples.
             scenario: A degraded mode over the whole series, or None for nominal telemetry.
             seed: Random seed of the scenario and the noise.
-            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
 
         Returns:
             float32 array of shape `(num_samples, channels)`.
         """
-        return self.generate_labelled_series(num_samples, scenario, seed, start_s)[0]
+        return self.generate_labelled_series(num_samples, scenario, seed)[0]
 
     def generate_labelled_series(
-        self,
-        num_samples: int,
-        scenario: Degraded | None = None,
-        seed: int = 0,
-        start_s: float = 0.0,
-        schedule: Sequence[ScheduledMode] = (),
+        self, num_samples: int, scenario: Degraded | None = None, seed: int = 0, schedule: Sequence[ScheduledMode] = ()
     ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, float, int, int]]]:
         """Generates the series of `generate_series`, with a mask of the samples that a degraded mode has changed.
 
@@ -289,13 +302,12 @@ class EnhancedSimulator:
             num_samples: Length of the series in samples.
             scenario: A degraded mode over the whole series, or None.
             seed: Random seed of the scenario and the noise.
-            start_s: Time of the first sample on the coarse simulator's clock, in seconds.
             schedule: Degraded modes at given places, instead of a scenario.
 
         Returns:
-            `(values, mask, events)`: the float32 series, a boolean array that marks the samples that differ from the nominal series of the
-            same seed, both of shape `(samples, channels)`, and for each event that changed a sample its mode, its severity, its first
-            changed sample, and the first sample after its last changed one.
+            The float32 series, and a boolean array that marks the samples that differ from the nominal series of the same seed, both of shape
+            `(samples, channels)`; and for each event that changed a sample its mode, its severity, its first changed sample, and the first
+            sample after its last changed one.
 
         Raises:
             InputError: If events overlap or lie outside the series, or if both a scenario and a schedule are given.
@@ -306,13 +318,13 @@ class EnhancedSimulator:
         schedule, noise_rng = check_schedule(schedule, num_samples), np.random.default_rng([seed, 1])
         if self.is_run_model:
             self.alignment.draw(np.zeros(0, int), [scenario, *schedule], noise_rng)  # refuses them
-            clean = self.nominal_series(num_samples, start_s)
+            clean = self.nominal_series(num_samples)
             return self.add_noise(clean, noise_rng), np.zeros(clean.shape, bool), []
         events = [(Degraded(each.mode, each.severity, 0.0), each.begin, each.end) for each in schedule]
         events += [] if scenario is None else [(scenario, 0, num_samples)]
         window, hop = self.window, self.window // 2
         num_windows = 1 + max(0, -(-(num_samples - window) // hop))  # that overlap by half and cover the series
-        drawn = self.alignment.draw_series(window + (num_windows - 1) * hop, start_s, events, np.random.default_rng(seed))
+        drawn = self.alignment.draw_series(window + (num_windows - 1) * hop, events, np.random.default_rng(seed))
         levels = self._following_levels(num_windows, seed)
         series = clean = self._join_series(drawn.nominal[0], levels)[:num_samples]
         mask = np.zeros(clean.shape, bool)
@@ -343,20 +355,17 @@ class EnhancedSimulator:
         """The parts of the nominal run, enhanced."""
         return [self.enhance_run(part.values) for part in self.recorded_runs().usable(self.alignment.nominal).parts]
 
-    def nominal_series(self, num_samples: int, start_s: float = 0.0) -> np.ndarray:
+    def nominal_series(self, num_samples: int) -> np.ndarray:
         """Returns the enhanced nominal run, repeated if the series is longer; parts and repetitions are cross-faded."""
-        skipped, fade = round(start_s / self.interval_s), self.window // 2
-        clean = self._nominal_clean
+        fade, clean = self.window // 2, self._nominal_clean
         rise = (np.sin(np.pi / 2 * (np.arange(fade) + 0.5) / fade) ** 2)[:, None]
-        pieces, tail = [clean[0][:-fade]], clean[0][-fade:]
-        length, number = len(pieces[0]), 0
-        while length < skipped + num_samples:
-            number += 1
-            following = clean[number % len(clean)].copy()
+        pieces, tail, length = [clean[0][:-fade]], clean[0][-fade:], len(clean[0]) - fade
+        while length < num_samples:
+            following = clean[len(pieces) % len(clean)].copy()
             following[:fade] = (1 - rise) * tail + rise * following[:fade]
             pieces.append(following[:-fade])
             length, tail = length + len(following) - fade, following[-fade:]
-        return np.concatenate(pieces)[skipped : skipped + num_samples].astype(np.float32)
+        return np.concatenate(pieces)[:num_samples].astype(np.float32)
 
     # runs of the user's simulator
 
@@ -370,9 +379,6 @@ class EnhancedSimulator:
 
         Yields:
             For each copy, one float32 array of shape `(samples, channels)` for each part of `alignment.usable(run)`.
-
-        Raises:
-            InputError: If the run cannot be enhanced.
         """
         _check_count("num_copies", num_copies, 0)
         clean = [self.enhance_run(part.values) for part in self.recorded_runs().usable(run).parts]
@@ -417,16 +423,13 @@ class EnhancedSimulator:
     def save(self, folder: str | os.PathLike) -> None:
         """Saves the simulator to a folder: `arrays.npz`, `settings.json`, and `manifest.json` with their checksums.
 
-        Args:
-            folder: The folder. A simulator that was saved there before is replaced.
+        A simulator that was saved there before is replaced.
 
         Raises:
             InputError: If the folder contains something else, or if a number is not finite; the folder is left unchanged.
         """
-        noise, nominal = state_of(self.noise), self.nominal
+        noise = state_of(self.noise)
         arrays = {"enhancer": self.enhancer.arrays, "noise": noise.arrays, "alignment": self.alignment.arrays}
-        arrays |= {} if self.levels is None else {"levels": {"rows": self.levels}}
-        arrays |= {} if nominal is None else {"nominal": {f"part_{number}": part.values for number, part in enumerate(nominal.parts)}}
         settings = {
             "alignment": self.alignment.settings,
             "enhancer": self.enhancer.settings,
@@ -436,9 +439,13 @@ class EnhancedSimulator:
             "interval_s": self.interval_s,
             "level_step": self.level_step,
             "quantisation": [None if each is None else dataclasses.asdict(each) for each in self.quantisation],
-            "nominal": None if nominal is None else {"start": nominal.start, "offsets_s": [part.offset_s for part in nominal.parts]},
+            "nominal": None,
             "trained": self.trained,
         }
+        if self.levels is not None:
+            arrays["levels"] = {"rows": self.levels}
+        if self.nominal is not None:
+            arrays["nominal"], settings["nominal"] = arrays_of_recording(self.nominal)
         write_saved(folder, arrays, settings)
 
     @classmethod
@@ -482,10 +489,7 @@ class EnhancedSimulator:
         if len(quantisation) != len(channels) or not all(np.isfinite([each.step, each.origin]).all() and each.step > 0 for each in known):
             raise ValueError("quantisation of other channels, or without levels")
         if nominal is not None:
-            runs = [Run(arrays["nominal"][f"part_{number}"], float(offset)) for number, offset in enumerate(nominal["offsets_s"])]
-            nominal = Recording(tuple(runs), channels, interval_s, nominal["start"], ", ".join(channels))
-            if not all(np.isfinite(run.values).all() for run in runs):
-                raise ValueError("nominal telemetry that is not finite")
+            nominal = recording_of(arrays["nominal"], nominal, channels, interval_s, ", ".join(channels))
         noise, shape = model_from(settings["noise"], arrays["noise"]), (1, window, len(channels))
         if noise.generate(1, np.random.default_rng(0), np.zeros(shape, np.float32)).shape != shape:
             raise ValueError("noise of another shape")

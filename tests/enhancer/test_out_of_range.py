@@ -102,14 +102,6 @@ def test_waves_in_phases_that_training_never_had_are_seen_by_their_distance(fitt
     assert np.mean(blind.score(shifted)) < 1.1 * np.mean(blind.score(COARSE(nominal)))
 
 
-def test_a_saved_score_comes_back_whole(fitted):
-    windows = degraded("friction", 0.7)[0]
-    assert sum(each.nbytes for each in fitted.arrays.values()) < 10**6
-    restored = OutOfRange.from_arrays(fitted.arrays)
-    np.testing.assert_array_equal(restored.score(windows), fitted.score(windows))
-    assert (restored.explained, restored.weight) == (fitted.explained, fitted.weight)
-
-
 def test_many_windows_are_scored_in_parts_and_remembered_up_to_a_number(fitted, training, monkeypatch):
     windows = degraded("stuck", 0.3)[0]
     whole = fitted.score(windows)
@@ -122,10 +114,6 @@ def test_many_windows_are_scored_in_parts_and_remembered_up_to_a_number(fitted, 
 
 
 def test_what_is_refused(fitted, training, refused):
-    with refused("before fit"):
-        OutOfRange().score(training)
-    with refused("before fit"):
-        OutOfRange().arrays  # noqa: B018
     with refused("(windows, 500)", "(1500, 499)"):
         fitted.score(training[:, 1:])
     with refused("(500,)"):

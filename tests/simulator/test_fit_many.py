@@ -30,6 +30,7 @@ def test_all_channels_become_one_simulator_and_one_that_cannot_is_left_out(tmp_p
     reports, failed, lines = fitted(tmp_path, table(still=np.ones(1_500)))
     assert list(reports) == ["volts~watts"] and list(failed) == ["still"] and "constant" in failed["still"]
     ((name, folder),) = models_of(tmp_path / "models").items()
+    assert name_of_channels([f"channel {number}" for number in range(30)]) == "channel 0~29 more"
     assert name == "volts~watts" and channels_of(folder) == ("volts", "watts")
     assert {path.name for path in folder.iterdir()} == {"arrays.npz", "settings.json", "manifest.json", "report.json", "report.png"}
     assert any("cross-correlation" in line for line in lines)
@@ -57,8 +58,3 @@ def test_a_folder_with_something_else_is_left_alone(tmp_path):
     with pytest.raises(InputError, match="something else"):
         fitted(tmp_path, table(), separately=True)
     assert (tmp_path / "models" / "volts" / "notes.txt").read_text() == "mine"
-
-
-def test_names_of_many_channels_are_short():
-    assert name_of_channels(["a"]) == "a" and name_of_channels(["a", "b"]) == "a~b"
-    assert name_of_channels([f"channel {number}" for number in range(30)]) == "channel 0~29 more"
