@@ -3,15 +3,9 @@
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from enhsim_tf.coarse_simulator.degraded import Degraded
 from enhsim_tf.common.errors import InputError
-
-if TYPE_CHECKING:
-    from enhsim_tf.coarse_simulator.square_waves import SquareWaveSimulator
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,24 +83,3 @@ def check_schedule(schedule: Sequence[ScheduledMode], num_samples: int) -> list[
             f"Expected events within {num_samples:,} samples. Received: {ordered[-1].mode} until sample {ordered[-1].end}. Move or shorten it."
         )
     return ordered
-
-
-def simulate_schedule(
-    coarse: "SquareWaveSimulator", time_s: np.ndarray, schedule: Sequence[ScheduledMode], rng: np.random.Generator
-) -> np.ndarray:
-    """Simulates a series with several degraded modes.
-
-    Args:
-        coarse: The coarse simulator.
-        time_s: Times in seconds, shape `(samples,)`.
-        schedule: The events, in the order of time and without overlaps.
-        rng: Random number generator for the lags of `friction` and the gaps of `dropout`.
-
-    Returns:
-        float32 array of shape `(samples,)`. It equals the nominal run outside the events.
-    """
-    values = coarse.simulate(time_s[None])[0]
-    for event in schedule:
-        inside = slice(event.begin, event.end)
-        values[inside] = coarse.simulate(time_s[None, inside], Degraded(event.mode, event.severity, 0.0), rng)[0]
-    return values

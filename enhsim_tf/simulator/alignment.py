@@ -31,13 +31,10 @@ class Aligned(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """Coarse windows for generated telemetry.
+    """Coarse windows for generated telemetry, float32 of shape `(windows, samples, columns)`, and the same without a degraded mode.
 
-    Args:
-        coarse: float32 of shape `(windows, samples, columns)`.
-        nominal: The same windows without a degraded mode.
-        held: For each sample the one whose value it has: where a mechanism is stuck, the first of these samples, otherwise itself. None if
-            nothing is stuck.
+    `held` is for each sample the one whose value it has: where a mechanism is stuck, the first of these samples, otherwise itself; None if nothing
+    is stuck.
     """
 
     coarse: np.ndarray
@@ -48,15 +45,8 @@ class Drawn(NamedTuple):
 class Waves:
     """One square wave or constant level for each channel, aligned with each window in phase, offset and gain.
 
-    Coarse windows are in units of the wave: -1 is its lowest level, 1 its highest.
-
-    Args:
-        simulators: The coarse simulator of each channel.
-        channels: Names of the channels.
-        interval_s: Sampling interval in seconds.
-        window: Length of a window in samples.
-        waveforms: For each channel its enhanced waveform in these units at `_NUM_PHASES` phases, shape `(phases, samples)`, or None for the
-            square wave itself. A square wave shows its phase only at its edges, the enhanced waveform at every sample.
+    Coarse windows are in units of the wave: -1 is its lowest level, 1 its highest. A square wave shows its phase only at its edges, the enhanced
+    waveform of a channel at every sample: `waveforms` has it at `_NUM_PHASES` phases, shape `(phases, samples)`, or None.
     """
 
     kind = "waves"
@@ -266,18 +256,13 @@ class Runs:
         return dataclasses.replace(run, parts=parts)
 
     def pair(self, telemetry: Recording, run: Recording) -> tuple[Recording, Recording]:
-        """Cuts telemetry and a run to the stretches of at least a window that both cover.
-
-        Raises:
-            InputError: If they share no window.
-        """
+        """Cuts telemetry and a run to the stretches of at least a window that both cover; raises InputError if there are none."""
         return pair_recordings(telemetry, self.usable(run), self.delay_s, self.window)
 
     def draw(self, starts: np.ndarray, scenarios: Sequence[Any], rng: np.random.Generator) -> Drawn:
         """Cuts coarse windows out of the nominal run; `starts` count its possible windows and begin again after the last.
 
-        Raises:
-            InputError: If a scenario is given, because a recorded run is nominal.
+        Raises InputError for a scenario, because a recorded run is nominal.
         """
         for scenario in scenarios:
             if scenario is not None:

@@ -49,7 +49,8 @@ def put_changes(
         if drawn.held is not None:
             held = drawn.held[:, begin:end] - begin
             differs &= held == np.arange(end - begin)[:, None]
-        inside[:, own] = _from_first_to_last(differs)
+        begun, unfinished = (np.logical_or.accumulate(each, axis=1) for each in (differs, differs[:, ::-1]))
+        inside[:, own] = begun & unfinished[:, ::-1]  # from the first to the last sample that differs
         found, changed = _cross_faded(nominal[:, here], degraded[:, here], inside, fade, tolerance)
         if drawn.held is not None:
             moving = found[:, own]
@@ -58,11 +59,6 @@ def put_changes(
             found[:, own], changed[:, own] = np.where(stands, still, moving), changed[:, own] | stands
         runs[:, here], mask[:, here] = np.where(changed, found, runs[:, here]), mask[:, here] | changed
     return runs, mask
-
-
-def _from_first_to_last(changed: np.ndarray) -> np.ndarray:
-    """Marks all samples from the first to the last marked one of each run."""
-    return np.logical_or.accumulate(changed, axis=1) & np.logical_or.accumulate(changed[:, ::-1], axis=1)[:, ::-1]
 
 
 def _cross_faded(

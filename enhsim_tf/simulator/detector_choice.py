@@ -6,13 +6,12 @@ because injected anomalies only stand in for real ones, and the first of them in
 holds for the anomalies of their relation; where no detector is near the best in both, the sum decides. If none keeps its promise, the one with the
 fewest false alarms is taken, and the report says so in its first line.
 
-The tenth and the twenty points were set on 2026-11-26, after six SMAP channels had been seen: with two points and no tenth, the mean area under the
-precision-recall curve of the chosen detectors was .74 there; that of the residual alone was .81.
+The tenth and the twenty points were set on 2026-11-26, after six SMAP channels had been seen (mean area under the precision-recall curve .74 with
+two points and no tenth; .81 of the residual alone).
 """
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -64,10 +63,6 @@ class JudgedDetector:
         found = [self.by_kind[kind] for kind in RELATIONS if kind in self.by_kind]
         return min(found, default=0.0)
 
-    def to_dict(self) -> dict[str, Any]:
-        """All fields in plain JSON types."""
-        return dataclasses.asdict(self) | {"keeps": bool(self.keeps)}
-
 
 def choose_detector(judged: Sequence[JudgedDetector]) -> JudgedDetector:
     """Returns the detector that the rule chooses; see the module."""
@@ -80,14 +75,7 @@ def choose_detector(judged: Sequence[JudgedDetector]) -> JudgedDetector:
 
 
 def judge_detectors(simulator: EnhancedSimulator, held_out: Recording, run: Recording | None, seed: int = 0) -> list[JudgedDetector]:
-    """Judges all candidates on nominal time after the fit.
-
-    Args:
-        simulator: The simulator, whose nominal telemetry bounds the thresholds.
-        held_out: Nominal telemetry, in parts of at least a window.
-        run: Its coarse run, for recorded runs.
-        seed: Random seed of the detectors and the anomalies.
-    """
+    """Judges all candidates on nominal telemetry after the fit, in parts of at least a window, and its coarse run, for recorded runs."""
     series = simulator.judged_series(held_out, run)
     windows, clean = simulator.windows_and_signal(held_out, run, 3 * _NUM_ANOMALOUS)
     below = 0.0 if run is None else clean

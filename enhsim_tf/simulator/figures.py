@@ -62,7 +62,7 @@ def report_figure(report: Report) -> matplotlib.figure.Figure:
                 axes.ticklabel_format(axis="y", useOffset=False)
                 axes.set_xlabel("sample" if row == len(shown) - 1 else "")
             signal.set_ylabel(drawable(name, 14))
-        title_words(grid[0, 0], [("real", REAL), ("coarse", COARSE), ("enhanced", ENHANCED)])
+        title_words(grid[0, 0], [("real", REAL), ("coarse (dashed)", COARSE), ("enhanced", ENHANCED)])
         title_words(grid[0, 1], [("generated", GENERATED)])
         names = [each["name"] for each in report.detectors]
         for axes, key, label in (

@@ -159,17 +159,12 @@ def _fitted_by_processes(jobs: Sequence[Job], engine: str, workers: int | None) 
                 yield Outcome(some[0].name, failed=dict.fromkeys(some[0].series, reason))
                 continue
             batches += [(list(waiting.values()), workers)] if waiting else []
-            batches += [
-                ([job], 1) for job in suspects
-            ]  # one at a time, to find the one that kills its worker, and to give it all the memory
+            # one at a time, to find the one that kills its worker, and to give it all the memory
+            batches += [([job], 1) for job in suspects]
 
 
 def fit_or_say(job: Job) -> Outcome:
-    """Fits the channels of a job. Errors that concern only some of them are returned, not raised.
-
-    Raises:
-        InputError: If the machine lacks disk space or memory, which affects the other channels too.
-    """
+    """Fits the channels of a job. Errors that concern only some of them are returned; lack of disk space or memory is raised as InputError."""
     from enhsim_tf.simulator.joint import join_channels
 
     cleaned, outcome = {}, Outcome(job.name)

@@ -67,20 +67,16 @@ def fit(
     """
     options, recording = options or FitOptions(), _recording_of(telemetry)
     for channel, name in enumerate(recording.columns):
-        values = np.concatenate([part.values[:, channel] for part in recording.parts])
-        _check_size(check_values(values, name), name)
+        values = check_values(np.concatenate([part.values[:, channel] for part in recording.parts]), name)
+        low, high = float(np.min(values)), float(np.max(values))
+        if not (max(-low, high) <= _MOST_SIZE and high - low >= _LEAST_SPAN):
+            raise InputError(
+                f"Expected values up to {_MOST_SIZE:g} that span at least {_LEAST_SPAN:g}. Received: {name}, from {low:g} to {high:g}. "
+                "Give it in another unit."
+            )
     if coarse is not None:
         return _fit_runs(recording, coarse, options, progress)
     return _fit_waves(recording, options, progress, commands)
-
-
-def _check_size(values: np.ndarray, name: str) -> None:
-    low, high = float(np.min(values)), float(np.max(values))
-    if not (max(-low, high) <= _MOST_SIZE and high - low >= _LEAST_SPAN):
-        raise InputError(
-            f"Expected values up to {_MOST_SIZE:g} that span at least {_LEAST_SPAN:g}. Received: {name}, from {low:g} to {high:g}. "
-            "Give it in another unit."
-        )
 
 
 def _recording_of(telemetry: Any) -> Recording:

@@ -36,8 +36,12 @@ def join_channels(channels: Mapping[str, Sequence[Telemetry] | Telemetry]) -> li
     for name, each in parts.items():
         for part in each:
             check_telemetry(part)
-        group = next((group for group in groups if _is_alike(parts[group[0]][0], each[0])), None)
-        if group is None:
+        own = each[0]
+        for group in groups:
+            first = parts[group[0]][0]
+            if first.has_time == own.has_time and abs(first.interval_s / own.interval_s - 1) <= SAME_RATE:
+                break
+        else:
             groups.append(group := [])
         group.append(name)
     found = []
@@ -53,10 +57,6 @@ def telemetry_of(recording: Recording, channel: int = 0) -> list[Telemetry]:
     """Returns the parts of one channel, given by its number."""
     interval_s, start, name = recording.interval_s, recording.start, recording.columns[channel]
     return [Telemetry(part.values[:, channel], interval_s, part.offset_s, start, name) for part in recording.parts]
-
-
-def _is_alike(first: Telemetry, second: Telemetry) -> bool:
-    return first.has_time == second.has_time and abs(first.interval_s / second.interval_s - 1) <= SAME_RATE
 
 
 def _joined(channels: Mapping[str, Sequence[Telemetry]]) -> Recording | None:

@@ -25,11 +25,7 @@ _FAMILY = "enhsim_tf.EnhancedSimulator/"  # every manifest begins with it, whate
 
 
 def folder_of(models: str | os.PathLike, channel: str) -> Path:
-    """Returns the folder of a channel. Its name is the channel's name, percent-encoded.
-
-    Raises:
-        InputError: If the name is empty or too long for a folder.
-    """
+    """Returns the folder of a channel: its name, percent-encoded. An `InputError` refuses names that are empty or too long."""
     return Path(models) / encode_name(channel)
 
 
@@ -40,11 +36,7 @@ def name_of_channels(channels: Sequence[str]) -> str:
 
 
 def models_of(models: str | os.PathLike) -> dict[str, Path]:
-    """Returns the folders of the fitted simulators in a folder, or of the one that it is, by the names of their channels.
-
-    Raises:
-        InputError: If the folder contains no saved simulator.
-    """
+    """Returns the folders of the fitted simulators in a folder, or of the one that it is, by name; raises InputError if there is none."""
     models = Path(os.path.abspath(models))  # so that "." has a name too
     if os.path.isfile(models / MANIFEST):  # unlike Path.is_file, this does not raise for names that are not valid file names
         return {urllib.parse.unquote(models.name): models}
@@ -60,11 +52,7 @@ def models_of(models: str | os.PathLike) -> dict[str, Path]:
 
 
 def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dict[str, Path]:
-    """Selects some of the models of `models_of` by name; None or an empty sequence selects all.
-
-    Raises:
-        InputError: If there is no model of one of the names.
-    """
+    """Selects models of `models_of` by name; None or an empty sequence selects all. Raises InputError for a name that there is not."""
     unknown = [name for name in channels or () if name not in models]
     if unknown:
         raise InputError(f"Expected --channel, one of: {printable(', '.join(list(models)[:8]))}. Received: {unknown[0]!r}.")
@@ -72,11 +60,7 @@ def chosen_of(models: Mapping[str, Path], channels: Sequence[str] | None) -> dic
 
 
 def refuse_foreign(folder: str | os.PathLike) -> None:
-    """Checks that a folder is new, empty or a saved simulator, so that it may be replaced. A damaged simulator counts as one.
-
-    Raises:
-        InputError: If the folder contains something else.
-    """
+    """Raises InputError unless a folder is new, empty or a saved simulator, so that it may be replaced. A damaged simulator counts as one."""
     folder, is_ours = Path(folder), False
     if (folder / MANIFEST).is_file():  # other programs write files of this name too
         with open(folder / MANIFEST, "rb") as file:
@@ -116,32 +100,22 @@ def write_saved(folder: str | os.PathLike, arrays: Mapping[str, Mapping[str, np.
 
 
 def check_saved(folder: str | os.PathLike) -> None:
-    """Verifies the checksums of a saved simulator without loading it.
-
-    Raises:
-        InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
-    """
+    """Raises InputError if a folder was not written by `write_saved`, or if a file in it has changed since."""
     folder = Path(folder)
     manifest = settings_of(folder, MANIFEST)
-    found, checksums = str(manifest.get("format")), manifest.get("sha256")
+    found = str(manifest.get("format"))
     if found != _FAMILY + _NUMBER:
-        number = found.removeprefix(_FAMILY)
-        raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number[:80]} in {folder}. Fit it again.")
-    if not isinstance(checksums, dict) or set(checksums) != {_ARRAYS, _SETTINGS}:
-        raise InputError(f"Expected the checksums of {_ARRAYS} and {_SETTINGS}. Received: others in {folder / MANIFEST}. Fit it again.")
-    for name, expected in checksums.items():
-        if not (folder / name).is_file() or sha256(folder / name) != expected:
-            raise InputError(
-                f"Expected {name} to be unchanged since it was saved. Received: a missing or damaged file in {folder}. Fit it again."
-            )
+        number = found.removeprefix(_FAMILY)[:80]
+        raise InputError(f"Expected a model of format {_NUMBER}. Received: format {number} in {folder}. Fit it again.")
+    if manifest.get("sha256") != {name: sha256(folder / name) if (folder / name).is_file() else "" for name in (_ARRAYS, _SETTINGS)}:
+        raise InputError(
+            f"Expected {_ARRAYS} and {_SETTINGS} to be unchanged since they were saved. Received: a missing or damaged file in {folder}. "
+            "Fit it again."
+        )
 
 
 def settings_of(folder: str | os.PathLike, name: str = _SETTINGS) -> dict[str, Any]:
-    """Reads the settings of a saved simulator, or another JSON file beside them.
-
-    Raises:
-        InputError: If the file cannot be read.
-    """
+    """Reads the settings of a saved simulator, or another JSON file beside them; raises InputError if it cannot be read."""
     try:
         content = read_json(Path(folder) / name, _MOST_SETTINGS)
         if not isinstance(content, dict):
@@ -154,11 +128,7 @@ def settings_of(folder: str | os.PathLike, name: str = _SETTINGS) -> dict[str, A
 
 
 def channels_of(folder: str | os.PathLike) -> tuple[str, ...]:
-    """Returns the names of the channels of a saved simulator without loading it.
-
-    Raises:
-        InputError: If the folder was not written by `write_saved`.
-    """
+    """Returns the names of the channels of a saved simulator without loading it; raises InputError if it is none."""
     names = settings_of(folder).get("channels")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(f"Expected the names of channels in settings.json. Received: {str(names)[:80]} in {folder}. Fit it again.")
@@ -166,11 +136,7 @@ def channels_of(folder: str | os.PathLike) -> tuple[str, ...]:
 
 
 def read_saved(folder: str | os.PathLike, make: Callable[[Mapping[str, Mapping[str, np.ndarray]], Mapping[str, Any]], Any]) -> Any:
-    """Loads a saved simulator; `make` creates it from the arrays of each part and the settings.
-
-    Raises:
-        InputError: If the folder was not written by `write_saved`, or if a file in it has changed since.
-    """
+    """Loads a saved simulator, which `make` creates from the arrays of each part and the settings; raises InputError as `check_saved`."""
     folder = Path(folder)
     check_saved(folder)
     settings, as_checked = settings_of(folder), sha256(folder / MANIFEST)

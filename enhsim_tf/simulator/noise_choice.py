@@ -43,10 +43,7 @@ _DRAW = 73  # number of the random draw
 class NoiseWindows:
     """Windows of noise and the enhanced windows below them, of shape `(windows, samples, channels)` or without the last axis.
 
-    Args:
-        noise: Telemetry minus enhanced signal, in the telemetry's unit.
-        clean: Enhanced windows.
-        starts: First sample of each window, shape `(windows,)`; not needed of generated noise.
+    The noise is telemetry minus enhanced signal; `starts` are the first samples of the windows, which generated noise does not need.
     """
 
     noise: np.ndarray
@@ -171,13 +168,7 @@ class HeldOutJudge:
 
     The classifier sees disjoint windows only, cut into pieces if there are few of them: it recognises single windows that overlap, whatever
     their noise is like. Of each candidate as many are generated: of more, some would repeat real noise if it draws real windows again.
-
-    Args:
-        learnt: Windows from which the models are fitted, in the order of time.
-        judged: Windows that they have not seen, in the order of time.
-        seed: Seed of the classifier, the detectors and the positions of the anomalies.
-        quantisation: Levels of each channel, or None.
-        with_signal: Whether the cheap detectors see the enhanced signal with the noise, or the noise alone.
+    The arguments are those of `choose_noise`.
     """
 
     def __init__(

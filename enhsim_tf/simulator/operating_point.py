@@ -41,8 +41,10 @@ def find_departure(
     Scores have the shape `(samples,)`, with NaN where nothing was scored; `score_series` is that of a `Scorer`, and `judged` what it has judged:
     for each stretch its first sample and a series of shape `(samples, channels)`.
     """
-    window, nominal, has_left = simulator.window, _nominal_windows(simulator), scores > 1
-    if nominal is not None:
+    window, has_left = simulator.window, scores > 1
+    learnt = [] if simulator.nominal is None else simulator.judged_series(simulator.nominal, simulator.nominal_run)
+    if learnt:
+        nominal = _windows_of(learnt, window)
         limits = _limits_of(nominal)
         for place, series in judged:
             has_left[place : place + len(series)] |= beyond(series, limits, window)
@@ -55,7 +57,7 @@ def find_departure(
         if len(series) - skip >= window:
             late.append((place + skip, series[skip:]))
     what, after = ("shape",), scores.copy()
-    if nominal is not None and late:
+    if learnt and late:
         windows = _windows_of([series for _, series in late], window)
         what = changed_properties(nominal, windows)
         (old_level, old_size), (new_level, new_size) = (
@@ -134,12 +136,6 @@ def properties(windows: np.ndarray) -> dict[str, np.ndarray]:
         "period": np.log(np.maximum(frequency, 0.5)),
         "channel relation": relation,
     }
-
-
-def _nominal_windows(simulator: EnhancedSimulator) -> np.ndarray | None:
-    """What a detector sees of the nominal telemetry of the fit; None if there is none."""
-    series = [] if simulator.nominal is None else simulator.judged_series(simulator.nominal, simulator.nominal_run)
-    return _windows_of(series, simulator.window) if series else None
 
 
 def _windows_of(series: Sequence[np.ndarray], window: int) -> np.ndarray:

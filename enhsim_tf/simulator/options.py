@@ -131,11 +131,7 @@ def add_options(parser: argparse.ArgumentParser, options: type, *names: str) -> 
 
 
 def options_from(namespace: argparse.Namespace, options: type) -> Any:
-    """Makes an object of a class of options from a parsed command line.
-
-    Raises:
-        InputError: If a value is out of range.
-    """
+    """Makes an object of a class of options from a parsed command line; raises InputError if a value is out of range."""
     found = {}
     for field in dataclasses.fields(options):
         if hasattr(namespace, field.name):

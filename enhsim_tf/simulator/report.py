@@ -1,7 +1,7 @@
 """The report on a fitted simulator: numbers for `report.json`, and the lines that `fit` prints."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -70,7 +70,11 @@ class Report:
         """Returns the report as lines of text: the warning, if there is one, comes first."""
         name = spoken(self.channels)
         where = "held-out time" if self.is_held_out else "the telemetry of the fit (none was held out)"
-        rates = "; ".join(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}{_relation(each)}" for each in self.detectors)
+        rates = []
+        for each in self.detectors:
+            relations = [each["by_kind"][kind] for kind in RELATIONS if kind in each["by_kind"]]  # of several channels
+            least = f" ({min(relations):.0%} of relations)" if relations else ""
+            rates.append(f"{each['name']} {each['false_alarms']:.1%} and {each['recall']:.0%}{least}")
         found = [
             *self._warnings(),
             self.coarse,
@@ -80,7 +84,7 @@ class Report:
             self._of_signals(),
             self._of_noise(),
             self._of_cross_correlation(),
-            f"detectors there, set for {RATE:.0%} (false alarms, and recall of injected anomalies): {rates}. score uses: {self.detector}",
+            f"detectors there, set for {RATE:.0%} (false alarms, and recall of injected anomalies): {'; '.join(rates)}. score uses: {self.detector}",
         ]
         if self.outside is not None:
             found.append(f"range: {self.outside:.1%} of that time are outside the training range of the coarse columns")
@@ -114,9 +118,13 @@ class Report:
         return f"signal: error {errors['enhanced']:.3f} of the enhanced signal, {errors['coarse']:.3f} of the coarse one (NRMSE, with the noise)"
 
     def _of_noise(self) -> str:
-        judged = "; ".join(f"{each['name']} {_auc(each)}, {each['alarms']:.1%} and {each['recall']:.0%}" for each in self.noise_candidates)
-        if not judged:
+        if not self.noise_candidates:
             return f"noise: {self.noise_model}"
+        aucs = ["-" if each["auc"] is None else f"{each['auc']:.2f}" for each in self.noise_candidates]
+        judged = "; ".join(
+            f"{each['name']} {auc}, {each['alarms']:.1%} and {each['recall']:.0%}"
+            for each, auc in zip(self.noise_candidates, aucs, strict=True)
+        )
         used = next(each for each in self.noise_candidates if each["is_chosen"])
         real = f"real {used['real_auc']:.2f}, {used['real_alarms']:.1%} and {used['real_recall']:.0%}"
         why = "the simplest that passes" if used["passes"] else "none passes, and it departs least"
@@ -172,7 +180,7 @@ def make_report(
         noise_model=trained["noise"],
         noise_candidates=noise_rows,
         cross_correlation=_cross_correlation(simulator.channels, noise, generated),
-        detectors=[each.to_dict() for each in detectors],
+        detectors=[dataclasses.asdict(each) | {"keeps": bool(each.keeps)} for each in detectors],
         detector=trained["detector"],
         keeps_promise=trained["keeps_promise"],
         outside=outside,
@@ -189,16 +197,6 @@ def _coarse_signal(simulator: EnhancedSimulator, real: np.ndarray, run: Recordin
     coarse = cut(series, evenly_spaced_starts(series, simulator.window, _NUM_WINDOWS), simulator.window)
     outside = np.concatenate([trusted.score_run(each) for each in series]) > 1
     return fit_enhancer(COARSE, coarse, real, np.arange(len(real))).predict(coarse), float(outside.mean())
-
-
-def _relation(row: Mapping[str, Any]) -> str:
-    """Least recall of the anomalies of relations, of several channels."""
-    found = [row["by_kind"][kind] for kind in RELATIONS if kind in row["by_kind"]]
-    return f" ({min(found):.0%} of relations)" if found else ""
-
-
-def _auc(row: Mapping[str, Any]) -> str:
-    return "-" if row["auc"] is None else f"{row['auc']:.2f}"
 
 
 def correlation_of(windows: np.ndarray) -> np.ndarray:

@@ -63,7 +63,10 @@ class Scorer:
         self.unit = np.ones(1) if len(simulator.channels) == 1 else simulator.noise_sd if self.on_residual else simulator.scale
         self.unit = np.where(self.unit > 0, self.unit, 1.0).astype(np.float32)
         seed = self.options.seed
-        training = self._generated_windows(self.options.num_windows, seed)
+        if simulator.is_run_model:
+            training = simulator.draw_noise(simulator.generate_clean(self.options.num_windows, seed=seed), np.random.default_rng([seed, 3]))
+        else:
+            training = simulator.generate(self.options.num_windows, seed=seed)
         self.detector = ResidualSize() if self.name == RESIDUAL else all_detectors()[self.name](seed)
         means = training.mean(axis=1, dtype=np.float64)
         width = np.maximum(np.ptp(means, axis=0), simulator.noise_sd)
@@ -88,11 +91,6 @@ class Scorer:
     def nominal_scores(self) -> np.ndarray:
         """Scores of a further generated series, on which alarms are counted."""
         return self._relative(self._of_generated(self.options.seed + 2))
-
-    def _generated_windows(self, number: int, seed: int) -> np.ndarray:
-        if not self.simulator.is_run_model:
-            return self.simulator.generate(number, seed=seed)
-        return self.simulator.draw_noise(self.simulator.generate_clean(number, seed=seed), np.random.default_rng([seed, 3]))
 
     def _of_generated(self, seed: int) -> np.ndarray:
         series = self.simulator.generate_series(self._length * self.window, seed=seed)
@@ -169,7 +167,6 @@ def score(
     telemetry: Recording,
     run: Recording | None = None,
     options: ScoreOptions | None = None,
-    scorer: Scorer | None = None,
 ) -> "pd.DataFrame":
     """Scores every sample of telemetry.
 
@@ -178,7 +175,6 @@ def score(
         telemetry: Telemetry of its channels, as returned by `joint.join_channels`.
         run: The coarse run of the same time, for a simulator of recorded runs.
         options: Options of the scoring. None uses the defaults.
-        scorer: A scorer of this simulator, if there is one already.
 
     Returns:
         A data frame with the index of `pandas_series.to_series` and the columns `value` (of several channels, their names), with a run
@@ -196,7 +192,7 @@ def score(
     from enhsim_tf.simulator.trusted_range import TrustedRange
 
     check_fits(simulator, telemetry, run)
-    scorer = scorer or Scorer(simulator, options)
+    scorer = Scorer(simulator, options)
     trusted = None if run is None else TrustedRange(simulator)
     values = np.concatenate([part.values for part in telemetry.parts])
     scores, outside = np.full((2, len(values)), np.nan)
@@ -229,11 +225,7 @@ def score(
 
 
 def check_fits(simulator: EnhancedSimulator, telemetry: Recording, run: Recording | None) -> None:
-    """Refuses telemetry, or a coarse run of the same time, that do not fit to a simulator.
-
-    Raises:
-        InputError: If channels or interval differ, if a run is missing, or if one is given that the simulator cannot use.
-    """
+    """Raises InputError if channels or interval differ, if a coarse run is missing, or if one is given that the simulator cannot use."""
     if telemetry.columns != simulator.channels and not len(telemetry.columns) == len(simulator.channels) == 1:
         raise InputError(
             f"Expected the channels {', '.join(simulator.channels)[:120]}. Received: {', '.join(telemetry.columns)[:120]}. Select them with --column."
@@ -274,14 +266,12 @@ def _note(frame: "pd.DataFrame", scorer: Scorer, edges: Sequence[int], departure
     frame.attrs["expected_false_alarm_rate"] = scorer.rate
     frame.attrs["false_alarms_per_day"] = list(false_alarms_per_day(num_alarms, len(nominal) * interval_s))
     frame.attrs["events"] = event_rows(frame["score"].to_numpy(), edges, nominal, scorer.window, interval_s, since)
-    frame.attrs["departure"] = (
-        ""
-        if departure is None
-        else (
+    frame.attrs["departure"] = ""
+    if departure is not None:
+        frame.attrs["departure"] = (
             f"since {frame.index[since]} the telemetry has left what was learnt and stays there ({', '.join(departure.what)}): one event. It is a "
             "lasting fault, or the new normal: then go on with `update`. score_after are scores against the new operating point."
         )
-    )
 
 
 def event_rows(

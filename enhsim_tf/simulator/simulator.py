@@ -241,16 +241,10 @@ class EnhancedSimulator:
         return windows
 
     def complete(self, drawn: Drawn, levels: np.ndarray | None, noise_rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
-        """Completes coarse windows to telemetry, and marks the samples that a degraded mode has changed.
+        """Completes coarse windows to telemetry; returns float32 windows, and a mask of the samples that a degraded mode has changed.
 
-        Args:
-            drawn: Coarse windows, nominal and degraded.
-            levels: Offset and gain of each window and channel, shape `(windows, channels, 2)`, or None.
-            noise_rng: Random generator of the noise, or None for windows without noise.
-
-        Returns:
-            float32 windows and a boolean mask of shape `(windows, samples, channels)`. Noise follows the nominal signal, so samples that are
-            not marked equal the nominal ones to the bit.
+        `levels` are offset and gain of each window and channel, shape `(windows, channels, 2)`. Noise, if there is a generator of it, follows the
+        nominal signal, so samples that are not marked equal the nominal ones to the bit.
         """
         shift, gain = (None, None) if levels is None else (levels[..., 0], levels[..., 1])
         clean = self.enhance(drawn.nominal, shift, gain)
@@ -258,9 +252,7 @@ class EnhancedSimulator:
         if drawn.coarse is not drawn.nominal:
             degraded = self.enhance(drawn.coarse, shift, gain)
             windows, mask = put_changes(clean, degraded, drawn, [(0, self.window)], fade_length(self.window), self._tolerance)
-        if noise_rng is None:
-            return check_finite(windows), mask
-        return self._with_noise(windows, clean, mask, noise_rng)
+        return (windows, mask) if noise_rng is None else self._with_noise(windows, clean, mask, noise_rng)
 
     @property
     def _tolerance(self) -> np.ndarray:
@@ -407,11 +399,7 @@ class EnhancedSimulator:
         return record(runs.coarse, time_s, scenario, np.random.default_rng(seed), labels=labels)
 
     def recorded_runs(self) -> Runs:
-        """Returns the alignment of a simulator of recorded runs.
-
-        Raises:
-            InputError: If it is one of square waves.
-        """
+        """Returns the alignment of a simulator of recorded runs; raises InputError if it is one of square waves."""
         if not isinstance(self.alignment, Runs):
             raise InputError(
                 "Expected a model of recorded runs. Received: one of square waves, which needs no run. Leave --coarse out, or fit with it."
@@ -516,11 +504,7 @@ def _check_count(name: str, count: Any, least: int) -> None:
 
 
 def check_finite(windows: np.ndarray) -> np.ndarray:
-    """Returns generated telemetry.
-
-    Raises:
-        InputError: If a value is not finite.
-    """
+    """Returns generated telemetry; raises InputError if a value is not finite."""
     bad = np.size(windows) - np.count_nonzero(np.isfinite(windows))
     if bad:
         raise InputError(

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from enhsim_tf.coarse_simulator.degraded import Degraded
     from enhsim_tf.simulator.simulator import EnhancedSimulator
 
+_RATE = 0.01  # share of nominal windows that count as outside the range
 _NUM_NOMINAL = 900  # coarse windows for fitting the range, and as many others for its limit
 _LEAST_LIMIT = 1e-3  # lower bound of the limit, for periodic coarse windows whose scores are all close to 0
 
@@ -25,21 +26,20 @@ class TrustedRange:
 
     Args:
         simulator: A simulator fitted to nominal telemetry.
-        rate: Share of nominal windows that count as outside the range.
 
     Example:
     >>> trusted = TrustedRange(simulator)
     >>> trusted.share_outside(Degraded("stuck", severity=0.5))
     """
 
-    def __init__(self, simulator: "EnhancedSimulator", rate: float = 0.01):
+    def __init__(self, simulator: "EnhancedSimulator"):
         self.simulator = simulator
         learnt, held_out = (self._drawn(None, _NUM_NOMINAL, seed) for seed in range(2))
         self._centre, self._scale = learnt.mean(axis=(0, 1), dtype=np.float64), spread_of(learnt)
         self._range, self._limit = None, _LEAST_LIMIT
         if np.ptp(learnt, axis=0).any():  # whatever differs from constant levels is outside
             self._range = OutOfRange().fit(self._rows(learnt))
-            limit, _ = metrics.finite_threshold(self._range.score(self._rows(held_out)), rate)
+            limit, _ = metrics.finite_threshold(self._range.score(self._rows(held_out)), _RATE)
             self._limit = max(limit, _LEAST_LIMIT)
 
     def _rows(self, windows: np.ndarray) -> np.ndarray:
@@ -48,7 +48,7 @@ class TrustedRange:
     def score(self, coarse: np.ndarray) -> np.ndarray:
         """Scores how far coarse windows of shape `(windows, samples, columns)` are outside the training range, float64 of shape `(windows,)`.
 
-        A share `rate` of nominal windows scores above 1.
+        One per cent of nominal windows score above 1.
         """
         rows = self._rows(coarse)
         scores = np.sqrt(np.mean(rows**2, axis=1, dtype=np.float64)) if self._range is None else self._range.score(rows)

@@ -21,15 +21,10 @@ _NUM_WINDOWS = 300  # of the held-out end, on which errors are measured
 
 @dataclasses.dataclass(frozen=True)
 class UpdateReport:
-    """What an update changed.
+    """What an update changed: the state of the old and of the new simulator on the held-out end of the new telemetry.
 
-    Args:
-        channels: Names of the channels.
-        num_samples: Number of samples of the new telemetry.
-        num_held_out: Number of them on which both simulators were judged.
-        before: The old simulator there: `level`, `gain`, `period_s` and `noise_sd` of each channel by name, the error of the enhanced signal
-            (`nrmse`) and the share of flagged samples (`alarms`).
-        after: The same of the new one.
+    A state is `level`, `gain`, `period_s`, `noise_sd` and `nrmse`, the error of the enhanced signal, of each channel by name, and `alarms`, the
+    share of flagged samples.
     """
 
     channels: list[str]
@@ -76,9 +71,7 @@ def update(
         InputError: If the telemetry has other channels or another interval, or is too short.
     """
     check_fits(simulator, telemetry, run)
-    known = {field.name for field in dataclasses.fields(FitOptions)}
-    kept = {name: value for name, value in dict(simulator.trained.get("options", {})).items() if name in known}
-    options = FitOptions(**kept | {"held_out": held_out, "seed": seed})
+    options = FitOptions(**simulator.trained["options"] | {"held_out": held_out, "seed": seed})
     telemetry = dataclasses.replace(telemetry, columns=simulator.channels)
     new, _ = fit(telemetry, run, options)
     new.trained["updates"] = [*simulator.trained.get("updates", ()), {"num_samples": len(telemetry), "held_out": held_out, "seed": seed}]

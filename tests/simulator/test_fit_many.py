@@ -2,9 +2,9 @@ import hashlib
 
 import numpy as np
 import pandas as pd
-import pytest
 
-from enhsim_tf.common.errors import InputError
+from enhsim_tf.common.parallel.local import ProcessesDiedError
+from enhsim_tf.simulator import fit_many
 from enhsim_tf.simulator.fit_many import fit_channels
 from enhsim_tf.simulator.model_folder import channels_of, models_of, name_of_channels
 from enhsim_tf.simulator.options import FitOptions
@@ -52,9 +52,17 @@ def test_channels_of_other_rates_become_simulators_of_their_own(tmp_path):
     assert sorted(reports) == ["fast", "volts~watts"] and not failed
 
 
-def test_a_folder_with_something_else_is_left_alone(tmp_path):
-    (tmp_path / "models" / "volts").mkdir(parents=True)
-    (tmp_path / "models" / "volts" / "notes.txt").write_text("mine")
-    with pytest.raises(InputError, match="something else"):
-        fitted(tmp_path, table(), separately=True)
-    assert (tmp_path / "models" / "volts" / "notes.txt").read_text() == "mine"
+def test_a_channel_that_kills_its_worker_is_reported_and_stops_no_other(tmp_path, monkeypatch):
+    tried = []
+
+    def run(engine, work, jobs, workers, threads):
+        tried.append(([job.name for job in jobs], workers))
+        for place, job in enumerate(jobs):
+            if job.name == "bad":
+                raise ProcessesDiedError("killed", jobs[place : place + 2])
+            yield fit_many.Outcome(job.name, lines=[job.name])
+
+    monkeypatch.setattr(fit_many.engines, "run", run)
+    _, failed, lines = fitted(tmp_path, dict.fromkeys(["a", "bad", "c", "d"]), separately=True, workers=4)
+    assert list(failed) == ["bad"] and "memory" in failed["bad"] and lines == ["a", "c", "d"]
+    assert tried == [(["a", "bad", "c", "d"], 4), (["c"], 1), (["bad"], 1), (["d"], 4)]

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from enhsim_tf.coarse_simulator.interface import FunctionSimulator
 from enhsim_tf.common.errors import InputError
 from enhsim_tf.simulator.fitting import fit
 from enhsim_tf.simulator.options import FitOptions
@@ -34,12 +33,6 @@ def test_a_delay_between_run_and_telemetry_is_recovered():
     late = Telemetry(late.values, late.interval_s, 70.0, late.start, late.name)  # the same values, seven samples later
     simulator, report = fit(late, coarse_run(4_000), QUICK)
     assert simulator.alignment.delay_s == 70.0 and any("later than the coarse run" in note for note in report.notes)
-
-
-def test_a_function_is_run_at_the_times_of_the_telemetry():
-    wave = FunctionSimulator(lambda time_s: np.sign(np.sin(2 * np.pi * (time_s / 10 + 4) / PERIOD + 1e-6)), ["square"])
-    simulator, report = fit(series(), wave, QUICK)
-    assert report.nrmse["volts"]["enhanced"] < 0.1 and simulator.alignment.coarse is wave
 
 
 def test_telemetry_without_a_period_gets_a_constant_level():
